@@ -1,0 +1,17 @@
+//! Robot, scene, settings and trajectory files: reading, checking, and the robot digest.
+//!
+//! Every file is hostile until checked. A reader collects every fault and reports them all at once, each with file,
+//! key, value and what was expected; unknown keys are faults.
+#![forbid(unsafe_code)]
+
+pub mod fault;
+pub mod robot;
+pub mod scene;
+pub mod settings;
+pub mod trajectory_file;
+
+pub use fault::{Fault, Faults};
+pub use robot::{LinkShape, Robot, RobotJoint};
+pub use scene::{Obstacle, Scene, Shape};
+pub use settings::{Bus, BusKind, Servo, Settings};
+pub use trajectory_file::TrajectoryFile;

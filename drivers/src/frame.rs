@@ -1,0 +1,169 @@
+//! CAN frames, classic and FD, in one fixed-size type.
+
+/// Flag of a 29-bit id in [`CanId`] (as in linux/can.h).
+const EXTENDED: u32 = 0x8000_0000;
+/// Flag of a remote request in [`CanId`].
+const REMOTE: u32 = 0x4000_0000;
+/// Flag of an error frame in [`CanId`].
+const ERROR: u32 = 0x2000_0000;
+/// Largest 11-bit id.
+const STANDARD_MAX: u32 = 0x7FF;
+
+/// A CAN id with its kind, laid out as `canid_t`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
+pub struct CanId(u32);
+
+impl CanId {
+    /// An 11-bit id; higher bits are cut off.
+    #[must_use]
+    pub const fn standard(id: u16) -> Self {
+        Self(id as u32 & STANDARD_MAX)
+    }
+    /// From the kernel's representation.
+    #[must_use]
+    pub const fn from_raw(raw: u32) -> Self {
+        Self(raw)
+    }
+    /// As the kernel represents it.
+    #[must_use]
+    pub const fn raw(self) -> u32 {
+        self.0
+    }
+    /// The 11-bit id of a standard data frame; `None` for extended, remote and error frames.
+    #[must_use]
+    pub const fn as_standard_data(self) -> Option<u16> {
+        if self.0 & (EXTENDED | REMOTE | ERROR) == 0 {
+            #[expect(clippy::cast_possible_truncation, reason = "masked to 11 bits")]
+            Some((self.0 & STANDARD_MAX) as u16)
+        } else {
+            None
+        }
+    }
+    /// True for an error frame of the kernel.
+    #[must_use]
+    pub const fn is_error(self) -> bool {
+        self.0 & ERROR != 0
+    }
+    /// True for a remote request.
+    #[must_use]
+    pub const fn is_remote(self) -> bool {
+        self.0 & REMOTE != 0
+    }
+}
+
+/// One frame, laid out as `canfd_frame`; a classic frame uses the first 8 data bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C, align(8))]
+pub struct CanFrame {
+    id: CanId,
+    len: u8,
+    flags: u8,
+    reserved: [u8; 2],
+    data: [u8; 64],
+}
+
+/// Size of a classic frame at the kernel's interface.
+pub const CLASSIC_SIZE: usize = 16;
+/// Size of an FD frame at the kernel's interface.
+pub const FD_SIZE: usize = 72;
+/// `CANFD_FDF`: the frame is an FD frame.
+const FDF: u8 = 0x04;
+
+impl CanFrame {
+    /// A classic data frame; bytes beyond 8 are cut off.
+    #[must_use]
+    pub fn classic(id: CanId, bytes: &[u8]) -> Self {
+        Self::with(id, bytes, 8, 0)
+    }
+    /// An FD frame with bit rate switch; bytes beyond 64 are cut off.
+    #[must_use]
+    pub fn fd(id: CanId, bytes: &[u8]) -> Self {
+        Self::with(id, bytes, 64, FDF | 0x01)
+    }
+    fn with(id: CanId, bytes: &[u8], most: usize, flags: u8) -> Self {
+        let mut frame = Self { id, len: 0, flags, reserved: [0; 2], data: [0; 64] };
+        for (slot, byte) in frame.data.iter_mut().zip(bytes.iter().take(most)) {
+            *slot = *byte;
+            frame.len += 1;
+        }
+        frame
+    }
+    /// Its id.
+    #[must_use]
+    pub fn id(&self) -> CanId {
+        self.id
+    }
+    /// Its data; a length beyond the kind's largest (it came from outside) is cut off.
+    #[must_use]
+    pub fn data(&self) -> &[u8] {
+        let most = if self.is_fd() { 64 } else { 8 };
+        self.data.get(..usize::from(self.len).min(most)).unwrap_or(&[])
+    }
+    /// True for an FD frame.
+    #[must_use]
+    pub fn is_fd(&self) -> bool {
+        self.flags & FDF != 0
+    }
+    /// Bytes at the kernel's interface.
+    #[must_use]
+    pub fn wire_size(&self) -> usize {
+        if self.is_fd() { FD_SIZE } else { CLASSIC_SIZE }
+    }
+}
+
+impl Default for CanFrame {
+    fn default() -> Self {
+        Self::classic(CanId::standard(0), &[])
+    }
+}
+
+const _: () = assert!(size_of::<CanFrame>() == FD_SIZE);
+
+/// Most frames that one bus sends, or hands over, in one cycle.
+pub const BATCH_MAX: usize = 64;
+
+/// The frames of one cycle on one bus, in sending order. Fixed capacity, no allocation.
+#[derive(Clone, Debug)]
+pub struct FrameBatch {
+    frames: [CanFrame; BATCH_MAX],
+    count: usize,
+}
+
+impl FrameBatch {
+    /// Empty.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { frames: [CanFrame::default(); BATCH_MAX], count: 0 }
+    }
+    /// Forgets all frames.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+    /// Appends a frame; false when the batch is full.
+    pub fn push(&mut self, frame: CanFrame) -> bool {
+        let Some(slot) = self.frames.get_mut(self.count) else { return false };
+        *slot = frame;
+        self.count += 1;
+        true
+    }
+    /// The frames.
+    #[must_use]
+    pub fn frames(&self) -> &[CanFrame] {
+        self.frames.get(..self.count).unwrap_or(&[])
+    }
+    /// All slots, for a link that fills them itself and then calls [`Self::set_count`].
+    pub fn slots(&mut self) -> &mut [CanFrame; BATCH_MAX] {
+        &mut self.frames
+    }
+    /// How many slots hold a frame; more than fit are cut off.
+    pub fn set_count(&mut self, count: usize) {
+        self.count = count.min(BATCH_MAX);
+    }
+}
+
+impl Default for FrameBatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}

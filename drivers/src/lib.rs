@@ -1,0 +1,13 @@
+//! CAN links, servo protocols and simulated servos.
+//!
+//! A link moves frames and knows no protocol. A servo driver turns joint commands into frames and frames into
+//! joint feedback, and does no I/O. Simulated servos sit behind the same links and decode real frames.
+#![deny(unsafe_code)]
+
+pub mod frame;
+pub mod link;
+pub mod servo;
+
+pub use frame::{CanFrame, CanId, FrameBatch};
+pub use link::{CanLink, LinkFault};
+pub use servo::{DriveState, DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};

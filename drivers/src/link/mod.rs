@@ -1,0 +1,44 @@
+//! What moves frames: SocketCAN, or the local link on a host whose kernel has no CAN.
+use crate::frame::{CanFrame, FrameBatch};
+
+/// Why a link did not take, or give, frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LinkFault {
+    /// ENOBUFS or EAGAIN: nobody takes frames from the queue.
+    #[error("transmit queue full; are the drives powered and is the bus terminated?")]
+    QueueFull,
+    /// ENETDOWN: the interface is down.
+    #[error("interface is down; bring it up: ip link set IFACE up")]
+    Down,
+    /// ENXIO, ENODEV, or the peer of a local link has gone: the interface does not exist any more.
+    #[error("interface has gone")]
+    Gone,
+    /// Another error of the operating system.
+    #[error("operating system error {0}")]
+    Os(i32),
+}
+
+/// What became of a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// How many frames were taken, from the front.
+    pub count: usize,
+    /// Why not all.
+    pub fault: Option<LinkFault>,
+}
+
+/// A CAN bus as the cycle sees it. Never waits, never allocates after it was opened.
+pub trait CanLink: Send {
+    /// Hands the frames over in order, in as few system calls as possible.
+    ///
+    /// Real time: one system call, never waits.
+    fn send(&mut self, frames: &[CanFrame]) -> Sent;
+
+    /// Replaces the batch by what has arrived, oldest first, at most its capacity. Error frames come too.
+    ///
+    /// Real time: one system call, never waits.
+    fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault>;
+
+    /// What it is, for messages: "socketcan vcan0" or "local link vcan0".
+    fn describe(&self) -> String;
+}

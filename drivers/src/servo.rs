@@ -1,0 +1,134 @@
+//! The seam between the cycle and a servo protocol.
+//!
+//! A driver serves the joints of one bus that speak one protocol. It is pure: frames in, frames out, time as an
+//! argument. Bring-up (finding, configuring, energising) is a state machine inside the driver, advanced once a
+//! cycle by `encode`; the streamer only wishes and watches.
+use crate::frame::{CanFrame, FrameBatch};
+use taustream_motion::MAX_JOINTS;
+
+/// CLOCK_MONOTONIC in nanoseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Nanos(pub u64);
+
+impl Nanos {
+    /// Seconds from `earlier` to this; 0 when `earlier` is later.
+    #[must_use]
+    pub fn since_s(self, earlier: Self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
+        let ns = self.0.saturating_sub(earlier.0) as f64;
+        ns * 1e-9
+    }
+}
+
+/// What one joint is told, on the link side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointCommand {
+    /// Target angle.
+    pub position_rad: f64,
+    /// Its derivative.
+    pub velocity_rad_s: f64,
+    /// Its second derivative.
+    pub acceleration_rad_s2: f64,
+}
+
+/// What the streamer wants of all drives of a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveWish {
+    /// Configured, communicating, not energised.
+    Disabled,
+    /// Energised, following the commands.
+    Enabled,
+    /// De-energised at once, whatever the state: the emergency wish.
+    TorqueOff,
+}
+
+/// Where one drive is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveState {
+    /// Nothing heard yet.
+    Absent,
+    /// Being configured.
+    Configuring,
+    /// It was found energised before anything was sent to it; nothing was changed, and nothing will be.
+    EnergisedUnowned,
+    /// Configured, communicating, not energised.
+    Disabled,
+    /// On its way to energised.
+    Enabling,
+    /// Energised and following the commands.
+    Enabled,
+    /// On its way to de-energised.
+    Disabling,
+    /// In its fault state (or reacting to a fault).
+    Fault,
+    /// It refused a configuration step; see [`ServoStatus::error_code`] and [`ServoStatus::refused_object`].
+    Refused,
+}
+
+/// What is known of one joint's drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoStatus {
+    /// Where it is.
+    pub state: DriveState,
+    /// Measured link angle; NaN before the first feedback.
+    pub position_rad: f64,
+    /// Measured link velocity; NaN when the drive does not send it.
+    pub velocity_rad_s: f64,
+    /// When the newest feedback arrived; `None` before the first.
+    pub received: Option<Nanos>,
+    /// The protocol's status word.
+    pub status_word: u32,
+    /// The protocol's error code (EMCY code, or SDO abort code when refused); 0 for none.
+    pub error_code: u32,
+    /// Object that was refused, `index << 8 | sub`; 0 for none.
+    pub refused_object: u32,
+    /// The drive warns.
+    pub warning: bool,
+}
+
+impl ServoStatus {
+    /// Before anything was heard.
+    pub const UNKNOWN: Self = Self {
+        state: DriveState::Absent,
+        position_rad: f64::NAN,
+        velocity_rad_s: f64::NAN,
+        received: None,
+        status_word: 0,
+        error_code: 0,
+        refused_object: 0,
+        warning: false,
+    };
+}
+
+/// A protocol's master side for the joints of one bus.
+pub trait ServoDriver: Send {
+    /// Writes this cycle's frames, in sending order (SYNC first). `commands` is indexed by joint of the arm.
+    ///
+    /// Real time: no allocation, no I/O, bounded work.
+    fn encode(
+        &mut self,
+        now: Nanos,
+        wish: DriveWish,
+        commands: &[JointCommand; MAX_JOINTS],
+        out: &mut FrameBatch,
+    );
+
+    /// Takes one received frame; frames of others, and malformed ones, change nothing.
+    ///
+    /// Real time: no allocation, no I/O, bounded work.
+    fn decode(&mut self, now: Nanos, frame: &CanFrame);
+
+    /// The arm's joints that this driver serves.
+    fn joints(&self) -> &[usize];
+
+    /// What is known of a joint of [`Self::joints`]; [`ServoStatus::UNKNOWN`] for any other.
+    fn status(&self, joint: usize) -> ServoStatus;
+
+    /// Asks drives in fault to forget it (rising edge of fault reset), over the next cycles.
+    ///
+    /// Real time: no allocation.
+    fn clear_faults(&mut self);
+
+    /// The sentence for an error code of this protocol: "0x8611 following error too large".
+    fn explain(&self, error_code: u32) -> String;
+}

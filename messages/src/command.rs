@@ -1,0 +1,152 @@
+//! Commands to the streamer and its answers (request-response).
+use crate::{LAYOUT_VERSION, Phase, Text};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// What an operator, or the planner, may ask of the streamer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Energise the drives and hold.
+    Enable,
+    /// De-energise the drives; only at rest.
+    Disable,
+    /// sigma to 0, keeping the trajectory.
+    Pause,
+    /// sigma back to the override.
+    Resume,
+    /// sigma to 0, then drop the trajectory and hold.
+    Stop,
+    /// sigma to 0 as fast as the stop limits allow, then fault.
+    FastStop,
+    /// De-energise at once. The arm may fall.
+    TorqueOff,
+    /// Speed override in percent, 0 to 100.
+    Speed {
+        /// The override in percent.
+        percent: f64,
+    },
+    /// Forget a fault whose cause is gone.
+    ClearFault,
+}
+
+/// A command on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct CommandRequest {
+    layout_version: u32,
+    code: u32,
+    value: f64,
+}
+
+/// The answer on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct CommandReply {
+    layout_version: u32,
+    accepted: u32,
+    phase: u32,
+    reserved: u32,
+    text: Text,
+}
+
+/// Why a request is not a command.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum CommandError {
+    /// Written by another version.
+    #[error("layout version {got}, expected {LAYOUT_VERSION}; use command line and streamer of one release")]
+    Layout {
+        /// The version in the message.
+        got: u32,
+    },
+    /// No such command.
+    #[error("unknown command code {got}")]
+    Unknown {
+        /// The code in the message.
+        got: u32,
+    },
+    /// The override is not a number from 0 to 100.
+    #[error("speed is {percent} %; it must be from 0 to 100 %")]
+    Percent {
+        /// The value in the message.
+        percent: f64,
+    },
+}
+
+impl From<Command> for CommandRequest {
+    fn from(command: Command) -> Self {
+        let (code, value) = match command {
+            Command::Enable => (1, 0.0),
+            Command::Disable => (2, 0.0),
+            Command::Pause => (3, 0.0),
+            Command::Resume => (4, 0.0),
+            Command::Stop => (5, 0.0),
+            Command::FastStop => (6, 0.0),
+            Command::TorqueOff => (7, 0.0),
+            Command::Speed { percent } => (8, percent),
+            Command::ClearFault => (9, 0.0),
+        };
+        Self { layout_version: LAYOUT_VERSION, code, value }
+    }
+}
+
+impl TryFrom<&CommandRequest> for Command {
+    type Error = CommandError;
+
+    fn try_from(r: &CommandRequest) -> Result<Self, CommandError> {
+        if r.layout_version != LAYOUT_VERSION {
+            return Err(CommandError::Layout { got: r.layout_version });
+        }
+        Ok(match r.code {
+            1 => Self::Enable,
+            2 => Self::Disable,
+            3 => Self::Pause,
+            4 => Self::Resume,
+            5 => Self::Stop,
+            6 => Self::FastStop,
+            7 => Self::TorqueOff,
+            8 if (0.0..=100.0).contains(&r.value) => Self::Speed { percent: r.value },
+            8 => return Err(CommandError::Percent { percent: r.value }),
+            9 => Self::ClearFault,
+            got => return Err(CommandError::Unknown { got }),
+        })
+    }
+}
+
+impl CommandReply {
+    /// Taken over; `text` says what happens now.
+    #[must_use]
+    pub fn accepted(phase: Phase, text: &str) -> Self {
+        Self::new(true, phase, text)
+    }
+    /// Refused; `text` says why and what to do.
+    #[must_use]
+    pub fn refused(phase: Phase, text: &str) -> Self {
+        Self::new(false, phase, text)
+    }
+    fn new(accepted: bool, phase: Phase, text: &str) -> Self {
+        Self {
+            layout_version: LAYOUT_VERSION,
+            accepted: u32::from(accepted),
+            phase: phase.code(),
+            reserved: 0,
+            text: Text::new(text),
+        }
+    }
+    /// True when the command was taken over. An answer of another layout counts as refused.
+    #[must_use]
+    pub fn is_accepted(&self) -> bool {
+        self.layout_version == LAYOUT_VERSION && self.accepted == 1
+    }
+    /// The phase when the answer was written.
+    #[must_use]
+    pub fn phase(&self) -> Option<Phase> {
+        Phase::from_code(self.phase)
+    }
+    /// What happens now, or why not.
+    #[must_use]
+    pub fn text(&self) -> String {
+        self.text.read()
+    }
+}
+
+const _: () = assert!(size_of::<CommandRequest>() == 16);
+const _: () = assert!(size_of::<CommandReply>() == 264);

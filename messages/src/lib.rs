@@ -1,0 +1,26 @@
+//! What crosses shared memory between planner, streamer and command line.
+//!
+//! Every message is plain `repr(C)` data of fixed size that begins with [`LAYOUT_VERSION`]. It is untrusted
+//! until checked: copy it out, then convert it. Nothing outside this crate reads the raw fields of a
+//! [`TrajectoryMessage`]; the one door is [`CheckedTrajectory`].
+#![deny(unsafe_code)]
+
+pub mod command;
+pub mod phase;
+pub mod plan;
+pub mod receipt;
+pub mod report;
+pub mod service;
+pub mod text;
+pub mod trajectory;
+
+pub use command::{Command, CommandReply, CommandRequest};
+pub use phase::{FaultReason, Phase};
+pub use plan::{PlanReply, PlanRequest};
+pub use receipt::{Outcome, Receipt, Rejection};
+pub use report::Report;
+pub use text::Text;
+pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
+
+/// Version of every layout in this crate; a change of any message raises it.
+pub const LAYOUT_VERSION: u32 = 1;

@@ -1,0 +1,233 @@
+//! Replan requests to the planner and its answers (request-response).
+use crate::{LAYOUT_VERSION, Receipt, Text};
+use iceoryx2::prelude::ZeroCopySend;
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// When a new plan takes over from a motion that runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// Cut the running motion. From rest: at once.
+    AtOnce,
+    /// Plan from the end of the running motion, and start when it has ended.
+    AfterCurrent,
+}
+
+/// A replan request on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct PlanRequest {
+    layout_version: u32,
+    joint_count: u32,
+    when: u32,
+    deadline_ms: u32,
+    seed: u64,
+    goal_rad: [f64; MAX_JOINTS],
+    planner: Text,
+}
+
+/// What a checked request asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckedPlanRequest {
+    /// How many joints the goal has.
+    pub joints: usize,
+    /// Where to go.
+    pub goal_rad: JointArray,
+    /// When to take over.
+    pub when: When,
+    /// How long planning may take.
+    pub deadline_ms: u32,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Name of a planner; empty for the default.
+    pub planner: String,
+}
+
+/// Why a request is refused before planning.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlanRequestError {
+    /// Written by another version.
+    #[error("layout version {got}, expected {LAYOUT_VERSION}; use command line and planner of one release")]
+    Layout {
+        /// The version in the message.
+        got: u32,
+    },
+    /// Not 1 to 8 joints.
+    #[error("{got} joint values; an arm has 1 to {MAX_JOINTS}")]
+    Joints {
+        /// The count in the message.
+        got: u32,
+    },
+    /// The goal is not finite.
+    #[error("goal of joint {} is {value_rad}; it must be finite (rad)", joint + 1)]
+    Goal {
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// The value in the message.
+        value_rad: f64,
+    },
+    /// Neither at once nor after current.
+    #[error("unknown start code {got}; 0 (at once) or 1 (after current)")]
+    When {
+        /// The code in the message.
+        got: u32,
+    },
+}
+
+impl From<&CheckedPlanRequest> for PlanRequest {
+    fn from(r: &CheckedPlanRequest) -> Self {
+        Self {
+            layout_version: LAYOUT_VERSION,
+            joint_count: u32::try_from(r.joints).unwrap_or(u32::MAX),
+            when: match r.when {
+                When::AtOnce => 0,
+                When::AfterCurrent => 1,
+            },
+            deadline_ms: r.deadline_ms,
+            seed: r.seed,
+            goal_rad: r.goal_rad,
+            planner: Text::new(&r.planner),
+        }
+    }
+}
+
+impl TryFrom<&PlanRequest> for CheckedPlanRequest {
+    type Error = PlanRequestError;
+
+    fn try_from(r: &PlanRequest) -> Result<Self, PlanRequestError> {
+        if r.layout_version != LAYOUT_VERSION {
+            return Err(PlanRequestError::Layout { got: r.layout_version });
+        }
+        let joints = usize::try_from(r.joint_count)
+            .ok()
+            .filter(|n| (1..=MAX_JOINTS).contains(n))
+            .ok_or(PlanRequestError::Joints { got: r.joint_count })?;
+        let when = match r.when {
+            0 => When::AtOnce,
+            1 => When::AfterCurrent,
+            got => return Err(PlanRequestError::When { got }),
+        };
+        for (joint, &value_rad) in r.goal_rad.iter().enumerate() {
+            if !value_rad.is_finite() || (joint >= joints && value_rad != 0.0) {
+                return Err(PlanRequestError::Goal { joint, value_rad });
+            }
+        }
+        Ok(Self {
+            joints,
+            goal_rad: r.goal_rad,
+            when,
+            deadline_ms: r.deadline_ms,
+            seed: r.seed,
+            planner: r.planner.read(),
+        })
+    }
+}
+
+/// The planner's answer on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct PlanReply {
+    layout_version: u32,
+    planned: u32,
+    trajectory_id: u64,
+    planning_s: f64,
+    duration_s: f64,
+    clearance_m: f64,
+    stroke_count: u32,
+    received: u32,
+    receipt: Receipt,
+    text: Text,
+}
+
+/// The answer, read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlanOutcome {
+    /// No motion was found, or the request is refused; nothing was sent to the streamer.
+    Failed {
+        /// Why, and what to do.
+        reason: String,
+    },
+    /// A verified motion was sent to the streamer.
+    Planned {
+        /// Names the trajectory.
+        trajectory_id: u64,
+        /// How long planning took.
+        planning_s: f64,
+        /// How long the motion takes at full speed.
+        duration_s: f64,
+        /// Least distance to any obstacle or between links.
+        clearance_m: f64,
+        /// How many strokes.
+        strokes: u32,
+        /// What planned it: "straight line", "RRT-Connect", ...
+        how: String,
+        /// The streamer's receipt; `None` when it did not answer in time.
+        receipt: Option<Box<Receipt>>,
+    },
+}
+
+impl PlanReply {
+    /// Writes an outcome down.
+    #[must_use]
+    pub fn new(outcome: &PlanOutcome) -> Self {
+        let nothing = Receipt::new(0, 0, &crate::Outcome::Rejected(crate::Rejection::Busy));
+        let mut reply = Self {
+            layout_version: LAYOUT_VERSION,
+            planned: 0,
+            trajectory_id: 0,
+            planning_s: 0.0,
+            duration_s: 0.0,
+            clearance_m: 0.0,
+            stroke_count: 0,
+            received: 0,
+            receipt: nothing,
+            text: Text::default(),
+        };
+        match outcome {
+            PlanOutcome::Failed { reason } => reply.text = Text::new(reason),
+            PlanOutcome::Planned {
+                trajectory_id,
+                planning_s,
+                duration_s,
+                clearance_m,
+                strokes,
+                how,
+                receipt,
+            } => {
+                reply.planned = 1;
+                reply.trajectory_id = *trajectory_id;
+                (reply.planning_s, reply.duration_s) = (*planning_s, *duration_s);
+                (reply.clearance_m, reply.stroke_count) = (*clearance_m, *strokes);
+                reply.text = Text::new(how);
+                if let Some(receipt) = receipt {
+                    (reply.received, reply.receipt) = (1, **receipt);
+                }
+            }
+        }
+        reply
+    }
+
+    /// The typed answer.
+    #[must_use]
+    pub fn outcome(&self) -> PlanOutcome {
+        if self.layout_version != LAYOUT_VERSION {
+            let got = self.layout_version;
+            let reason = format!("the planner answers in layout version {got}, expected {LAYOUT_VERSION}");
+            return PlanOutcome::Failed { reason };
+        }
+        if self.planned != 1 {
+            return PlanOutcome::Failed { reason: self.text.read() };
+        }
+        PlanOutcome::Planned {
+            trajectory_id: self.trajectory_id,
+            planning_s: self.planning_s,
+            duration_s: self.duration_s,
+            clearance_m: self.clearance_m,
+            strokes: self.stroke_count,
+            how: self.text.read(),
+            receipt: (self.received == 1).then(|| Box::new(self.receipt)),
+        }
+    }
+}
+
+const _: () = assert!(size_of::<PlanRequest>() == 336);
+const _: () = assert!(size_of::<PlanReply>() == 48 + 312 + 248);

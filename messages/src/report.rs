@@ -1,0 +1,124 @@
+//! The streamer's state, published off the real-time thread at a settable rate.
+use crate::{FaultReason, LAYOUT_VERSION, Phase, RobotDigest};
+use iceoryx2::prelude::ZeroCopySend;
+use taustream_motion::MAX_JOINTS;
+
+/// A report on the wire. Read [`Report::checked`] before any field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct Report {
+    /// See [`LAYOUT_VERSION`].
+    pub layout_version: u32,
+    /// How many joints the arm has.
+    pub joint_count: u32,
+    /// Number of this report; gaps are reports that this reader missed.
+    pub sequence: u64,
+    /// Cycle number.
+    pub tick: u64,
+    /// CLOCK_MONOTONIC of the cycle.
+    pub time_ns: u64,
+    /// The robot that the streamer drives.
+    pub robot_digest: RobotDigest,
+    /// [`Phase::code`].
+    pub phase: u32,
+    /// [`FaultReason::code`], 0 for none.
+    pub fault_reason: u32,
+    /// Zero-based joint of the fault; `u32::MAX` for none.
+    pub fault_joint: u32,
+    /// 1 when at least one drive is energised.
+    pub energised: u32,
+    /// The number that belongs to the fault reason.
+    pub fault_value: f64,
+    /// The limit that it broke.
+    pub fault_limit: f64,
+    /// Newest generation accepted; a sender uses this plus 1.
+    pub generation: u64,
+    /// The trajectory that runs or ran last; 0 for none.
+    pub trajectory_id: u64,
+    /// Its trajectory time.
+    pub trajectory_s: f64,
+    /// Its duration at full speed.
+    pub trajectory_duration_s: f64,
+    /// The pose it ends at; the commanded pose when none runs.
+    pub end_rad: [f64; MAX_JOINTS],
+    /// The time scale now.
+    pub sigma: f64,
+    /// The speed override in percent.
+    pub speed_percent: f64,
+    /// Commanded position, rad.
+    pub command_rad: [f64; MAX_JOINTS],
+    /// Commanded velocity, rad/s.
+    pub command_velocity_rad_s: [f64; MAX_JOINTS],
+    /// Commanded acceleration, rad/s^2.
+    pub command_acceleration_rad_s2: [f64; MAX_JOINTS],
+    /// Commanded jerk, rad/s^3.
+    pub command_jerk_rad_s3: [f64; MAX_JOINTS],
+    /// Measured position, rad.
+    pub measured_rad: [f64; MAX_JOINTS],
+    /// Measured velocity, rad/s; NaN where the drive does not send it.
+    pub measured_velocity_rad_s: [f64; MAX_JOINTS],
+    /// Age of the newest feedback a joint, s; infinite before the first.
+    pub feedback_age_s: [f64; MAX_JOINTS],
+    /// Tracking error a joint, rad.
+    pub tracking_error_rad: [f64; MAX_JOINTS],
+    /// Largest tracking error since the last enable, rad.
+    pub tracking_error_rad_max: [f64; MAX_JOINTS],
+    /// Drive status words (CiA 402 statusword, or the protocol's own).
+    pub drive_status: [u32; MAX_JOINTS],
+    /// Drive error codes, 0 for none.
+    pub drive_error: [u32; MAX_JOINTS],
+    /// Cycles since start.
+    pub cycles: u64,
+    /// Cycles that woke up more than half a period late.
+    pub cycles_late: u64,
+    /// Deadlines that were skipped.
+    pub cycles_skipped: u64,
+    /// Stalls that froze the trajectory.
+    pub stalls: u64,
+    /// Frames handed to the buses.
+    pub frames_sent: u64,
+    /// Frames that the buses refused.
+    pub frames_lost: u64,
+    /// Frames received.
+    pub frames_received: u64,
+    /// Guard trips.
+    pub guard_trips: u64,
+    /// Trajectories accepted.
+    pub accepted: u64,
+    /// Trajectories rejected.
+    pub rejected: u64,
+    /// Wake-up lateness over the last report window: median, ns.
+    pub lateness_ns_p50: u64,
+    /// 99th percentile, ns, since start.
+    pub lateness_ns_p99: u64,
+    /// 99.9th percentile, ns, since start.
+    pub lateness_ns_p999: u64,
+    /// Largest, ns, since start.
+    pub lateness_ns_max: u64,
+    /// Time in the cycle, 99th percentile, ns, since start.
+    pub cycle_ns_p99: u64,
+    /// Largest time in the cycle, ns, since start.
+    pub cycle_ns_max: u64,
+}
+
+impl Report {
+    /// The report when its layout, phase and joint count make sense.
+    #[must_use]
+    pub fn checked(&self) -> Option<(&Self, Phase)> {
+        let joints = usize::try_from(self.joint_count).ok()?;
+        let sane = self.layout_version == LAYOUT_VERSION && (1..=MAX_JOINTS).contains(&joints);
+        Phase::from_code(self.phase).filter(|_| sane).map(|phase| (self, phase))
+    }
+
+    /// How many joints, never more than [`MAX_JOINTS`].
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        usize::try_from(self.joint_count).unwrap_or(MAX_JOINTS).min(MAX_JOINTS)
+    }
+
+    /// The fault, if there is one.
+    #[must_use]
+    pub fn fault(&self) -> Option<FaultReason> {
+        FaultReason::from_code(self.fault_reason)
+    }
+}

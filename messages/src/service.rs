@@ -1,0 +1,374 @@
+//! Names, sizes and the explicit iceoryx2 configuration of every service.
+//!
+//! Segments lie in one flat name space of the host, so the arm's name and the user's id stand in the prefix:
+//! two arms, or two users, on one host do not meet. Nothing is read from an iceoryx2 file, and segments belong
+//! to one uid only.
+use crate::{CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TrajectoryMessage};
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::port::{client::Client, publisher::Publisher, server::Server, subscriber::Subscriber};
+use iceoryx2::prelude::{FileName, Path as IceoryxPath, SemanticString, SignalHandlingMode, ipc};
+use std::fs;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+/// Sends trajectories.
+pub type TrajectoryPublisher = Publisher<ipc::Service, TrajectoryMessage, ()>;
+/// Receives trajectories.
+pub type TrajectorySubscriber = Subscriber<ipc::Service, TrajectoryMessage, ()>;
+/// Sends receipts.
+pub type ReceiptPublisher = Publisher<ipc::Service, Receipt, ()>;
+/// Receives receipts.
+pub type ReceiptSubscriber = Subscriber<ipc::Service, Receipt, ()>;
+/// Sends reports.
+pub type ReportPublisher = Publisher<ipc::Service, Report, ()>;
+/// Receives reports.
+pub type ReportSubscriber = Subscriber<ipc::Service, Report, ()>;
+/// Asks the streamer.
+pub type CommandClient = Client<ipc::Service, CommandRequest, (), CommandReply, ()>;
+/// Answers commands.
+pub type CommandServer = Server<ipc::Service, CommandRequest, (), CommandReply, ()>;
+/// Asks the planner.
+pub type PlanClient = Client<ipc::Service, PlanRequest, (), PlanReply, ()>;
+/// Answers replan requests.
+pub type PlanServer = Server<ipc::Service, PlanRequest, (), PlanReply, ()>;
+
+/// Most processes that may use one service: planner, streamer and command lines.
+const NODES_MAX: usize = 32;
+/// Most subscribers of reports and receipts.
+const SUBSCRIBERS_MAX: usize = 24;
+/// Most processes that may send trajectories at one time.
+const PUBLISHERS_MAX: usize = 4;
+/// Reports that a slow reader may lag behind; older ones are overwritten.
+const REPORT_BUFFER: usize = 64;
+/// Receipts that a slow reader may lag behind.
+const RECEIPT_BUFFER: usize = 64;
+/// Trajectories that wait for the streamer's intake.
+const TRAJECTORY_BUFFER: usize = 8;
+/// Most clients of a request-response service.
+const CLIENTS_MAX: usize = 24;
+/// Longest arm name.
+const NAME_MAX: usize = 32;
+
+/// Why services cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ServiceError {
+    /// The arm's name does not fit into a file name.
+    #[error("arm name `{name}`: use 1 to {NAME_MAX} letters, digits, '-' or '_'")]
+    Name {
+        /// The name that was given.
+        name: String,
+    },
+    /// The runtime directory is not ours or cannot be made.
+    #[error("runtime directory {}: {why}", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        why: String,
+    },
+    /// Nobody serves this arm.
+    #[error("{who} of arm `{arm}` is not running for this user (uid {uid}){others}; start {who} first")]
+    NotRunning {
+        /// `taustream-streamer` or `taustream-planner`.
+        who: &'static str,
+        /// The arm's name.
+        arm: String,
+        /// Our user.
+        uid: u32,
+        /// Who serves it instead, as a clause; empty when nobody does.
+        others: String,
+    },
+    /// iceoryx2 refused.
+    #[error("shared memory of arm `{arm}`: cannot {what}: {why}")]
+    Refused {
+        /// The arm's name.
+        arm: String,
+        /// What was tried.
+        what: &'static str,
+        /// iceoryx2's reason.
+        why: String,
+    },
+}
+
+/// One process's access to the services of one arm of one user.
+#[derive(Debug)]
+pub struct Wire {
+    arm: String,
+    uid: u32,
+    node: Node<ipc::Service>,
+}
+
+/// The uid that services belong to: this process's.
+///
+/// # Errors
+/// When /proc is not mounted.
+pub fn own_uid() -> Result<u32, ServiceError> {
+    let path = PathBuf::from("/proc/self");
+    let metadata = fs::metadata(&path)
+        .map_err(|e| ServiceError::Directory { path, why: format!("{e}; mount /proc") })?;
+    Ok(metadata.uid())
+}
+
+/// The directory of sockets and service files, made (mode 0700) when it is missing and refused when it belongs
+/// to somebody else: `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (root, or its owner),
+/// else `/run/user/UID/taustream`, else `/tmp/taustream-UID`.
+///
+/// # Errors
+/// When it cannot be made or is not safe to use.
+pub fn runtime_directory() -> Result<PathBuf, ServiceError> {
+    let uid = own_uid()?;
+    let path = choose_directory(uid);
+    let fail = |why: String| ServiceError::Directory { path: path.clone(), why };
+    if let Err(e) = fs::DirBuilder::new().recursive(true).mode(0o700).create(&path) {
+        return Err(fail(format!(
+            "cannot be made: {e}; set TAUSTREAM_RUNTIME_DIR to a directory of your own"
+        )));
+    }
+    let metadata = fs::symlink_metadata(&path).map_err(|e| fail(e.to_string()))?;
+    if !metadata.is_dir() || metadata.uid() != uid {
+        let owner = metadata.uid();
+        return Err(fail(format!(
+            "is no directory of uid {uid} (owner {owner}); remove it or set TAUSTREAM_RUNTIME_DIR"
+        )));
+    }
+    Ok(path)
+}
+
+fn choose_directory(uid: u32) -> PathBuf {
+    if let Some(path) = std::env::var_os("TAUSTREAM_RUNTIME_DIR").filter(|p| !p.is_empty()) {
+        return PathBuf::from(path);
+    }
+    let system = PathBuf::from("/run/taustream");
+    let owned = fs::symlink_metadata(&system).is_ok_and(|m| m.uid() == uid);
+    let user = PathBuf::from(format!("/run/user/{uid}"));
+    if uid == 0 || owned {
+        system
+    } else if user.is_dir() {
+        user.join("taustream")
+    } else {
+        PathBuf::from(format!("/tmp/taustream-{uid}"))
+    }
+}
+
+/// True for a name that may stand in a file name.
+#[must_use]
+pub fn is_arm_name(name: &str) -> bool {
+    (1..=NAME_MAX).contains(&name.len())
+        && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
+}
+
+fn prefix(arm: &str, uid: u32) -> String {
+    format!("taustream.{uid}.{arm}.")
+}
+
+/// Other uids that have segments of an arm of this name, in rising order.
+fn other_users(arm: &str, own: u32) -> Vec<u32> {
+    let suffix = format!(".{arm}.");
+    let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let mut uids: Vec<u32> = entries
+        .filter_map(|e| {
+            let name = e.file_name();
+            let rest = name.to_str()?.strip_prefix("taustream.")?;
+            let (uid, rest) = rest.split_at(rest.find('.')?);
+            rest.starts_with(&suffix).then(|| uid.parse().ok())?
+        })
+        .filter(|uid| *uid != own)
+        .collect();
+    uids.sort_unstable();
+    uids.dedup();
+    uids
+}
+
+impl Wire {
+    /// Joins the services of `arm` (the settings' name) as this user, under `node_name`.
+    ///
+    /// # Errors
+    /// When the name or the runtime directory is unfit, or shared memory is not to be had.
+    pub fn join(arm: &str, node_name: &str) -> Result<Self, ServiceError> {
+        if !is_arm_name(arm) {
+            return Err(ServiceError::Name { name: arm.to_owned() });
+        }
+        let uid = own_uid()?;
+        let refused = |why: String| ServiceError::Refused { arm: arm.to_owned(), what: "join", why };
+        let config = config(arm, uid, &runtime_directory()?).map_err(refused)?;
+        let name = node_name.try_into().map_err(|e| refused(format!("{e:?}")))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|e| refused(format!("{e:?}")))?;
+        Ok(Self { arm: arm.to_owned(), uid, node })
+    }
+
+    /// The arm's name.
+    #[must_use]
+    pub fn arm(&self) -> &str {
+        &self.arm
+    }
+
+    /// That nobody serves this arm, naming other users who do.
+    #[must_use]
+    pub fn not_running(&self, who: &'static str) -> ServiceError {
+        let uids = other_users(&self.arm, self.uid);
+        let others = if uids.is_empty() {
+            String::new()
+        } else {
+            let list: Vec<String> = uids.iter().map(ToString::to_string).collect();
+            format!(", but uid {} runs one: use that user's account", list.join(", "))
+        };
+        ServiceError::NotRunning { who, arm: self.arm.clone(), uid: self.uid, others }
+    }
+
+    fn refused(&self, what: &'static str, why: &dyn std::fmt::Debug) -> ServiceError {
+        ServiceError::Refused { arm: self.arm.clone(), what, why: format!("{why:?}") }
+    }
+}
+
+fn config(arm: &str, uid: u32, root: &Path) -> Result<Config, String> {
+    let mut config = Config::default();
+    let prefix = FileName::new(prefix(arm, uid).as_bytes()).map_err(|e| format!("prefix: {e:?}"))?;
+    let root = root.join("iceoryx2");
+    let root = root.to_str().ok_or("the runtime directory is not UTF-8")?;
+    let root = IceoryxPath::new(root.as_bytes()).map_err(|e| format!("root: {e:?}"))?;
+    config.global.prefix = prefix;
+    config.global.set_root_path(&root);
+    Ok(config)
+}
+
+macro_rules! publish_subscribe {
+    ($factory:ident, $sender:ident, $receiver:ident, $payload:ty, $name:literal, $publishers:expr, $subscribers:expr, $buffer:expr) => {
+        impl Wire {
+            fn $factory(
+                &self,
+            ) -> Result<
+                iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, $payload, ()>,
+                ServiceError,
+            > {
+                let what = concat!("open the ", $name, " service");
+                let name = $name.try_into().map_err(|e| self.refused(what, &e))?;
+                self.node
+                    .service_builder(&name)
+                    .publish_subscribe::<$payload>()
+                    .max_publishers($publishers)
+                    .max_subscribers($subscribers)
+                    .max_nodes(NODES_MAX)
+                    .subscriber_max_buffer_size($buffer)
+                    .subscriber_max_borrowed_samples(2)
+                    .history_size(0)
+                    .enable_safe_overflow(true)
+                    .open_or_create()
+                    .map_err(|e| self.refused(what, &e))
+            }
+
+            #[doc = concat!("A sender of the ", $name, " service.")]
+            ///
+            /// # Errors
+            /// When shared memory refuses: another layout, too many senders.
+            pub fn $sender(&self) -> Result<Publisher<ipc::Service, $payload, ()>, ServiceError> {
+                let what = concat!("send on the ", $name, " service");
+                self.$factory()?.publisher_builder().create().map_err(|e| self.refused(what, &e))
+            }
+
+            #[doc = concat!("A receiver of the ", $name, " service.")]
+            ///
+            /// # Errors
+            /// When shared memory refuses: another layout, too many receivers.
+            pub fn $receiver(&self) -> Result<Subscriber<ipc::Service, $payload, ()>, ServiceError> {
+                let what = concat!("receive from the ", $name, " service");
+                self.$factory()?
+                    .subscriber_builder()
+                    .buffer_size($buffer)
+                    .create()
+                    .map_err(|e| self.refused(what, &e))
+            }
+        }
+    };
+}
+
+publish_subscribe!(
+    trajectory_service,
+    trajectory_publisher,
+    trajectory_subscriber,
+    TrajectoryMessage,
+    "trajectory",
+    PUBLISHERS_MAX,
+    2,
+    TRAJECTORY_BUFFER
+);
+publish_subscribe!(
+    receipt_service,
+    receipt_publisher,
+    receipt_subscriber,
+    Receipt,
+    "receipt",
+    1,
+    SUBSCRIBERS_MAX,
+    RECEIPT_BUFFER
+);
+publish_subscribe!(
+    report_service,
+    report_publisher,
+    report_subscriber,
+    Report,
+    "report",
+    1,
+    SUBSCRIBERS_MAX,
+    REPORT_BUFFER
+);
+
+macro_rules! request_response {
+    ($factory:ident, $client:ident, $server:ident, $request:ty, $reply:ty, $name:literal) => {
+        impl Wire {
+            fn $factory(
+                &self,
+            ) -> Result<
+                iceoryx2::service::port_factory::request_response::PortFactory<
+                    ipc::Service,
+                    $request,
+                    (),
+                    $reply,
+                    (),
+                >,
+                ServiceError,
+            > {
+                let what = concat!("open the ", $name, " service");
+                let name = $name.try_into().map_err(|e| self.refused(what, &e))?;
+                self.node
+                    .service_builder(&name)
+                    .request_response::<$request, $reply>()
+                    .max_clients(CLIENTS_MAX)
+                    .max_servers(1)
+                    .max_nodes(NODES_MAX)
+                    .max_active_requests_per_client(2)
+                    .max_response_buffer_size(2)
+                    .enable_safe_overflow_for_requests(true)
+                    .enable_safe_overflow_for_responses(true)
+                    .open_or_create()
+                    .map_err(|e| self.refused(what, &e))
+            }
+
+            #[doc = concat!("A client of the ", $name, " service.")]
+            ///
+            /// # Errors
+            /// When shared memory refuses: another layout, too many clients.
+            pub fn $client(&self) -> Result<Client<ipc::Service, $request, (), $reply, ()>, ServiceError> {
+                let what = concat!("ask the ", $name, " service");
+                self.$factory()?.client_builder().create().map_err(|e| self.refused(what, &e))
+            }
+
+            #[doc = concat!("The one server of the ", $name, " service.")]
+            ///
+            /// # Errors
+            /// When shared memory refuses: another layout, a server that runs already.
+            pub fn $server(&self) -> Result<Server<ipc::Service, $request, (), $reply, ()>, ServiceError> {
+                let what = concat!("serve the ", $name, " service");
+                self.$factory()?.server_builder().create().map_err(|e| self.refused(what, &e))
+            }
+        }
+    };
+}
+
+request_response!(command_service, command_client, command_server, CommandRequest, CommandReply, "command");
+request_response!(plan_service, plan_client, plan_server, PlanRequest, PlanReply, "plan");

@@ -1,0 +1,1 @@
+//! The scalar profiles of the papers behind one trait.

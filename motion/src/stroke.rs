@@ -1,0 +1,114 @@
+//! One Tau-J* stroke: all joints along a straight joint-space line with one scalar profile.
+//!
+//! phi(s) = 1 - (1 - s^4)^n with integer n = 1/k is a polynomial, so a stroke is exact, fast and
+//! bit-reproducible: powers are products in a fixed order, never a library call.
+//!
+//! Source: seed paper 000 (Tau-J*, its eq. 4.2), written in normalised time.
+use crate::{JointArray, MAX_JOINTS};
+
+/// Smallest n on the wire: below 4 the snap at the end of a stroke is not bounded.
+pub const N_MIN: u32 = 4;
+/// Largest n on the wire.
+pub const N_MAX: u32 = 64;
+/// Shortest stroke.
+pub const DURATION_S_MIN: f64 = 1e-3;
+/// Latest instant at which a stroke may end.
+pub const END_S_MAX: f64 = 86_400.0;
+
+/// One straight joint-space move of a trajectory. Plain data: `Trajectory` checks it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stroke {
+    /// When it starts, in trajectory time.
+    pub start_s: f64,
+    /// How long it takes.
+    pub duration_s: f64,
+    /// The exponent n = 1/k, from [`N_MIN`] to [`N_MAX`].
+    pub n: u32,
+    /// How far each joint goes; unused joints are zero.
+    pub delta_rad: JointArray,
+}
+
+/// Why a stroke is refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum StrokeError {
+    /// A number is NaN or infinite.
+    #[error("{field} is not finite")]
+    NotFinite {
+        /// Which one: `start_s`, `duration_s` or `delta_rad`.
+        field: &'static str,
+    },
+    /// The start lies before the start of the trajectory.
+    #[error("start_s is {start_s}; a stroke starts at 0 s or later")]
+    StartsEarly {
+        /// The start that was given.
+        start_s: f64,
+    },
+    /// The duration is too short.
+    #[error("duration_s is {duration_s}; a stroke takes at least {DURATION_S_MIN} s")]
+    TooShort {
+        /// The duration that was given.
+        duration_s: f64,
+    },
+    /// The stroke ends too late.
+    #[error("ends at {end_s} s; a trajectory ends by {END_S_MAX} s")]
+    EndsLate {
+        /// The end that was given.
+        end_s: f64,
+    },
+    /// n is out of range.
+    #[error("n is {n}; it must be from {N_MIN} to {N_MAX} (k = 1/n)")]
+    Exponent {
+        /// The n that was given.
+        n: u32,
+    },
+    /// A joint that the arm does not have moves.
+    #[error("joint {joint} moves, but the arm has only {joints} joints")]
+    UnusedJoint {
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// How many joints the arm has.
+        joints: usize,
+    },
+}
+
+impl Stroke {
+    /// When it ends, in trajectory time.
+    #[must_use]
+    pub fn end_s(&self) -> f64 {
+        self.start_s + self.duration_s
+    }
+
+    /// Checks one stroke of an arm with `joints` joints.
+    ///
+    /// # Errors
+    /// The first fault, as evidence.
+    pub fn check(&self, joints: usize) -> Result<(), StrokeError> {
+        if !self.start_s.is_finite() {
+            return Err(StrokeError::NotFinite { field: "start_s" });
+        }
+        if !self.duration_s.is_finite() {
+            return Err(StrokeError::NotFinite { field: "duration_s" });
+        }
+        if !self.delta_rad.iter().all(|d| d.is_finite()) {
+            return Err(StrokeError::NotFinite { field: "delta_rad" });
+        }
+        if self.start_s < 0.0 {
+            return Err(StrokeError::StartsEarly { start_s: self.start_s });
+        }
+        if self.duration_s < DURATION_S_MIN {
+            return Err(StrokeError::TooShort { duration_s: self.duration_s });
+        }
+        if self.end_s() > END_S_MAX {
+            return Err(StrokeError::EndsLate { end_s: self.end_s() });
+        }
+        if !(N_MIN..=N_MAX).contains(&self.n) {
+            return Err(StrokeError::Exponent { n: self.n });
+        }
+        for (joint, delta) in self.delta_rad.iter().enumerate().take(MAX_JOINTS).skip(joints) {
+            if *delta != 0.0 {
+                return Err(StrokeError::UnusedJoint { joint, joints });
+            }
+        }
+        Ok(())
+    }
+}
