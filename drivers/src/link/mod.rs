@@ -1,5 +1,6 @@
 //! What moves frames: SocketCAN, or the local link on a host whose kernel has no CAN.
 use crate::frame::{CanFrame, FrameBatch};
+use std::os::fd::BorrowedFd;
 
 /// Why a link did not take, or give, frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -41,4 +42,11 @@ pub trait CanLink: Send {
 
     /// What it is, for messages: "socketcan vcan0" or "local link vcan0".
     fn describe(&self) -> String;
+
+    /// Descriptor that polls readable while `receive` has work, new peers of a local link included: an epoll
+    /// instance where one descriptor does not do. For servers, which wait; the cycle never does. `None` when there
+    /// is nothing to wait on (a link in memory).
+    fn readiness(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
 }
