@@ -1,0 +1,11 @@
+//! Servo protocols as pure functions between frames and values, and the drivers built on them.
+//!
+//! The encoders and decoders serve both ends: the master in this room, and the simulated drives. No I/O, no clock.
+pub mod canopen;
+pub mod object;
+pub mod sdo;
+pub mod words;
+
+pub use canopen::{Emcy, Nmt, NmtState, PdoEntry};
+pub use object::Address;
+pub use sdo::{SdoBytes, SdoRequest, SdoResponse, SegmentBytes};

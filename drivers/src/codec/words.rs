@@ -1,0 +1,139 @@
+//! Abort and emergency codes in words.
+//!
+//! Sources: CiA 301 table "SDO abort codes" and "Emergency error codes", CiA 402-2 "Error codes".
+
+/// SDO abort: toggle bit not alternated.
+pub const ABORT_TOGGLE: u32 = 0x0503_0000;
+/// SDO abort: protocol timed out.
+pub const ABORT_TIMEOUT: u32 = 0x0504_0000;
+/// SDO abort: command specifier not valid or unknown.
+pub const ABORT_COMMAND: u32 = 0x0504_0001;
+/// SDO abort: unsupported access.
+pub const ABORT_ACCESS: u32 = 0x0601_0000;
+/// SDO abort: read of a write-only object.
+pub const ABORT_WRITE_ONLY: u32 = 0x0601_0001;
+/// SDO abort: write of a read-only object.
+pub const ABORT_READ_ONLY: u32 = 0x0601_0002;
+/// SDO abort: no such object.
+pub const ABORT_NO_OBJECT: u32 = 0x0602_0000;
+/// SDO abort: object cannot be mapped to the PDO.
+pub const ABORT_NOT_MAPPABLE: u32 = 0x0604_0041;
+/// SDO abort: mapped objects exceed the PDO's length.
+pub const ABORT_PDO_LENGTH: u32 = 0x0604_0042;
+/// SDO abort: parameters do not fit each other.
+pub const ABORT_INCOMPATIBLE: u32 = 0x0604_0043;
+/// SDO abort: length of the parameter does not match.
+pub const ABORT_LENGTH: u32 = 0x0607_0010;
+/// SDO abort: parameter too long.
+pub const ABORT_TOO_LONG: u32 = 0x0607_0012;
+/// SDO abort: parameter too short.
+pub const ABORT_TOO_SHORT: u32 = 0x0607_0013;
+/// SDO abort: no such subindex.
+pub const ABORT_NO_SUBINDEX: u32 = 0x0609_0011;
+/// SDO abort: value out of range.
+pub const ABORT_RANGE: u32 = 0x0609_0030;
+/// SDO abort: value too high.
+pub const ABORT_TOO_HIGH: u32 = 0x0609_0031;
+/// SDO abort: value too low.
+pub const ABORT_TOO_LOW: u32 = 0x0609_0032;
+/// SDO abort: resource not available.
+pub const ABORT_RESOURCE: u32 = 0x060A_0023;
+/// SDO abort: general error.
+pub const ABORT_GENERAL: u32 = 0x0800_0000;
+/// SDO abort: data cannot be stored.
+pub const ABORT_STORE: u32 = 0x0800_0020;
+/// SDO abort: data cannot be stored because of local control.
+pub const ABORT_LOCAL_CONTROL: u32 = 0x0800_0021;
+/// SDO abort: wrong device state, as for a re-map in operational.
+pub const ABORT_DEVICE_STATE: u32 = 0x0800_0022;
+
+/// What an SDO abort code says.
+#[must_use]
+pub fn sdo_abort(code: u32) -> &'static str {
+    match code {
+        ABORT_TOGGLE => "toggle bit not alternated",
+        ABORT_TIMEOUT => "no SDO answer in time",
+        ABORT_COMMAND => "SDO command not valid or not known",
+        ABORT_ACCESS => "access to the object is not supported",
+        ABORT_WRITE_ONLY => "read of a write-only object",
+        ABORT_READ_ONLY => "write of a read-only object",
+        ABORT_NO_OBJECT => "no such object",
+        ABORT_NOT_MAPPABLE => "object cannot be mapped into a PDO",
+        ABORT_PDO_LENGTH => "mapped objects exceed the length of the PDO",
+        ABORT_INCOMPATIBLE => "parameters do not fit each other",
+        ABORT_LENGTH => "length of the value does not match the object",
+        ABORT_TOO_LONG => "value is longer than the object",
+        ABORT_TOO_SHORT => "value is shorter than the object",
+        ABORT_NO_SUBINDEX => "no such subindex",
+        ABORT_RANGE => "value out of range",
+        ABORT_TOO_HIGH => "value too high",
+        ABORT_TOO_LOW => "value too low",
+        ABORT_RESOURCE => "resource not available",
+        ABORT_GENERAL => "general error",
+        ABORT_STORE => "value cannot be stored",
+        ABORT_LOCAL_CONTROL => "value cannot be stored because of local control",
+        ABORT_DEVICE_STATE => "not in the present state of the device",
+        _ => "abort code that CiA 301 does not list",
+    }
+}
+
+/// EMCY: error reset or no error.
+pub const EMCY_RESET: u16 = 0x0000;
+/// EMCY: heartbeat or life guarding lost.
+pub const EMCY_HEARTBEAT: u16 = 0x8130;
+/// EMCY: PDO not processed because of its length.
+pub const EMCY_PDO_LENGTH: u16 = 0x8210;
+/// EMCY: RPDO time-out.
+pub const EMCY_RPDO_TIMEOUT: u16 = 0x8250;
+/// EMCY: following error too large.
+pub const EMCY_FOLLOWING_ERROR: u16 = 0x8611;
+/// EMCY: reference limit.
+pub const EMCY_REFERENCE_LIMIT: u16 = 0x8612;
+
+/// What an emergency code says; a code that is not listed gets the sentence of its class.
+#[must_use]
+pub fn emcy(code: u16) -> &'static str {
+    match code {
+        EMCY_RESET => "error reset",
+        0x1000 => "generic error",
+        0x2310 => "over-current at the output",
+        0x2320 => "short circuit at the output",
+        0x3210 => "over-voltage of the DC link",
+        0x3220 => "under-voltage of the DC link",
+        0x4210 => "device too hot",
+        0x4310 => "drive too hot",
+        0x7121 => "motor blocked",
+        0x7305 => "encoder signal faulty",
+        0x7500 => "communication faulty",
+        0x8110 => "CAN overrun, messages lost",
+        0x8120 => "CAN error passive",
+        EMCY_HEARTBEAT => "master heartbeat lost",
+        0x8140 => "recovered from bus-off",
+        EMCY_PDO_LENGTH => "PDO ignored, too short",
+        0x8220 => "PDO too long",
+        EMCY_RPDO_TIMEOUT => "setpoints (RPDO) stopped coming",
+        EMCY_FOLLOWING_ERROR => "following error too large",
+        EMCY_REFERENCE_LIMIT => "reference limit reached",
+        0x8700 => "SYNC faulty",
+        _ => emcy_class(code),
+    }
+}
+
+fn emcy_class(code: u16) -> &'static str {
+    match code >> 8 {
+        0x00 => "error reset",
+        0x10 => "generic error",
+        0x20..=0x2F => "current fault",
+        0x30..=0x3F => "voltage fault",
+        0x40..=0x4F => "temperature fault",
+        0x50..=0x5F => "fault of the device hardware",
+        0x60..=0x6F => "fault of the device software",
+        0x70..=0x7F => "fault of an additional module",
+        0x80..=0x81 => "communication fault",
+        0x82..=0x8F => "supervision fault",
+        0x90..=0x9F => "external fault",
+        0xF0..=0xFE => "fault of an additional function",
+        0xFF => "vendor-specific fault",
+        _ => "fault of a class that CiA 301 does not list",
+    }
+}
