@@ -1,1 +1,15 @@
-//! Placeholder.
+//! World, search, optimisation, timing, verification and the replan service.
+//!
+//! [`plan`] goes from two poses to a verified motion; [`verify`] proves any trajectory; the service
+//! (`taustream-planner`) answers replan requests and hands motions to the streamer. An ordinary process: it may
+//! allocate and use every core, and it never touches a bus.
+#![forbid(unsafe_code)]
+
+pub mod cost;
+pub mod plan;
+pub mod send;
+pub mod verify;
+
+pub use cost::{CostError, CostModel, PaperCost, paper_cost};
+pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan};
+pub use verify::{Contact, Proof, Violation, verify};

@@ -1,2 +1,2 @@
-//! Placeholder.
+//! The planner process.
 fn main() {}

@@ -1,0 +1,167 @@
+//! From two poses to a verified motion.
+use crate::verify::{Contact, Proof, Violation};
+use std::time::Duration;
+use taustream_arm::{Robot, Scene};
+use taustream_motion::{JointArray, Trajectory};
+
+/// Which method looks for the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum PlannerKind {
+    /// Straight line, then RRT-Connect, then IBFOA refinement of what was found; the shortest verified motion wins.
+    #[default]
+    Auto,
+    /// The straight joint-space line, or nothing.
+    Straight,
+    /// RRT-Connect with shortcuts.
+    RrtConnect,
+    /// IBFOA over three control points, started from the straight line only (the paper's method).
+    Ibfoa,
+}
+
+impl PlannerKind {
+    /// Every kind.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Straight, Self::RrtConnect, Self::Ibfoa];
+
+    /// The word that users write.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Straight => "straight",
+            Self::RrtConnect => "rrt-connect",
+            Self::Ibfoa => "ibfoa",
+        }
+    }
+
+    /// The kind of a word; `None` for a word that is unknown.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// How to plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlanOptions {
+    /// Seed of every random choice: one seed gives one answer, unless the clock cuts the work short (then
+    /// [`Plan::how`] says so).
+    pub seed: u64,
+    /// How long planning may take. Work is budgeted in evaluations derived from it; the clock only aborts.
+    pub deadline: Duration,
+    /// Which method.
+    pub planner: PlannerKind,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self { seed: 0, deadline: Duration::from_millis(2000), planner: PlannerKind::Auto }
+    }
+}
+
+/// A verified motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The motion, from rest to rest.
+    pub trajectory: Trajectory,
+    /// What found it, in a few words.
+    pub how: String,
+    /// What was proven about it.
+    pub proof: Proof,
+    /// How long planning took.
+    pub planning_s: f64,
+}
+
+/// Which of the two given poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseOf {
+    /// Where the motion begins.
+    Start,
+    /// Where it shall end.
+    Goal,
+}
+
+impl std::fmt::Display for PoseOf {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+        })
+    }
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// A joint value is not a finite number, or a joint that the arm does not have is not zero.
+    #[error("{which} pose: joint {} is {value_rad}; expected {joints} finite values in rad", joint + 1)]
+    BadPose {
+        /// Which pose.
+        which: PoseOf,
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// The value that was given.
+        value_rad: f64,
+        /// How many joints the arm has.
+        joints: usize,
+    },
+    /// A joint lies outside its range.
+    #[error(
+        "{which} outside limits: joint {} ({name}) at {value_rad:.4} rad is {by_rad:.4} rad outside [{:.4}, {:.4}]; choose a {which} inside",
+        joint + 1, range_rad[0], range_rad[1]
+    )]
+    OutsideLimits {
+        /// Which pose.
+        which: PoseOf,
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// The joint's name.
+        name: String,
+        /// The value that was given.
+        value_rad: f64,
+        /// How far outside.
+        by_rad: f64,
+        /// Lowest and highest angle.
+        range_rad: [f64; 2],
+    },
+    /// The arm touches something, or is inside the margin, in a given pose.
+    #[error("{which} in collision: {contact}; choose another {which} or correct the scene")]
+    InCollision {
+        /// Which pose.
+        which: PoseOf,
+        /// What touches what.
+        contact: Contact,
+    },
+    /// Nothing was found.
+    #[error(
+        "no path found: {tried}{}; try a longer deadline, another seed or another goal",
+        if *cut_short { " (the deadline cut the search short)" } else { "" }
+    )]
+    NotFound {
+        /// What was tried, with counts and the obstacle in the way.
+        tried: String,
+        /// True when the clock ended the search before its budget did.
+        cut_short: bool,
+    },
+    /// A path was found, but its timed motion could not be proven.
+    #[error("a path was found ({tried}), but its motion is not proven: {violation}")]
+    Unproven {
+        /// What found the path.
+        tried: String,
+        /// Why the proof failed.
+        violation: Violation,
+    },
+}
+
+/// Plans a verified motion between two poses at rest.
+///
+/// # Errors
+/// What is wrong with a pose, or what was tried in vain.
+pub fn plan(
+    _robot: &Robot,
+    _scene: &Scene,
+    _start_rad: &JointArray,
+    _goal_rad: &JointArray,
+    _options: &PlanOptions,
+) -> Result<Plan, PlanError> {
+    todo!("planner")
+}
