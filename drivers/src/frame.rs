@@ -33,12 +33,7 @@ impl CanId {
     /// The 11-bit id of a standard data frame; `None` for extended, remote and error frames.
     #[must_use]
     pub const fn as_standard_data(self) -> Option<u16> {
-        if self.0 & (EXTENDED | REMOTE | ERROR) == 0 {
-            #[expect(clippy::cast_possible_truncation, reason = "masked to 11 bits")]
-            Some((self.0 & STANDARD_MAX) as u16)
-        } else {
-            None
-        }
+        if self.0 & (EXTENDED | REMOTE | ERROR) == 0 { Some((self.0 & STANDARD_MAX) as u16) } else { None }
     }
     /// True for an error frame of the kernel.
     #[must_use]
@@ -104,6 +99,27 @@ impl CanFrame {
     #[must_use]
     pub fn is_fd(&self) -> bool {
         self.flags & FDF != 0
+    }
+    /// Makes a slot of which a socket filled `size` bytes a well-formed frame; false when no kind of frame has
+    /// that size. What the sender left in unused bytes is zeroed: equal frames must compare equal.
+    pub(crate) fn settle(&mut self, size: usize) -> bool {
+        let most = match size {
+            CLASSIC_SIZE => {
+                self.flags = 0;
+                8
+            }
+            FD_SIZE => {
+                self.flags |= FDF;
+                64
+            }
+            _ => return false,
+        };
+        self.len = self.len.min(most);
+        self.reserved = [0; 2];
+        if let Some(unused) = self.data.get_mut(usize::from(self.len)..) {
+            unused.fill(0);
+        }
+        true
     }
     /// Bytes at the kernel's interface.
     #[must_use]

@@ -6,7 +6,7 @@
 use crate::frame::{CanFrame, FrameBatch};
 use taustream_motion::MAX_JOINTS;
 
-/// CLOCK_MONOTONIC in nanoseconds.
+/// `CLOCK_MONOTONIC` in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Nanos(pub u64);
 

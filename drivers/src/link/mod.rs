@@ -1,6 +1,18 @@
 //! What moves frames: SocketCAN, or the local link on a host whose kernel has no CAN.
+//!
+//! [`open()`] chooses, checks and locks; the cycle then knows only the [`CanLink`] trait. Frames that a link sent itself
+//! never come back to it.
 use crate::frame::{CanFrame, FrameBatch};
 use std::os::fd::BorrowedFd;
+
+mod batch;
+mod facts;
+mod local;
+mod lock;
+pub mod open;
+mod socketcan;
+
+pub use open::{Holder, LinkChoice, LinkRole, OpenError, open};
 
 /// Why a link did not take, or give, frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -48,5 +60,16 @@ pub trait CanLink: Send {
     /// is nothing to wait on (a link in memory).
     fn readiness(&self) -> Option<BorrowedFd<'_>> {
         None
+    }
+
+    /// After [`LinkFault::Gone`]: attaches to the interface, or the peer, that has come back. The lock is kept all the
+    /// while, so that no other master slips in. Harmless on a link that is well.
+    ///
+    /// Not for real time: allocates and asks the kernel.
+    ///
+    /// # Errors
+    /// As for [`open()`]; the link stays gone and may be asked again.
+    fn reopen(&mut self) -> Result<(), OpenError> {
+        Ok(())
     }
 }

@@ -1,0 +1,186 @@
+//! The kernel's CAN: a raw socket on an interface.
+use super::batch::{self, InterfaceName};
+use super::lock::InterfaceLock;
+use super::open::{LinkRole, OpenError};
+use super::{CanLink, LinkFault, Sent, facts};
+use crate::frame::{CanFrame, FrameBatch};
+use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_recv_buffer_size_force};
+use socketcan::{CanFdSocket, Socket, SocketOptions};
+use std::os::fd::{AsFd, BorrowedFd};
+use taustream_arm::{Bus, BusKind};
+
+/// Error frames that are taken: transmit time-out, controller state, bus-off, restarted (linux/can/error.h). The others
+/// flood, and say nothing that changes what to do.
+const ERROR_CLASSES: u32 = 0x001 | 0x004 | 0x040 | 0x100;
+
+/// Receive buffer. The default holds 278 frames, less than what six drives send in 50 ms; this holds some 2700.
+const RECEIVE_BUFFER_BYTES: usize = 2 << 20;
+
+/// A raw socket on a CAN interface.
+#[derive(Debug)]
+pub(super) struct SocketCan {
+    bus: Bus,
+    socket: CanFdSocket,
+    name: InterfaceName,
+    /// The interface was deleted: this socket is dead, whatever comes back under the name.
+    gone: bool,
+    /// The interface was seen down, and not yet up again.
+    down: bool,
+    _lock: Option<InterfaceLock>,
+}
+
+impl SocketCan {
+    /// Opens, checks and (for a master) locks the interface of a bus.
+    pub(super) fn open(bus: &Bus, role: LinkRole) -> Result<Self, OpenError> {
+        let interface = &bus.interface;
+        let name = batch::interface_name(interface)
+            .ok_or_else(|| OpenError::BadName { interface: interface.clone() })?;
+        check(bus)?;
+        // Locked before a socket is there: a refused master must not even take frames.
+        let lock = match role {
+            LinkRole::Master => Some(InterfaceLock::take(interface)?),
+            LinkRole::Servos => None,
+        };
+        let socket = open_socket(interface)?;
+        Ok(Self { bus: bus.clone(), socket, name, gone: false, down: false, _lock: lock })
+    }
+
+    /// Asks whether an interface that was down still is.
+    fn look_up(&mut self) -> Option<LinkFault> {
+        match batch::interface_is_up(self.socket.as_fd(), self.name) {
+            Ok(true) => {
+                self.down = false;
+                None
+            }
+            Ok(false) => Some(LinkFault::Down),
+            Err(fault) => self.note(fault),
+        }
+    }
+
+    /// Keeps what outlasts a call: the kernel tells of a deleted or downed interface only once.
+    fn note(&mut self, fault: LinkFault) -> Option<LinkFault> {
+        match fault {
+            LinkFault::Gone => self.gone = true,
+            LinkFault::Down => self.down = true,
+            LinkFault::QueueFull | LinkFault::Os(_) => {}
+        }
+        Some(fault)
+    }
+}
+
+impl CanLink for SocketCan {
+    fn send(&mut self, frames: &[CanFrame]) -> Sent {
+        if self.gone {
+            return Sent { count: 0, fault: Some(LinkFault::Gone) };
+        }
+        let sent = batch::send(self.socket.as_fd(), frames);
+        if let Some(fault) = sent.fault {
+            self.note(fault);
+        }
+        sent
+    }
+
+    fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
+        if self.gone {
+            into.clear();
+            return Some(LinkFault::Gone);
+        }
+        let mut result = batch::receive(self.socket.as_fd(), into);
+        if result == Err(LinkFault::Down) {
+            // The word may be stale, and it hides the frames behind it: read again, then ask for the truth.
+            self.down = true;
+            result = batch::receive(self.socket.as_fd(), into);
+        }
+        match result {
+            Ok(_) if self.down => self.look_up(),
+            Ok(_) => None,
+            Err(fault) => self.note(fault),
+        }
+    }
+
+    fn describe(&self) -> String {
+        format!("socketcan {}", self.bus.interface)
+    }
+
+    fn readiness(&self) -> Option<BorrowedFd<'_>> {
+        (!self.gone).then(|| self.socket.as_fd())
+    }
+
+    fn reopen(&mut self) -> Result<(), OpenError> {
+        check(&self.bus)?;
+        if self.gone {
+            self.socket = open_socket(&self.bus.interface)?;
+            self.gone = false;
+        }
+        self.down = false;
+        Ok(())
+    }
+}
+
+/// Refuses an interface that is absent, down, or not what the settings say.
+fn check(bus: &Bus) -> Result<(), OpenError> {
+    let interface = bus.interface.clone();
+    if !facts::exists(&interface) {
+        let cure = match bus.kind {
+            BusKind::Virtual => {
+                format!("create it: ip link add dev {interface} type vcan && ip link set {interface} up")
+            }
+            BusKind::Classic { .. } => {
+                "is its adapter plugged in? (list interfaces: ip link show type can)".into()
+            }
+        };
+        return Err(OpenError::Missing { interface, cure });
+    }
+    let facts = facts::of(&interface)?;
+    if !facts.is_can {
+        return Err(OpenError::NotCan { interface });
+    }
+    let name = bus.name.clone();
+    let is_vcan = facts.kind.as_deref() == Some("vcan");
+    match bus.kind {
+        BusKind::Virtual if !is_vcan => {
+            let kind = facts.kind.unwrap_or_default();
+            return Err(OpenError::NotVirtual { bus: name, interface, kind });
+        }
+        BusKind::Classic { .. } if is_vcan => return Err(OpenError::NotReal { bus: name, interface }),
+        BusKind::Virtual | BusKind::Classic { .. } => {}
+    }
+    if !facts.is_up {
+        return Err(OpenError::Down { command: up_command(bus), interface });
+    }
+    match (bus.kind, facts.bitrate_bit_s) {
+        (BusKind::Classic { bitrate_bit_s: declared_bit_s }, Some(actual_bit_s))
+            if declared_bit_s != actual_bit_s =>
+        {
+            Err(OpenError::OtherBitRate { bus: name, interface, declared_bit_s, actual_bit_s })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What brings the interface of a bus up.
+fn up_command(bus: &Bus) -> String {
+    let interface = &bus.interface;
+    match bus.kind {
+        BusKind::Virtual => format!("ip link set {interface} up"),
+        BusKind::Classic { bitrate_bit_s } => {
+            format!("ip link set {interface} up type can bitrate {bitrate_bit_s}")
+        }
+    }
+}
+
+/// Opens and sets up the socket: FD frames too, error frames, no own frames, never waiting.
+fn open_socket(interface: &str) -> Result<CanFdSocket, OpenError> {
+    let failed = |doing| move |source| OpenError::System { interface: interface.to_owned(), doing, source };
+    let socket = CanFdSocket::open(interface).map_err(failed("open"))?;
+    socket.set_nonblocking(true).map_err(failed("set up"))?;
+    socket.set_recv_own_msgs(false).map_err(failed("set up"))?;
+    // Loopback to other sockets of this host stays on: recorders and simulators live there.
+    socket.set_loopback(true).map_err(failed("set up"))?;
+    socket.set_error_filter(ERROR_CLASSES).map_err(failed("set up"))?;
+    // Beyond the host's limit only with CAP_NET_ADMIN; without it, as much as the limit gives.
+    set_socket_recv_buffer_size_force(&socket, RECEIVE_BUFFER_BYTES)
+        .or_else(|_| set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER_BYTES))
+        .map_err(|errno| failed("set up")(errno.into()))?;
+    Ok(socket)
+}
