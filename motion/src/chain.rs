@@ -1,8 +1,14 @@
 //! Forward kinematics of a serial chain of revolute joints.
+//!
+//! Sines and cosines come from `libm`, so that every machine computes the same pose.
+//!
+//! Source: Denavit and Hartenberg 1955 (standard rows); Craig, Introduction to Robotics, 3rd ed., section 3.4
+//! (modified rows).
 use crate::{JointArray, MAX_JOINTS};
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A pose: rotation and translation in metres.
-pub type Pose = nalgebra::Isometry3<f64>;
+pub type Pose = Isometry3<f64>;
 
 /// One joint: frame = parent * pre * rotation(axis, q + offset) * post.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +16,7 @@ pub struct ChainJoint {
     /// From the parent's frame to the joint.
     pub pre: Pose,
     /// Axis of rotation in the joint's frame, of unit length.
-    pub axis: nalgebra::Unit<nalgebra::Vector3<f64>>,
+    pub axis: Unit<Vector3<f64>>,
     /// Angle added to the joint's position.
     pub offset_rad: f64,
     /// From the joint to the link's frame.
@@ -20,13 +26,19 @@ pub struct ChainJoint {
 impl ChainJoint {
     /// Standard Denavit-Hartenberg row: Rz(q + theta) Tz(d) Tx(a) Rx(alpha).
     #[must_use]
-    pub fn from_dh(_a_m: f64, _alpha_rad: f64, _d_m: f64, _theta_offset_rad: f64) -> Self {
-        todo!("motion")
+    pub fn from_dh(a_m: f64, alpha_rad: f64, d_m: f64, theta_offset_rad: f64) -> Self {
+        let post =
+            Isometry3::from_parts(Translation3::new(a_m, 0.0, d_m), rotation(&Vector3::x_axis(), alpha_rad));
+        Self { pre: Pose::identity(), axis: Vector3::z_axis(), offset_rad: theta_offset_rad, post }
     }
     /// Modified (Craig) row: Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(q + theta) Tz(d).
     #[must_use]
-    pub fn from_mdh(_a_m: f64, _alpha_rad: f64, _d_m: f64, _theta_offset_rad: f64) -> Self {
-        todo!("motion")
+    pub fn from_mdh(a_m: f64, alpha_rad: f64, d_m: f64, theta_offset_rad: f64) -> Self {
+        // Rx and Tx share their axis, so their order does not matter.
+        let pre =
+            Isometry3::from_parts(Translation3::new(a_m, 0.0, 0.0), rotation(&Vector3::x_axis(), alpha_rad));
+        let post = Pose::translation(0.0, 0.0, d_m);
+        Self { pre, axis: Vector3::z_axis(), offset_rad: theta_offset_rad, post }
     }
 }
 
@@ -40,8 +52,15 @@ pub struct Chain {
 impl Chain {
     /// Makes a chain of 1 to 8 joints; `None` otherwise.
     #[must_use]
-    pub fn new(_joints: &[ChainJoint]) -> Option<Self> {
-        todo!("motion")
+    pub fn new(joints: &[ChainJoint]) -> Option<Self> {
+        if !(1..=MAX_JOINTS).contains(&joints.len()) {
+            return None;
+        }
+        let mut kept = [ChainJoint::from_dh(0.0, 0.0, 0.0, 0.0); MAX_JOINTS];
+        for (slot, joint) in kept.iter_mut().zip(joints) {
+            *slot = *joint;
+        }
+        Some(Self { joints: kept, count: joints.len() })
     }
     /// How many joints.
     #[must_use]
@@ -52,7 +71,25 @@ impl Chain {
     ///
     /// Real time: no allocation.
     #[must_use]
-    pub fn frames(&self, _position_rad: &JointArray) -> [Pose; MAX_JOINTS + 1] {
-        todo!("motion")
+    pub fn frames(&self, position_rad: &JointArray) -> [Pose; MAX_JOINTS + 1] {
+        let mut frames = [Pose::identity(); MAX_JOINTS + 1];
+        let mut tip = Pose::identity();
+        let moves = self.joints.iter().zip(position_rad).take(self.count);
+        let mut slots = frames.iter_mut().skip(1);
+        for ((joint, angle_rad), slot) in moves.zip(slots.by_ref()) {
+            let turn = rotation(&joint.axis, angle_rad + joint.offset_rad);
+            tip = tip * joint.pre * turn * joint.post;
+            *slot = tip;
+        }
+        for slot in slots {
+            *slot = tip;
+        }
+        frames
     }
+}
+
+/// Rotation about an axis of unit length.
+fn rotation(axis: &Unit<Vector3<f64>>, angle_rad: f64) -> UnitQuaternion<f64> {
+    let (sin, cos) = libm::sincos(0.5 * angle_rad);
+    Unit::new_unchecked(Quaternion::from_parts(cos, axis.into_inner() * sin))
 }

@@ -8,8 +8,11 @@
 
 pub mod brake;
 pub mod chain;
+pub mod duration;
 pub mod limits;
+pub mod peaks;
 pub mod profile;
+mod proof;
 pub mod stroke;
 pub mod time_scale;
 pub mod trajectory;

@@ -41,7 +41,8 @@ pub enum Quantity {
 
 /// The first limit that a trajectory exceeds.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{quantity:?} limit of joint {joint} exceeded at t = {at_s:.3} s: {value} against {limit}")]
+#[error("{quantity:?} limit of joint {} {} at t = {at_s:.3} s: {value} against {limit}", joint + 1,
+    if *proven { "exceeded" } else { "not proven to hold (its bound is given)" })]
 pub struct LimitViolation {
     /// Zero-based index of the joint.
     pub joint: usize,
@@ -53,6 +54,9 @@ pub struct LimitViolation {
     pub value: f64,
     /// The limit.
     pub limit: f64,
+    /// True when `value` is reached; false when the work allowed for the proof ran out, and `value` is the bound
+    /// that could not be brought below the limit.
+    pub proven: bool,
 }
 
 /// Largest absolute values over a whole trajectory, as proven upper bounds, one a joint.
@@ -68,17 +72,22 @@ pub struct Peaks {
 
 /// Proves that a trajectory keeps the motion limits (and the position limits) of every joint.
 ///
-/// Exact up to a relative [`TOLERANCE`]: between samples the next derivative bounds what can happen.
+/// Exact up to a relative [`TOLERANCE`] ([`POSITION_TOLERANCE_RAD`] for positions): between samples a bound of a
+/// higher derivative says what can happen. Its work is bounded; what it cannot prove it refuses.
 ///
 /// # Errors
-/// The first violation in time.
+/// The first violation in time, at its worst instant.
 pub fn check_motion(
-    _trajectory: &Trajectory,
-    _limits: &[JointLimits; MAX_JOINTS],
+    trajectory: &Trajectory,
+    limits: &[JointLimits; MAX_JOINTS],
 ) -> Result<Peaks, LimitViolation> {
-    todo!("motion")
+    crate::proof::check(trajectory, limits)
 }
 
 /// Relative excess that [`check_motion`] lets pass, so that a motion timed exactly to a limit is not refused
 /// for rounding.
 pub const TOLERANCE: f64 = 1e-6;
+
+/// Excess of a position limit that [`check_motion`] lets pass (rad), for a pose that lies exactly on it: far below
+/// one count of a 24-bit encoder.
+pub const POSITION_TOLERANCE_RAD: f64 = 1e-9;

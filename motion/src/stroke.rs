@@ -71,11 +71,96 @@ pub enum StrokeError {
     },
 }
 
+/// The profile phi of a unit stroke and its first three derivatives by s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Phi {
+    /// How much of the stroke is done, 0 to 1.
+    pub value: f64,
+    /// First derivative by s.
+    pub d1: f64,
+    /// Second derivative by s.
+    pub d2: f64,
+    /// Third derivative by s.
+    pub d3: f64,
+}
+
+impl Phi {
+    /// Before the stroke.
+    pub const BEFORE: Self = Self { value: 0.0, d1: 0.0, d2: 0.0, d3: 0.0 };
+    /// After the stroke.
+    pub const AFTER: Self = Self { value: 1.0, d1: 0.0, d2: 0.0, d3: 0.0 };
+
+    /// phi(s) = 1 - (1 - s^4)^n and its derivatives for s in [0, 1] and n of at least [`N_MIN`].
+    ///
+    /// The value is exactly 0 at s = 0 and exactly 1 at s = 1, and the derivatives are exactly 0 at both, because
+    /// n > 3 leaves a factor of s or of u everywhere. A smaller n counts as [`N_MIN`].
+    ///
+    /// Real time: at most six squarings, no library call.
+    #[must_use]
+    pub fn at(n: u32, s: f64) -> Self {
+        let n = n.max(N_MIN);
+        let m = f64::from(n);
+        let (s2, a, b) = (s * s, m - 1.0, m - 2.0);
+        let x = s2 * s2;
+        let u = 1.0 - x;
+        // One power serves all four: the rest are factors of u (bench.md section 6).
+        let p3 = power(u, n - 3);
+        let p2 = p3 * u;
+        let p1 = p2 * u;
+        let c = 4.0 * m * s;
+        Self {
+            value: 1.0 - p1 * u,
+            d1: c * s2 * p1,
+            d2: c * s * p2 * (3.0 * u - 4.0 * a * x),
+            d3: c * p3 * (6.0 * u * u + a * x * (16.0 * b * x - 36.0 * u)),
+        }
+    }
+}
+
+/// base^exponent by repeated squaring, always in the same order, so that every machine gets the same bits.
+///
+/// Real time: as many steps as the exponent has bits.
+#[must_use]
+pub fn power(base: f64, exponent: u32) -> f64 {
+    let (mut result, mut square, mut left) = (1.0, base, exponent);
+    while left > 0 {
+        if left & 1 == 1 {
+            result *= square;
+        }
+        square *= square;
+        left >>= 1;
+    }
+    result
+}
+
 impl Stroke {
     /// When it ends, in trajectory time.
     #[must_use]
     pub fn end_s(&self) -> f64 {
         self.start_s + self.duration_s
+    }
+
+    /// True when nothing of it is left at `t_s`: its profile is exactly 1 from then on.
+    ///
+    /// Real time: two operations.
+    #[must_use]
+    pub fn has_ended(&self, t_s: f64) -> bool {
+        t_s >= self.end_s()
+    }
+
+    /// The profile at trajectory time `t_s`, by normalised time; NaN for a `t_s` that is NaN.
+    ///
+    /// Real time: no allocation, no library call.
+    #[must_use]
+    pub fn phi(&self, t_s: f64) -> Phi {
+        if self.has_ended(t_s) {
+            return Phi::AFTER;
+        }
+        if t_s <= self.start_s {
+            return Phi::BEFORE;
+        }
+        // Rounding may lift the quotient to 1 just before the end; it cannot go beyond by more than that.
+        Phi::at(self.n, ((t_s - self.start_s) / self.duration_s).min(1.0))
     }
 
     /// Checks one stroke of an arm with `joints` joints.

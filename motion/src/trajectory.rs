@@ -1,6 +1,6 @@
 //! A checked sum of strokes over a base pose.
 //!
-//! q(t) = base + sum of delta_i * phi_i(t), added in the order of the strokes, so that every reader of the
+//! `q(t) = base + sum of delta_i * phi_i(t)`, added in the order of the strokes, so that every reader of the
 //! same message computes the same bits.
 use crate::stroke::{Stroke, StrokeError};
 use crate::{JointArray, MAX_JOINTS, MAX_STROKES, Setpoint};
@@ -59,9 +59,31 @@ impl Trajectory {
     ///
     /// # Errors
     /// The first fault, with the stroke and the joint.
-    pub fn new(_joints: usize, _base_rad: JointArray, _strokes: &[Stroke]) -> Result<Self, TrajectoryError> {
-        todo!("motion")
+    pub fn new(joints: usize, base_rad: JointArray, strokes: &[Stroke]) -> Result<Self, TrajectoryError> {
+        if !(1..=MAX_JOINTS).contains(&joints) {
+            return Err(TrajectoryError::JointCount { joints });
+        }
+        if strokes.len() > MAX_STROKES {
+            return Err(TrajectoryError::StrokeCount { strokes: strokes.len() });
+        }
+        for (joint, &value_rad) in base_rad.iter().enumerate() {
+            if !value_rad.is_finite() || (joint >= joints && value_rad != 0.0) {
+                return Err(TrajectoryError::Base { joint, value_rad });
+            }
+        }
+        let mut kept = [Stroke::default(); MAX_STROKES];
+        let mut last_start_s = 0.0;
+        for (index, (slot, stroke)) in kept.iter_mut().zip(strokes).enumerate() {
+            stroke.check(joints).map_err(|error| TrajectoryError::Stroke { stroke: index, error })?;
+            if stroke.start_s < last_start_s {
+                return Err(TrajectoryError::NotSorted { stroke: index });
+            }
+            last_start_s = stroke.start_s;
+            *slot = *stroke;
+        }
+        Ok(Self { joints, base_rad, strokes: kept, count: strokes.len() })
     }
+
     /// How many joints the arm has.
     #[must_use]
     pub fn joints(&self) -> usize {
@@ -80,42 +102,119 @@ impl Trajectory {
     /// When the last stroke has ended; 0 without strokes.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        todo!("motion")
+        self.strokes().iter().map(Stroke::end_s).fold(0.0, f64::max)
     }
     /// The pose after the last stroke.
     #[must_use]
     pub fn end_rad(&self) -> JointArray {
-        todo!("motion")
+        let mut end_rad = self.base_rad;
+        for stroke in self.strokes() {
+            add_scaled(&mut end_rad, &stroke.delta_rad, 1.0);
+        }
+        end_rad
     }
-    /// Position, velocity, acceleration and jerk at trajectory time `t_s`; at rest before and after.
+    /// Position, velocity, acceleration and jerk at trajectory time `t_s`; at rest before and after. A `t_s` that
+    /// is NaN gives NaN for every joint that moves, so that no caller takes it for a pose.
     ///
     /// Real time: no allocation; time grows with the number of strokes (see [`Cursor`]).
     #[must_use]
-    pub fn sample(&self, _t_s: f64) -> Setpoint {
-        todo!("motion")
+    pub fn sample(&self, t_s: f64) -> Setpoint {
+        self.sample_from(0, &self.base_rad, t_s)
+    }
+
+    /// Proven bound of how far each joint moves between two instants, in either order (rad).
+    ///
+    /// phi is monotone, so the sum of |delta| (phi(t2) - phi(t1)) is at least the total variation of the joint: every
+    /// position between the two instants is within it of both ends. Grown by what rounding can take away.
+    #[must_use]
+    pub fn travel_bound_rad(&self, t1_s: f64, t2_s: f64) -> JointArray {
+        let (from_s, to_s) = if t1_s <= t2_s { (t1_s, t2_s) } else { (t2_s, t1_s) };
+        let mut bound_rad = [0.0; MAX_JOINTS];
+        for stroke in self.strokes() {
+            if stroke.start_s >= to_s {
+                break;
+            }
+            if stroke.has_ended(from_s) {
+                continue;
+            }
+            // |error of phi| <= about 4 n epsilon < 6e-14 for n <= 64, at each of the two ends.
+            let part = (stroke.phi(to_s).value - stroke.phi(from_s).value + PHI_ROUNDING).clamp(0.0, 1.0);
+            for (bound_rad, delta_rad) in bound_rad.iter_mut().zip(&stroke.delta_rad) {
+                *bound_rad += delta_rad.abs() * part;
+            }
+        }
+        bound_rad
+    }
+
+    /// The one sampling loop: `reached_rad` is the pose after the strokes in front of `first`, which have ended.
+    fn sample_from(&self, first: usize, reached_rad: &JointArray, t_s: f64) -> Setpoint {
+        let mut setpoint = Setpoint { position_rad: *reached_rad, ..Setpoint::default() };
+        for stroke in self.strokes().get(first..).unwrap_or(&[]) {
+            if t_s <= stroke.start_s {
+                break; // Sorted by start: nothing behind it has begun.
+            }
+            if stroke.has_ended(t_s) {
+                add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, 1.0);
+                continue;
+            }
+            let phi = stroke.phi(t_s);
+            let rate = 1.0 / stroke.duration_s;
+            let rate2 = rate * rate;
+            add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, phi.value);
+            add_scaled(&mut setpoint.velocity_rad_s, &stroke.delta_rad, phi.d1 * rate);
+            add_scaled(&mut setpoint.acceleration_rad_s2, &stroke.delta_rad, phi.d2 * rate2);
+            add_scaled(&mut setpoint.jerk_rad_s3, &stroke.delta_rad, phi.d3 * rate2 * rate);
+        }
+        setpoint
     }
 }
 
-/// Samples one trajectory at times that never fall; skips strokes that have ended, with the same bits as
-/// [`Trajectory::sample`].
+/// What rounding can take from a difference of two values of phi.
+const PHI_ROUNDING: f64 = 2e-13;
+
+/// sum += value * factor, joint by joint.
+fn add_scaled(sum: &mut JointArray, value: &JointArray, factor: f64) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += value * factor;
+    }
+}
+
+/// Samples one trajectory at times that seldom fall; skips strokes that have ended, with the same bits as
+/// [`Trajectory::sample`]. A cursor belongs to one trajectory: another one needs [`Cursor::at_start`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cursor {
     /// Strokes in front of this one have ended.
     pub first: usize,
     /// Pose after the strokes that have ended.
     pub reached_rad: JointArray,
+    /// The latest instant that was asked for; a default cursor has none, and starts at the base.
+    last_t_s: Option<f64>,
 }
 
 impl Cursor {
     /// Starts at the base of a trajectory.
     #[must_use]
-    pub fn at_start(_trajectory: &Trajectory) -> Self {
-        todo!("motion")
+    pub fn at_start(trajectory: &Trajectory) -> Self {
+        Self { first: 0, reached_rad: *trajectory.base_rad(), last_t_s: None }
     }
+
     /// Like [`Trajectory::sample`]; a `t_s` that went back starts over.
     ///
-    /// Real time: touches only strokes that are running or end in this step.
-    pub fn sample(&mut self, _trajectory: &Trajectory, _t_s: f64) -> Setpoint {
-        todo!("motion")
+    /// Real time: no allocation; touches the strokes that run, that end in this step, and those that ended
+    /// behind one that still runs (at most all of them, one addition a joint).
+    pub fn sample(&mut self, trajectory: &Trajectory, t_s: f64) -> Setpoint {
+        // Written so that a NaN starts over too, and leaves no trace in the sums.
+        if !self.last_t_s.is_some_and(|last_t_s| t_s >= last_t_s) {
+            *self = Self::at_start(trajectory);
+        }
+        self.last_t_s = Some(t_s);
+        while let Some(stroke) = trajectory.strokes().get(self.first) {
+            if !stroke.has_ended(t_s) {
+                break;
+            }
+            add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0);
+            self.first += 1;
+        }
+        trajectory.sample_from(self.first, &self.reached_rad, t_s)
     }
 }

@@ -1,0 +1,430 @@
+//! The proof behind [`crate::limits::check_motion`]: branch and bound with Taylor models.
+//!
+//! Between two neighbouring starts or ends of strokes a trajectory is one polynomial. On an interval of half width H
+//! round m, Taylor's theorem bounds each quantity by its exact derivatives at m and a remainder:
+//!
+//!     |q^(k)(t)| <= |q^(k)(m)| + |q^(k+1)(m)| H + .. + |q^(4)(m)| H^(4-k)/(4-k)! + M5 H^(5-k)/(5-k)!
+//!
+//! M5 bounds the fifth derivative: that of one stroke is a sum of four terms c s^a (1 - s^4)^b, each with a closed-form
+//! peak. Intervals whose bound is too high are halved. Strokes that cancel each other are no difficulty, because only
+//! the remainder adds their magnitudes. What rounding can hide is added to every bound.
+use crate::limits::{LimitViolation, POSITION_TOLERANCE_RAD, Peaks, Quantity, TOLERANCE};
+use crate::stroke::{Phi, power};
+use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
+
+/// Most evaluations of one stroke that a proof may take.
+const WORK_MAX: usize = 4_000_000;
+/// Most halvings of one piece: 2^-40 of a day is 80 ns.
+const DEPTH_MAX: u32 = 40;
+/// Reported peaks are at most this much above the true ones, relatively ..
+const PEAK_RESOLUTION: f64 = 1e-3;
+/// .. or this part of the limit.
+const PEAK_FLOOR: f64 = 1e-3;
+/// Relative rounding of a sum of up to 512 terms, each with a relative error of some 4 n epsilon.
+const ROUNDING: f64 = 2e-13;
+/// Once a violation is known, an earlier one is looked for down to this width (s).
+const FIRST_S: f64 = 1e-5;
+
+/// Velocity, acceleration, jerk: the quantities with symmetric limits.
+const RATES: [Quantity; 3] = [Quantity::Velocity, Quantity::Acceleration, Quantity::Jerk];
+
+pub(crate) fn check(
+    trajectory: &Trajectory,
+    limits: &[JointLimits; MAX_JOINTS],
+) -> Result<Peaks, LimitViolation> {
+    let mut proof = Proof::new(trajectory, limits);
+    proof.check_base()?;
+    let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
+    for (pair, stroke) in edges.chunks_exact_mut(2).zip(trajectory.strokes()) {
+        pair.copy_from_slice(&[stroke.start_s, stroke.end_s()]);
+    }
+    edges.sort_unstable_by(f64::total_cmp);
+    let pieces =
+        || edges.windows(2).filter_map(|w| (w[1] > w[0] && w[1].is_finite()).then_some((w[0], w[1])));
+    // A first look at every piece, so that bounds are refined only near the peaks of the whole motion.
+    let looks = (128 / pieces().count().max(1)).max(1);
+    for (from_s, to_s) in pieces() {
+        proof.enter(from_s, to_s);
+        for look in 0..looks {
+            #[expect(clippy::cast_precision_loss, reason = "at most 128")]
+            let part = (look as f64 + 0.5) / looks as f64;
+            proof.look(from_s + part * (to_s - from_s));
+        }
+    }
+    for (from_s, to_s) in pieces() {
+        proof.enter(from_s, to_s);
+        proof.prove(from_s, to_s)?;
+    }
+    Ok(proof.peaks())
+}
+
+/// q and its first four derivatives by time at one instant, all joints.
+type Jet = [JointArray; 5];
+
+struct Proof<'a> {
+    trajectory: &'a Trajectory,
+    limits: &'a [JointLimits; MAX_JOINTS],
+    /// Of each stroke `c_k/T^k` for k = 0 to 3, and 5.
+    scales: [[f64; 5]; MAX_STROKES],
+    /// Sums over the strokes that run in the current piece of `|delta| c_k/T^k`: k = 0 to 3 for rounding, and 5.
+    size: [JointArray; 4],
+    fifth: JointArray,
+    /// Indices of the strokes that run in the current piece.
+    running: [u16; MAX_STROKES],
+    running_count: usize,
+    /// Pose after those that have ended before it, and the sum of their |delta|.
+    reached_rad: JointArray,
+    travelled_rad: JointArray,
+    /// Highest values met so far, and highest bounds proven: velocity, acceleration, jerk.
+    met: [JointArray; 3],
+    bound: [JointArray; 3],
+    work: usize,
+}
+
+/// An interval that is still to be proven.
+#[derive(Clone, Copy, Default)]
+struct Interval {
+    from_s: f64,
+    to_s: f64,
+    depth: u32,
+}
+
+/// What a bound says about an interval.
+enum Verdict {
+    Holds,
+    Halve,
+    /// Not below the limit; the evidence says whether the limit is truly exceeded at the middle.
+    Fails(LimitViolation),
+}
+
+impl<'a> Proof<'a> {
+    fn new(trajectory: &'a Trajectory, limits: &'a [JointLimits; MAX_JOINTS]) -> Self {
+        let zero = [0.0; MAX_JOINTS];
+        Self {
+            trajectory,
+            limits,
+            scales: scales(trajectory),
+            size: [zero; 4],
+            fifth: zero,
+            running: [0; MAX_STROKES],
+            running_count: 0,
+            reached_rad: *trajectory.base_rad(),
+            travelled_rad: zero,
+            met: [zero; 3],
+            bound: [zero; 3],
+            work: 0,
+        }
+    }
+
+    fn joint_limits(&self) -> impl Iterator<Item = (usize, &'a JointLimits)> {
+        self.limits.iter().enumerate().take(self.trajectory.joints())
+    }
+
+    /// A trajectory without strokes still stands somewhere.
+    fn check_base(&self) -> Result<(), LimitViolation> {
+        for (joint, limits) in self.joint_limits() {
+            if let Some(violation) = position_fault(joint, limits, self.trajectory.base_rad()[joint], 0.0) {
+                return Err(violation);
+            }
+        }
+        Ok(())
+    }
+
+    /// Collects what runs between two neighbouring edges.
+    fn enter(&mut self, from_s: f64, to_s: f64) {
+        self.size = [[0.0; MAX_JOINTS]; 4];
+        self.fifth = [0.0; MAX_JOINTS];
+        self.reached_rad = *self.trajectory.base_rad();
+        self.travelled_rad = [0.0; MAX_JOINTS];
+        self.running_count = 0;
+        for (index, stroke) in self.trajectory.strokes().iter().enumerate() {
+            if stroke.start_s >= to_s {
+                break;
+            }
+            if stroke.has_ended(from_s) {
+                add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0);
+                add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0);
+                continue;
+            }
+            let Some([lower @ .., fifth]) = self.scales.get(index) else { continue };
+            for (size, scale) in self.size.iter_mut().zip(lower) {
+                add_magnitude(size, &stroke.delta_rad, *scale);
+            }
+            add_magnitude(&mut self.fifth, &stroke.delta_rad, *fifth);
+            if let (Some(slot), Ok(index)) = (self.running.get_mut(self.running_count), u16::try_from(index))
+            {
+                *slot = index;
+                self.running_count += 1;
+            }
+        }
+    }
+
+    /// Exact derivatives at an instant of the current piece.
+    fn jet(&mut self, t_s: f64) -> Jet {
+        let mut jet = [[0.0; MAX_JOINTS]; 5];
+        jet[0] = self.reached_rad;
+        for index in self.running.iter().take(self.running_count) {
+            let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else { continue };
+            let s = ((t_s - stroke.start_s) / stroke.duration_s).clamp(0.0, 1.0);
+            let phi = Phi::at(stroke.n, s);
+            let mut rate = 1.0;
+            for (sum, phi) in jet.iter_mut().zip([phi.value, phi.d1, phi.d2, phi.d3, fourth(stroke.n, s)]) {
+                add_scaled(sum, &stroke.delta_rad, phi * rate);
+                rate /= stroke.duration_s;
+            }
+        }
+        self.work += self.running_count.max(1);
+        jet
+    }
+
+    /// Notes what is reached at one instant.
+    fn look(&mut self, t_s: f64) {
+        let jet = self.jet(t_s);
+        self.note(&jet);
+    }
+
+    fn note(&mut self, jet: &Jet) {
+        for (met, values) in self.met.iter_mut().zip(jet.iter().skip(1)) {
+            for (met, value) in met.iter_mut().zip(values) {
+                *met = met.max(value.abs());
+            }
+        }
+    }
+
+    /// Proves one piece from left to right, or finds its first violation.
+    fn prove(&mut self, from_s: f64, to_s: f64) -> Result<(), LimitViolation> {
+        let mut stack = [Interval::default(); DEPTH_MAX as usize + 2];
+        stack[0] = Interval { from_s, to_s, depth: 0 };
+        let mut count = 1_usize;
+        let mut found: Option<LimitViolation> = None;
+        while let Some(interval) = count.checked_sub(1).and_then(|top| stack.get(top).copied()) {
+            count -= 1;
+            let Interval { from_s, to_s, depth } = interval;
+            let middle_s = 0.5 * (from_s + to_s);
+            let may_halve = depth < DEPTH_MAX && self.work < WORK_MAX && from_s < middle_s && middle_s < to_s;
+            match self.judge(interval, may_halve) {
+                Verdict::Holds => continue,
+                Verdict::Fails(violation) if violation.proven => {
+                    // What lies to the right is later; only the left half can hold an earlier one.
+                    count = 0;
+                    found = Some(violation);
+                    if to_s - from_s < FIRST_S {
+                        break;
+                    }
+                }
+                Verdict::Fails(violation) if !may_halve => return Err(found.unwrap_or(violation)),
+                Verdict::Fails(_) | Verdict::Halve => {
+                    if found.is_some() && to_s - from_s < FIRST_S {
+                        continue;
+                    }
+                    if let Some(slot) = stack.get_mut(count) {
+                        *slot = Interval { from_s: middle_s, to_s, depth: depth + 1 };
+                        count += 1;
+                    }
+                }
+            }
+            if let (true, Some(slot)) = (may_halve, stack.get_mut(count)) {
+                *slot = Interval { from_s, to_s: middle_s, depth: depth + 1 };
+                count += 1;
+            }
+        }
+        found.map_or(Ok(()), |violation| Err(self.worst_near(violation)))
+    }
+
+    /// Bounds everything on one interval and compares it with the limits.
+    fn judge(&mut self, interval: Interval, may_halve: bool) -> Verdict {
+        let middle_s = 0.5 * (interval.from_s + interval.to_s);
+        let half_s = (interval.to_s - middle_s).max(middle_s - interval.from_s);
+        let jet = self.jet(middle_s);
+        self.note(&jet);
+        let mut fails = None;
+        let mut coarse = false;
+        let mut bounds = [[0.0; MAX_JOINTS]; 3];
+        for (joint, limits) in self.joint_limits() {
+            let position_rad = jet[0][joint];
+            let rounding = ROUNDING * (position_rad.abs() + self.travelled_rad[joint] + self.size[0][joint]);
+            let reach_rad = self.beyond(&jet, 0, joint, half_s) + rounding;
+            if let Some(violation) = position_fault(joint, limits, position_rad, middle_s) {
+                return Verdict::Fails(violation);
+            }
+            fails = fails.or(reach_fault(joint, limits, (position_rad, reach_rad), middle_s));
+            for (rate, quantity) in RATES.into_iter().enumerate() {
+                let value = jet[rate + 1][joint].abs();
+                let bound = value
+                    + self.beyond(&jet, rate + 1, joint, half_s)
+                    + ROUNDING * self.size[rate + 1][joint];
+                let limit = limit_of(limits, quantity);
+                let evidence =
+                    |value, proven| LimitViolation { joint, quantity, at_s: middle_s, value, limit, proven };
+                if !within(value, limit * (1.0 + TOLERANCE)) {
+                    return Verdict::Fails(evidence(value, true));
+                }
+                if !within(bound, limit * (1.0 + TOLERANCE)) {
+                    fails = fails.or(Some(evidence(bound, false)));
+                }
+                let met = self.met[rate][joint];
+                coarse |= bound > (met * (1.0 + PEAK_RESOLUTION)).max(limit * PEAK_FLOOR);
+                bounds[rate][joint] = bound;
+            }
+        }
+        if let Some(violation) = fails {
+            return Verdict::Fails(violation);
+        }
+        // Sharper peaks are a service, not a part of the proof: they get half of the work.
+        if coarse && may_halve && self.work < WORK_MAX / 2 {
+            return Verdict::Halve;
+        }
+        for (bound, new) in self.bound.iter_mut().zip(&bounds) {
+            for (bound, new) in bound.iter_mut().zip(new) {
+                *bound = bound.max(*new);
+            }
+        }
+        Verdict::Holds
+    }
+
+    /// How far the k-th derivative can go from its value at the middle, without rounding.
+    fn beyond(&self, jet: &Jet, k: usize, joint: usize, half_s: f64) -> f64 {
+        let (mut sum, mut factor, mut order) = (0.0, 1.0, 1.0);
+        for derivative in jet.iter().skip(k + 1) {
+            factor *= half_s / order;
+            order += 1.0;
+            sum += derivative[joint].abs() * factor;
+        }
+        sum + self.fifth[joint] * factor * half_s / order
+    }
+
+    /// Walks uphill from the beginning of a violation to its worst instant, so that the evidence shows how bad it is.
+    fn worst_near(&self, first: LimitViolation) -> LimitViolation {
+        let mut worst = first;
+        let mut step_s = FIRST_S;
+        for _ in 0..64 {
+            let at_s = worst.at_s + step_s;
+            let setpoint = self.trajectory.sample(at_s);
+            let value = match first.quantity {
+                Quantity::Position => setpoint.position_rad,
+                Quantity::Velocity => setpoint.velocity_rad_s,
+                Quantity::Acceleration => setpoint.acceleration_rad_s2,
+                Quantity::Jerk => setpoint.jerk_rad_s3,
+            }[first.joint];
+            let value = if first.quantity == Quantity::Position { value } else { value.abs() };
+            if (value - first.limit).abs() > (worst.value - first.limit).abs() && value.is_finite() {
+                worst = LimitViolation { at_s, value, ..worst };
+                step_s *= 2.0;
+            } else {
+                step_s *= 0.5;
+            }
+        }
+        worst
+    }
+
+    fn peaks(&self) -> Peaks {
+        let [velocity_rad_s, acceleration_rad_s2, jerk_rad_s3] = self.bound;
+        Peaks { velocity_rad_s, acceleration_rad_s2, jerk_rad_s3 }
+    }
+}
+
+/// False for a NaN on either side, so that what is no number never passes.
+fn within(value: f64, limit: f64) -> bool {
+    value <= limit
+}
+
+fn scales(trajectory: &Trajectory) -> [[f64; 5]; MAX_STROKES] {
+    let mut scales = [[0.0; 5]; MAX_STROKES];
+    for (scales, stroke) in scales.iter_mut().zip(trajectory.strokes()) {
+        let rate = 1.0 / stroke.duration_s;
+        let mut rate_k = 1.0;
+        for (order, scale) in [0, 1, 2, 3, 5].into_iter().zip(scales) {
+            rate_k = if order == 5 { rate_k * rate } else { rate_k };
+            *scale = rate_k * derivative_bound(order, stroke.n);
+            rate_k *= rate;
+        }
+    }
+    scales
+}
+
+fn limit_of(limits: &JointLimits, quantity: Quantity) -> f64 {
+    match quantity {
+        Quantity::Position => limits.position_rad[1],
+        Quantity::Velocity => limits.motion.velocity_rad_s,
+        Quantity::Acceleration => limits.motion.acceleration_rad_s2,
+        Quantity::Jerk => limits.motion.jerk_rad_s3,
+    }
+}
+
+fn position_fault(joint: usize, limits: &JointLimits, value: f64, at_s: f64) -> Option<LimitViolation> {
+    reach_fault(joint, limits, (value, 0.0), at_s)
+        .map(|violation| LimitViolation { proven: true, ..violation })
+}
+
+/// The position limit that an angle with a reach to both sides may break.
+fn reach_fault(
+    joint: usize,
+    limits: &JointLimits,
+    (middle_rad, reach_rad): (f64, f64),
+    at_s: f64,
+) -> Option<LimitViolation> {
+    let [low_rad, high_rad] = limits.position_rad;
+    let fault = |value, limit| {
+        Some(LimitViolation { joint, quantity: Quantity::Position, at_s, value, limit, proven: false })
+    };
+    if !within(middle_rad + reach_rad, high_rad + POSITION_TOLERANCE_RAD) {
+        return fault(middle_rad + reach_rad, high_rad);
+    }
+    if !within(low_rad - POSITION_TOLERANCE_RAD, middle_rad - reach_rad) {
+        return fault(middle_rad - reach_rad, low_rad);
+    }
+    None
+}
+
+/// phi''''(s) = n u^(n-4) (24 u^3 - 816 (n-1) x u^2 + 1152 (n-1)(n-2) x^2 u - 256 (n-1)(n-2)(n-3) x^3), x = s^4.
+fn fourth(n: u32, s: f64) -> f64 {
+    let m = f64::from(n);
+    let x = s * s * s * s;
+    let u = 1.0 - x;
+    let (a, b, c) = (m - 1.0, m - 2.0, m - 3.0);
+    let inner = 24.0 * u * u * u - a * x * (816.0 * u * u - b * x * (1152.0 * u - 256.0 * c * x));
+    m * power(u, n.saturating_sub(4)) * inner
+}
+
+/// A bound of |phi^(order)| on [0, 1]: the sum of the peaks of its terms.
+///
+/// phi^(k) = - sum over j of n!/(n-j)! b(k, j) s^(4j-k) u^(n-j) with b(k+1, j) = (4j - k) b(k, j) - 4 b(k, j-1),
+/// b(0, 0) = 1; the rows below are b, and s^a (1 - s^4)^b peaks at s^4 = a/(a + 4b).
+fn derivative_bound(order: usize, n: u32) -> f64 {
+    const ROWS: [[f64; 5]; 6] = [
+        [0.0; 5],
+        [4.0, 0.0, 0.0, 0.0, 0.0],
+        [12.0, 16.0, 0.0, 0.0, 0.0],
+        [24.0, 144.0, 64.0, 0.0, 0.0],
+        [24.0, 816.0, 1152.0, 256.0, 0.0],
+        [0.0, 3360.0, 12480.0, 7680.0, 1024.0],
+    ];
+    let Some(row) = ROWS.get(order).filter(|_| order > 0) else { return 1.0 };
+    let n = f64::from(n);
+    let (mut sum, mut falling, mut j) = (0.0, 1.0, 0.0);
+    #[expect(clippy::cast_precision_loss, reason = "at most 5")]
+    let k = order as f64;
+    for coefficient in row {
+        j += 1.0;
+        falling *= n - j + 1.0;
+        let (a, b) = (4.0 * j - k, n - j);
+        if *coefficient == 0.0 || falling <= 0.0 {
+            continue;
+        }
+        let x = a / (a + 4.0 * b);
+        sum += coefficient * falling * libm::pow(x, 0.25 * a) * libm::pow(1.0 - x, b);
+    }
+    sum
+}
+
+fn add_scaled(sum: &mut JointArray, value: &JointArray, factor: f64) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += value * factor;
+    }
+}
+
+fn add_magnitude(sum: &mut JointArray, value: &JointArray, factor: f64) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += value.abs() * factor;
+    }
+}
