@@ -2,7 +2,9 @@
 //!
 //! With x = s^m and n = 1/k, each derivative of phi = 1 - (1 - x)^n is, for b = n - j and a = m - j,
 //!
-//!     phi^(j) = n m s^a (1 - x)^b P_j(x),   P_1 = 1,   P_(j+1) = (a - (a + b m) x) P_j + m x (1 - x) P_j'
+//! ```text
+//! phi^(j) = n m s^a (1 - x)^b P_j(x),   P_1 = 1,   P_(j+1) = (a - (a + b m) x) P_j + m x (1 - x) P_j'
+//! ```
 //!
 //! so the peaks of velocity, acceleration and jerk sit at the roots of a linear, a quadratic and a cubic in x.
 //!

@@ -3,7 +3,9 @@
 //! Between two neighbouring starts or ends of strokes a trajectory is one polynomial. On an interval of half width H
 //! round m, Taylor's theorem bounds each quantity by its exact derivatives at m and a remainder:
 //!
-//!     |q^(k)(t)| <= |q^(k)(m)| + |q^(k+1)(m)| H + .. + |q^(4)(m)| H^(4-k)/(4-k)! + M5 H^(5-k)/(5-k)!
+//! ```text
+//! |q^(k)(t)| <= |q^(k)(m)| + |q^(k+1)(m)| H + .. + |q^(4)(m)| H^(4-k)/(4-k)! + M5 H^(5-k)/(5-k)!
+//! ```
 //!
 //! M5 bounds the fifth derivative: that of one stroke is a sum of four terms c s^a (1 - s^4)^b, each with a closed-form
 //! peak. Intervals whose bound is too high are halved. Strokes that cancel each other are no difficulty, because only

@@ -5,7 +5,9 @@
 //! [0, 1]: sigma stays in [0, 1], `|sigma'| <= c_v/D`, and `|sigma''| <= (c_a+ + c_a-)/D^2` where `c_a+` and `c_a-`
 //! are the highest positive and negative peaks of phi''. The duration D follows from the two limit sets in closed form:
 //!
-//!     a_m + v_m |sigma'| <= a_s      and      j_m + 3 a_m |sigma'| + v_m |sigma''| <= j_s      for every joint
+//! ```text
+//! a_m + v_m |sigma'| <= a_s      and      j_m + 3 a_m |sigma'| + v_m |sigma''| <= j_s      for every joint
+//! ```
 use crate::peaks::peak_constants;
 use crate::stroke::{DURATION_S_MIN, Phi};
 use crate::{JointLimits, MAX_JOINTS, Setpoint};
