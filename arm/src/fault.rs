@@ -1,12 +1,14 @@
 //! What is wrong with a file: every fault at once.
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One fault of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// The file.
     pub file: PathBuf,
+    /// Line of the file, from 1, where it is known.
+    pub line: Option<usize>,
     /// The key, as a path: `joint[2].motion.velocity_rad_s`. Empty when the whole file is at fault.
     pub key: String,
     /// The value that stands there, or "missing".
@@ -15,14 +17,26 @@ pub struct Fault {
     pub expected: String,
 }
 
+impl Fault {
+    /// A fault without a line.
+    #[must_use]
+    pub fn new(file: &Path, key: &str, value: &str, expected: &str) -> Self {
+        let (key, value, expected) = (key.to_owned(), value.to_owned(), expected.to_owned());
+        Self { file: file.to_owned(), line: None, key, value, expected }
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let file = self.file.display();
         let (key, value, expected) = (&self.key, &self.value, &self.expected);
+        write!(f, "{}", self.file.display())?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
         if key.is_empty() {
-            write!(f, "{file}: {value}: expected {expected}")
+            write!(f, ": {value}: expected {expected}")
         } else {
-            write!(f, "{file}: {key} = {value}: expected {expected}")
+            write!(f, ": {key} = {value}: expected {expected}")
         }
     }
 }
@@ -40,5 +54,22 @@ impl fmt::Display for Faults {
             write!(f, "{fault}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fault_shown_names_file_line_key_value_and_expectation() {
+        let mut fault = Fault::new(Path::new("ur5.toml"), "joint[0].name", "3", "a name");
+        assert_eq!(fault.to_string(), "ur5.toml: joint[0].name = 3: expected a name");
+        fault.line = Some(7);
+        assert_eq!(fault.to_string(), "ur5.toml:7: joint[0].name = 3: expected a name");
+        fault.key = String::new();
+        let both = Faults(vec![fault.clone(), fault]);
+        assert_eq!(both.to_string().lines().count(), 2);
+        assert!(both.to_string().starts_with("ur5.toml:7: 3: expected a name"), "{both}");
     }
 }

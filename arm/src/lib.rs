@@ -4,13 +4,22 @@
 //! key, value and what was expected; unknown keys are faults.
 #![forbid(unsafe_code)]
 
+mod binding;
+mod contact;
+mod description;
+pub mod digest;
+mod document;
 pub mod fault;
+pub mod lookup;
+mod mesh;
+mod reader;
 pub mod robot;
 pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
 
 pub use fault::{Fault, Faults};
+pub use lookup::{Kind, find};
 pub use robot::{LinkShape, Robot, RobotJoint};
 pub use scene::{Obstacle, Scene, Shape};
 pub use settings::{Bus, BusKind, Servo, Settings};

@@ -1,7 +1,14 @@
 //! A robot: its chain, limits and collision shapes.
+use crate::contact;
+use crate::description::{Description, JointRow, RowKind};
+use crate::digest;
+use crate::document;
+use crate::reader::Book;
 use crate::{Faults, scene::Shape};
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use taustream_motion::chain::{Chain, Pose};
+use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
 /// One joint, base to tip.
@@ -54,22 +61,124 @@ impl Robot {
     ///
     /// # Errors
     /// Every fault at once.
-    pub fn load(_file: &Path) -> Result<Self, Faults> {
-        todo!("arm")
+    pub fn load(file: &Path) -> Result<Self, Faults> {
+        Self::from_toml(file, &document::read_text(file, "a robot file in TOML")?)
+    }
+    /// Checks the text of a robot file; `file` is what faults call it.
+    ///
+    /// # Errors
+    /// Every fault at once.
+    pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        let book = Book::new(file);
+        let description = Description::read(&book, document::parse_toml(file, text)?);
+        let robot = description.and_then(|description| Self::build(&book, &description));
+        book.close(robot)
+    }
+    /// Makes the robot of a description without faults.
+    fn build(book: &Book, description: &Description) -> Option<Self> {
+        let rows = &description.joints;
+        let joints: Vec<ChainJoint> = rows.iter().map(chain_joint).collect();
+        let Some(chain) = Chain::new(&joints) else {
+            book.add(None, "joint", &format!("{} tables", rows.len()), "1 to 8 joints");
+            return None;
+        };
+        let shapes: Vec<LinkShape> =
+            rows.iter().enumerate().filter_map(|(i, row)| link_shape(i + 1, row)).collect();
+        let limits: Vec<JointLimits> = rows.iter().map(|row| row.limits).collect();
+        let joint = |row: &JointRow| RobotJoint { name: row.name.clone(), limits: row.limits };
+        Some(Self {
+            name: description.name.clone(),
+            file: book.file().to_owned(),
+            joints: rows.iter().map(joint).collect(),
+            links: (0..=rows.len()).map(link_name).collect(),
+            allowed_by_file: description.allowed_contacts.clone(),
+            allowed_by_rule: contact::allowed_by_rule(&chain, &shapes, &limits),
+            digest: digest::of(description),
+            chain,
+            shapes,
+        })
     }
     /// Limits as the motion crate takes them; unused slots are zero.
     #[must_use]
     pub fn limits(&self) -> [JointLimits; MAX_JOINTS] {
-        todo!("arm")
+        let mut limits = [JointLimits::default(); MAX_JOINTS];
+        for (slot, joint) in limits.iter_mut().zip(&self.joints) {
+            *slot = joint.limits;
+        }
+        limits
     }
-    /// True when the two links may touch.
+    /// True when the two links may touch: a link with itself, by the file, or by the contact rule.
     #[must_use]
-    pub fn may_touch(&self, _a: usize, _b: usize) -> bool {
-        todo!("arm")
+    pub fn may_touch(&self, a: usize, b: usize) -> bool {
+        let pair = (a.min(b), a.max(b));
+        a == b || self.allowed_by_file.contains(&pair) || self.allowed_by_rule.contains(&pair)
     }
     /// The digest in hexadecimal, as trajectory files hold it.
     #[must_use]
     pub fn digest_hex(&self) -> String {
-        todo!("arm")
+        let mut hex = String::with_capacity(2 * self.digest.len());
+        for byte in self.digest {
+            // Writing to a string cannot fail.
+            let _ = write!(hex, "{byte:02x}");
+        }
+        hex
+    }
+}
+
+/// Name of a link by index: "base", "link1", ...
+pub(crate) fn link_name(link: usize) -> String {
+    if link == 0 { "base".to_owned() } else { format!("link{link}") }
+}
+
+fn chain_joint(row: &JointRow) -> ChainJoint {
+    let (a_m, alpha_rad, d_m, theta_rad) = (row.a_m, row.alpha_rad, row.d_m, row.theta_offset_rad);
+    match row.kind {
+        RowKind::Standard => ChainJoint::from_dh(a_m, alpha_rad, d_m, theta_rad),
+        RowKind::Modified => ChainJoint::from_mdh(a_m, alpha_rad, d_m, theta_rad),
+    }
+}
+
+/// The capsule between the origins of frames i-1 and i.
+///
+/// Standard rows turn about the *last* frame's z, so the segment is rigid with frame i; modified rows turn about
+/// *this* frame's z, so it is rigid with frame i-1, and moves with joint i-1. A shape belongs to the link that it
+/// moves with: that is what decides which pairs can approach each other.
+fn link_shape(joint: usize, row: &JointRow) -> Option<LinkShape> {
+    if row.link_radius_m <= 0.0 {
+        return None;
+    }
+    let (sin, cos) = row.alpha_rad.sin_cos();
+    let (frame, other_end) = match row.kind {
+        // Frame i-1 as frame i sees it: the inverse of Tz(d) Tx(a) Rx(alpha), applied to the origin.
+        RowKind::Standard => (joint, Vector3::new(-row.a_m, -row.d_m * sin, -row.d_m * cos)),
+        // Frame i as frame i-1 sees it: Rx(alpha) Tx(a) Tz(d), applied to the origin.
+        RowKind::Modified => (joint - 1, Vector3::new(row.a_m, -row.d_m * sin, row.d_m * cos)),
+    };
+    let length_m = other_end.norm();
+    let radius_m = row.link_radius_m;
+    let shape =
+        if length_m > 0.0 { Shape::Capsule { radius_m, length_m } } else { Shape::Sphere { radius_m } };
+    let pose = Pose::from_parts(Translation3::from(other_end * 0.5), turn_z_to(&other_end));
+    Some(LinkShape { link: frame, frame, pose, shape })
+}
+
+/// A rotation that takes local z to a direction; none is needed for a zero vector.
+fn turn_z_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+    // There is no unique axis when the direction is opposite to z; any half turn about x or y will do.
+    UnitQuaternion::rotation_between(&Vector3::z(), direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+}
+
+impl LinkShape {
+    /// Ends of the axis of a capsule, or the centre of a sphere twice, in the shape's frame; `None` for other shapes.
+    #[must_use]
+    pub fn segment(&self) -> Option<([Point3<f64>; 2], f64)> {
+        let (half_m, radius_m) = match self.shape {
+            Shape::Capsule { radius_m, length_m } => (0.5 * length_m, radius_m),
+            Shape::Sphere { radius_m } => (0.0, radius_m),
+            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } => return None,
+        };
+        let end = |z| self.pose * Point3::new(0.0, 0.0, z);
+        Some(([end(-half_m), end(half_m)], radius_m))
     }
 }

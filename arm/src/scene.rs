@@ -1,6 +1,11 @@
 //! A scene: obstacles around the arm.
 use crate::Faults;
-use nalgebra::Point3;
+use crate::document::{self, Node};
+use crate::mesh;
+use crate::reader::{Book, Bounds, Table};
+use nalgebra::{Point3, Translation3, UnitQuaternion};
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use taustream_motion::chain::Pose;
 
@@ -62,12 +67,109 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
 }
 
+/// Least distance that plans keep where the file gives none.
+pub const MARGIN_M_DEFAULT: f64 = 0.02;
+
+/// Most obstacles in a scene.
+const OBSTACLES_MAX: usize = 1000;
+
+const MARGIN_M: Bounds = Bounds::within(0.0, 1.0, "m");
+const CENTER_M: Bounds = Bounds::within(-100.0, 100.0, "m");
+const SIZE_M: Bounds = Bounds::above(0.0, 100.0, "m");
+const RPY_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
+const SCALE: Bounds = Bounds::above(0.0, 1e4, "");
+
 impl Scene {
     /// Reads and checks a scene file (TOML); mesh files are read too.
     ///
     /// # Errors
     /// Every fault at once.
-    pub fn load(_file: &Path) -> Result<Self, Faults> {
-        todo!("arm")
+    pub fn load(file: &Path) -> Result<Self, Faults> {
+        Self::from_toml(file, &document::read_text(file, "a scene file in TOML")?)
+    }
+    /// Checks the text of a scene file; mesh files are looked up beside `file`, and faults name it.
+    ///
+    /// # Errors
+    /// Every fault at once.
+    pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        let book = Book::new(file);
+        let scene = Self::read(&book, document::parse_toml(file, text)?);
+        book.close(scene)
+    }
+    fn read(book: &Book, node: Node) -> Option<Self> {
+        let mut top = Table::top(book, node)?;
+        let margin_m = top.number_or("margin_m", MARGIN_M_DEFAULT, &MARGIN_M);
+        let mut obstacles = Vec::new();
+        let mut complete = true;
+        for kind in ["sphere", "box", "cylinder", "capsule", "mesh"] {
+            for (i, table) in top.tables(kind).into_iter().enumerate() {
+                let obstacle = read_obstacle(table, kind, format!("{kind}[{i}]"));
+                complete &= obstacle.is_some();
+                obstacles.extend(obstacle.map(|obstacle| (format!("{kind}[{i}].name"), obstacle)));
+            }
+        }
+        top.done();
+        if obstacles.len() > OBSTACLES_MAX {
+            let value = format!("{} obstacles", obstacles.len());
+            book.add(None, "", &value, &format!("at most {OBSTACLES_MAX}"));
+        }
+        check_names(book, &obstacles);
+        let obstacles = obstacles.into_iter().map(|(_, obstacle)| obstacle).collect();
+        complete.then_some(Self { file: book.file().to_owned(), margin_m: margin_m?, obstacles })
+    }
+}
+
+fn read_obstacle(mut table: Table<'_>, kind: &str, default_name: String) -> Option<Obstacle> {
+    let name = table.name_or("name", default_name);
+    let center_m = table.numbers::<3>("center_m", &CENTER_M);
+    // A ball has no direction; every other shape may be turned.
+    let rpy_rad =
+        if kind == "sphere" { Some([0.0; 3]) } else { table.numbers_or("rpy_rad", [0.0; 3], &RPY_RAD) };
+    let shape = read_shape(&mut table, kind);
+    table.done();
+    Some(Obstacle { name: name?, pose: pose(center_m?, rpy_rad?), shape: shape? })
+}
+
+fn read_shape(table: &mut Table<'_>, kind: &str) -> Option<Shape> {
+    match kind {
+        "sphere" => Some(Shape::Sphere { radius_m: table.number("radius_m", &SIZE_M)? }),
+        "box" => Some(Shape::Box { size_m: table.numbers("size_m", &SIZE_M)? }),
+        "mesh" => read_mesh(table),
+        _ => {
+            let (radius_m, length_m) = (table.number("radius_m", &SIZE_M), table.number("length_m", &SIZE_M));
+            let (radius_m, length_m) = (radius_m?, length_m?);
+            Some(match kind {
+                "cylinder" => Shape::Cylinder { radius_m, length_m },
+                _ => Shape::Capsule { radius_m, length_m },
+            })
+        }
+    }
+}
+
+fn read_mesh(table: &mut Table<'_>) -> Option<Shape> {
+    let file = table.text("file", "the path of an .stl or .obj file, relative to this file");
+    let scale = table.number_or("scale", 1.0, &SCALE);
+    let (file, scale) = (file?, scale?);
+    let path = document::beside(table.book().file(), &file);
+    match mesh::load(&path, scale) {
+        Ok(mesh) => Some(Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }),
+        Err((value, expected)) => {
+            table.fault("file", &value, &expected);
+            None
+        }
+    }
+}
+
+/// The URDF convention: R = Rz(yaw) Ry(pitch) Rx(roll), about fixed axes roll first.
+fn pose(center_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
+    Pose::from_parts(Translation3::from(center_m), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}
+
+fn check_names(book: &Book, obstacles: &[(String, Obstacle)]) {
+    let mut seen = BTreeSet::new();
+    for (key, obstacle) in obstacles {
+        if !seen.insert(&obstacle.name) {
+            book.add(None, key, &format!("{:?}", obstacle.name), "each obstacle's name once in the file");
+        }
     }
 }

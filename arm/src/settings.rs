@@ -1,5 +1,7 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
-use crate::{Faults, Robot, Scene};
+use crate::document::{self, Node};
+use crate::reader::{Book, Bounds, Table};
+use crate::{Faults, Robot, Scene, binding};
 use std::path::{Path, PathBuf};
 
 /// What carries frames.
@@ -114,14 +116,178 @@ pub struct Settings {
     pub cycle: Cycle,
     /// Supervision.
     pub supervision: Supervision,
+    /// The section of the simulated servos as it stands; whoever simulates checks its keys.
+    pub simulator: Option<toml::Table>,
 }
+
+/// Where the file gives none. Nothing here moves metal: what does has no default.
+mod default {
+    /// One late cycle is bridged by every drive that interpolates; the design's number.
+    pub(super) const TOLERATED_GAP_PERIODS: i64 = 2;
+    pub(super) const STALL_RESUME_MS: i64 = 20;
+    /// Below the kernel's own threads for timers, above everything ordinary.
+    pub(super) const PRIORITY: i64 = 80;
+    pub(super) const REPORT_RATE_HZ: f64 = 100.0;
+    pub(super) const LOST_CYCLES_MAX: i64 = 3;
+    pub(super) const DRIVE_TIMEOUT_S: f64 = 5.0;
+    /// The first enable after start runs at reduced speed until told otherwise.
+    pub(super) const FIRST_SPEED_PERCENT: f64 = 25.0;
+}
+
+/// 0x60C2 of CiA 402 and the vendors' drives take setpoints at 1 kHz or slower; 250 us leaves room above that.
+const PERIOD_US: [i64; 2] = [250, 20_000];
+const RATE_HZ: Bounds = Bounds::within(1.0, 1000.0, "Hz");
+const AGE_S: Bounds = Bounds::above(0.0, 1.0, "s");
+const ERROR_RAD: Bounds = Bounds::above(0.0, 3.2, "rad");
+const TIMEOUT_S: Bounds = Bounds::within(0.1, 60.0, "s");
+const TOLERANCE_RAD: Bounds = Bounds::within(0.0, 0.1, "rad");
+const PERCENT: Bounds = Bounds::above(0.0, 100.0, "percent");
+/// The arm's name stands in file names of shared memory, beside a prefix and a service's name.
+const ARM_NAME_BYTES_MAX: usize = 32;
 
 impl Settings {
     /// Reads and checks a settings file and the robot and scene files that it names.
     ///
     /// # Errors
     /// Every fault at once, those of the robot and scene files included.
-    pub fn load(_file: &Path) -> Result<Self, Faults> {
-        todo!("arm")
+    pub fn load(file: &Path) -> Result<Self, Faults> {
+        Self::from_toml(file, &document::read_text(file, "a settings file in TOML")?)
+    }
+    /// Checks the text of a settings file; the files that it names are looked up beside `file`.
+    ///
+    /// # Errors
+    /// Every fault at once, those of the robot and scene files included.
+    pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        let book = Book::new(file);
+        let settings = Self::read(&book, document::parse_toml(file, text)?, text);
+        book.close(settings)
+    }
+    fn read(book: &Book, node: Node, text: &str) -> Option<Self> {
+        let mut top = Table::top(book, node)?;
+        let name = read_name(&mut top);
+        let robot = named_file(&mut top, "robot", Robot::load);
+        let scene = named_file(&mut top, "scene", Scene::load);
+        let buses = binding::read_buses(&mut top);
+        let servos = binding::read_servos(&mut top, robot.as_ref(), &buses);
+        let cycle = top.table("cycle", "a table [cycle]").and_then(read_cycle);
+        let supervision = top.table("supervision", "a table [supervision]").and_then(read_supervision);
+        let simulator = read_simulator(&mut top, text);
+        top.done();
+        check_times(book, cycle.as_ref(), supervision.as_ref());
+        if !book.is_clean() {
+            return None;
+        }
+        Some(Self {
+            name: name?,
+            file: book.file().to_owned(),
+            robot: robot?,
+            scene: scene?,
+            buses: buses.into_iter().collect::<Option<Vec<Bus>>>()?,
+            servos,
+            cycle: cycle?,
+            supervision: supervision?,
+            simulator,
+        })
+    }
+}
+
+fn read_name(top: &mut Table<'_>) -> Option<String> {
+    let name = top.name("name")?;
+    if name.len() <= ARM_NAME_BYTES_MAX && !name.contains('.') {
+        return Some(name);
+    }
+    let expected = format!("1 to {ARM_NAME_BYTES_MAX} letters, digits, '_' or '-'");
+    top.fault("name", &document::shown(&name), &expected);
+    None
+}
+
+/// Loads a file that this one names; its faults join this book.
+fn named_file<T>(top: &mut Table<'_>, key: &'static str, load: fn(&Path) -> Result<T, Faults>) -> Option<T> {
+    let named = top.text(key, &format!("the path of a {key} file, relative to this file"))?;
+    let path = document::beside(top.book().file(), &named);
+    load(&path).map_err(|faults| top.book().take_over(faults)).ok()
+}
+
+fn read_cycle(mut table: Table<'_>) -> Option<Cycle> {
+    let period_us = table.integer("period_us", PERIOD_US[0], PERIOD_US[1]);
+    let gap = table.integer_or("tolerated_gap_periods", default::TOLERATED_GAP_PERIODS, 1, 100);
+    let stall = table.integer_or("stall_resume_ms", default::STALL_RESUME_MS, 0, 10_000);
+    let watchdog = table.integer("drive_watchdog_ms", 1, 10_000);
+    let priority = table.integer_or("priority", default::PRIORITY, 1, 99);
+    let cpu = table.has("cpu").then(|| table.integer("cpu", 0, 1023));
+    let report_rate_hz = table.number_or("report_rate_hz", default::REPORT_RATE_HZ, &RATE_HZ);
+    table.done();
+    Some(Cycle {
+        period_us: u32::try_from(period_us?).ok()?,
+        tolerated_gap_periods: u32::try_from(gap?).ok()?,
+        stall_resume_ms: u32::try_from(stall?).ok()?,
+        drive_watchdog_ms: u32::try_from(watchdog?).ok()?,
+        priority: u8::try_from(priority?).ok()?,
+        cpu: match cpu {
+            Some(cpu) => Some(usize::try_from(cpu?).ok()?),
+            None => None,
+        },
+        report_rate_hz: report_rate_hz?,
+    })
+}
+
+fn read_supervision(mut table: Table<'_>) -> Option<Supervision> {
+    let feedback_age_s_max = table.number("feedback_age_s_max", &AGE_S);
+    let tracking_error_rad_max = table.number("tracking_error_rad_max", &ERROR_RAD);
+    let position_jump_rad_max = table.number("position_jump_rad_max", &ERROR_RAD);
+    let lost_cycles_max = table.integer_or("lost_cycles_max", default::LOST_CYCLES_MAX, 1, 1000);
+    let drive_timeout_s = table.number_or("drive_timeout_s", default::DRIVE_TIMEOUT_S, &TIMEOUT_S);
+    let base_tolerance_rad = table.number("base_tolerance_rad", &TOLERANCE_RAD);
+    let first_speed_percent = table.number_or("first_speed_percent", default::FIRST_SPEED_PERCENT, &PERCENT);
+    table.done();
+    Some(Supervision {
+        feedback_age_s_max: feedback_age_s_max?,
+        tracking_error_rad_max: tracking_error_rad_max?,
+        position_jump_rad_max: position_jump_rad_max?,
+        lost_cycles_max: u32::try_from(lost_cycles_max?).ok()?,
+        drive_timeout_s: drive_timeout_s?,
+        base_tolerance_rad: base_tolerance_rad?,
+        first_speed_percent: first_speed_percent?,
+    })
+}
+
+/// The section as it stands; the simulator knows its keys and checks them.
+fn read_simulator(top: &mut Table<'_>, text: &str) -> Option<toml::Table> {
+    if !top.has("simulator") {
+        return None;
+    }
+    top.table("simulator", "a table [simulator]")?;
+    let mut whole: toml::Table = text.parse().ok()?;
+    match whole.remove("simulator") {
+        Some(toml::Value::Table(section)) => Some(section),
+        _ => None,
+    }
+}
+
+/// Times that only make sense in one order.
+fn check_times(book: &Book, cycle: Option<&Cycle>, supervision: Option<&Supervision>) {
+    let Some(cycle) = cycle else { return };
+    let gap_ms = f64::from(cycle.tolerated_gap_periods) * f64::from(cycle.period_us) * 1e-3;
+    let (watchdog_ms, stall_ms) = (cycle.drive_watchdog_ms, cycle.stall_resume_ms);
+    if f64::from(watchdog_ms) <= gap_ms {
+        let expected =
+            format!("more than the tolerated gap of {gap_ms} ms (tolerated_gap_periods x period_us)");
+        book.add(None, "cycle.drive_watchdog_ms", &watchdog_ms.to_string(), &expected);
+    }
+    if stall_ms > watchdog_ms {
+        let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
+        book.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
+    }
+    let Some(supervision) = supervision else { return };
+    let period_s = f64::from(cycle.period_us) * 1e-6;
+    // Feedback is one cycle old when it is looked at; below two periods, jitter alone would stop the arm.
+    if supervision.feedback_age_s_max < 2.0 * period_s {
+        let value = format!("{:?}", supervision.feedback_age_s_max);
+        book.add(
+            None,
+            "supervision.feedback_age_s_max",
+            &value,
+            &format!("at least two periods, {} s", 2.0 * period_s),
+        );
     }
 }

@@ -1,0 +1,223 @@
+//! Which servo of which bus moves which joint.
+//!
+//! A wrong sign, gear or zero sends a joint the wrong way at full speed, so none of them has a default, and every
+//! angle that the joint may be told must be a position that the servo can be told.
+use crate::document::{Node, shown};
+use crate::reader::{Bounds, Table};
+use crate::robot::Robot;
+use crate::settings::{Bus, BusKind, Protocol, Servo};
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+/// Longest interface name of Linux (IFNAMSIZ without its closing zero).
+const INTERFACE_BYTES_MAX: usize = 15;
+/// CiA 301 lists 10 kbit/s to 1 Mbit/s.
+const BITRATE_BIT_S: [i64; 2] = [10_000, 1_000_000];
+const NODE_ID: [i64; 2] = [1, 127];
+const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
+const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
+const ZERO_RAD: Bounds = Bounds::within(-16.0 * TAU, 16.0 * TAU, "rad");
+const FEEDBACK_RAD: Bounds = Bounds::within(-1e6, 1e6, "rad");
+
+/// Reads the buses; a faulty one keeps its place as `None`, so that the indices of the others hold.
+pub(crate) fn read_buses(top: &mut Table<'_>) -> Vec<Option<Bus>> {
+    let tables = top.tables("bus");
+    if tables.is_empty() && !top.had("bus") {
+        top.fault("bus", "missing", "at least one table [[bus]]");
+    }
+    let (mut names, mut interfaces) = (BTreeSet::new(), BTreeSet::new());
+    let mut buses = Vec::new();
+    for mut table in tables {
+        let name = table.name("name");
+        let interface = read_interface(&mut table);
+        let kind = read_bus_kind(&mut table);
+        if let Some(name) = &name
+            && !names.insert(name.clone())
+        {
+            table.fault("name", &shown(name), "each bus's name once");
+        }
+        if let Some(interface) = &interface
+            && !interfaces.insert(interface.clone())
+        {
+            table.fault("interface", &shown(interface), "each interface on one bus only");
+        }
+        table.done();
+        let whole = name.zip(interface).zip(kind);
+        buses.push(whole.map(|((name, interface), kind)| Bus { name, interface, kind }));
+    }
+    buses
+}
+
+fn read_interface(table: &mut Table<'_>) -> Option<String> {
+    let expected = "the name of a network interface, 1 to 15 bytes, such as \"can0\"";
+    let interface = table.text("interface", expected)?;
+    let plain = |b: u8| b.is_ascii_graphic() && b != b'/' && b != b':';
+    let dots = interface == "." || interface == "..";
+    if interface.len() <= INTERFACE_BYTES_MAX && interface.bytes().all(plain) && !dots {
+        return Some(interface);
+    }
+    table.fault("interface", &shown(&interface), expected);
+    None
+}
+
+/// `virtual = true` or a bit rate: a bus whose load cannot be known is only taken where it has none.
+fn read_bus_kind(table: &mut Table<'_>) -> Option<BusKind> {
+    let expected = "virtual = true (vcan) or bitrate_bit_s, one of the two";
+    let is_virtual = if table.has("virtual") { Some(table.flag("virtual")?) } else { None };
+    let [low, high] = BITRATE_BIT_S;
+    let bitrate =
+        if table.has("bitrate_bit_s") { Some(table.integer("bitrate_bit_s", low, high)?) } else { None };
+    match (is_virtual.unwrap_or(false), bitrate) {
+        (true, None) => Some(BusKind::Virtual),
+        (false, Some(bitrate)) => Some(BusKind::Classic { bitrate_bit_s: u32::try_from(bitrate).ok()? }),
+        (true, Some(_)) => {
+            table.fault("bitrate_bit_s", "given beside virtual = true", expected);
+            None
+        }
+        (false, None) => {
+            table.fault("bitrate_bit_s", "missing", expected);
+            None
+        }
+    }
+}
+
+/// Reads the servos and puts them in the order of the joints; complete only when no fault was noted.
+pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[Option<Bus>]) -> Vec<Servo> {
+    let tables = top.tables("servo");
+    let mut bound_joints = BTreeSet::new();
+    let mut nodes = BTreeSet::new();
+    let mut busy = BTreeSet::new();
+    let mut servos = Vec::new();
+    for mut table in tables {
+        let joint = read_joint(&mut table, robot, &mut bound_joints);
+        let bus = read_bus(&mut table, buses);
+        let servo = read_servo(&mut table, joint, bus);
+        busy.extend(bus);
+        if let (Some(bus), Some(id)) = (bus, servo.as_ref().map(|servo| servo.node_id))
+            && !nodes.insert((bus, id))
+        {
+            table.fault("node_id", &id.to_string(), "each node id once on a bus: two servos would answer");
+        }
+        if let (Some(servo), Some(robot)) = (&servo, robot) {
+            check_counts(&table, servo, robot);
+        }
+        table.done();
+        servos.extend(servo);
+    }
+    if let Some(robot) = robot {
+        for (i, joint) in robot.joints.iter().enumerate().filter(|(i, _)| !bound_joints.contains(i)) {
+            top.fault(
+                "servo",
+                "missing",
+                &format!("one table [[servo]] with joint = {:?} (joint {i} of the robot)", joint.name),
+            );
+        }
+    }
+    for (i, bus) in buses.iter().enumerate().filter(|(i, _)| !busy.contains(i)) {
+        if let Some(bus) = bus {
+            top.book().add(
+                None,
+                &format!("bus[{i}].name"),
+                &shown(&bus.name),
+                "a bus with at least one servo",
+            );
+        }
+    }
+    servos.sort_by_key(|servo| servo.joint);
+    servos
+}
+
+fn read_joint(table: &mut Table<'_>, robot: Option<&Robot>, bound: &mut BTreeSet<usize>) -> Option<usize> {
+    let name = table.text("joint", "the name of a joint of the robot")?;
+    let robot = robot?;
+    let Some(index) = robot.joints.iter().position(|joint| joint.name == name) else {
+        let names: Vec<&str> = robot.joints.iter().map(|joint| joint.name.as_str()).collect();
+        table.fault(
+            "joint",
+            &shown(&name),
+            &format!("a joint of robot {}: {}", robot.name, names.join(", ")),
+        );
+        return None;
+    };
+    if !bound.insert(index) {
+        table.fault("joint", &shown(&name), "one servo a joint");
+        return None;
+    }
+    Some(index)
+}
+
+fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
+    let name = table.text("bus", "the name of a [[bus]]")?;
+    let index = buses.iter().position(|bus| bus.as_ref().is_some_and(|bus| bus.name == name));
+    // A bus that is itself at fault was reported where it stands.
+    if index.is_none() && buses.iter().all(Option::is_some) {
+        let names: Vec<&str> = buses.iter().flatten().map(|bus| bus.name.as_str()).collect();
+        table.fault("bus", &shown(&name), &format!("the name of a [[bus]]: {}", names.join(", ")));
+    }
+    index
+}
+
+fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -> Option<Servo> {
+    let node_id = table.integer("node_id", NODE_ID[0], NODE_ID[1]);
+    let protocol = read_protocol(table);
+    let sign = table.need("sign", SIGN_WORDS).and_then(|node| sign_of(table, &node));
+    let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
+    let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
+    let zero_offset_rad = table.number("zero_offset_rad", &ZERO_RAD);
+    let feedback_range_rad = table.interval("feedback_range_rad", &FEEDBACK_RAD);
+    let limp_is_safe = table.flag("limp_is_safe");
+    Some(Servo {
+        joint: joint?,
+        bus: bus?,
+        node_id: u8::try_from(node_id?).ok()?,
+        protocol: protocol?,
+        sign: sign?,
+        gear_ratio: gear_ratio?,
+        counts_per_rev: counts_per_rev?,
+        zero_offset_rad: zero_offset_rad?,
+        feedback_range_rad: feedback_range_rad?,
+        limp_is_safe: limp_is_safe?,
+    })
+}
+
+const SIGN_WORDS: &str = "1 or -1: the servo's direction against the link's";
+
+fn sign_of(table: &Table<'_>, node: &Node) -> Option<f64> {
+    // Compared as shown text: 1, 1.0, -1 and -1.0 are the only four ways to write it.
+    match node.to_string().as_str() {
+        "1" | "1.0" => Some(1.0),
+        "-1" | "-1.0" => Some(-1.0),
+        other => {
+            table.fault("sign", other, SIGN_WORDS);
+            None
+        }
+    }
+}
+
+fn read_protocol(table: &mut Table<'_>) -> Option<Protocol> {
+    let expected = "\"cia402\" (CANopen CiA 402, cyclic synchronous position)";
+    let name = table.text("protocol", expected)?;
+    if name == "cia402" {
+        return Some(Protocol::Cia402);
+    }
+    table.fault("protocol", &shown(&name), expected);
+    None
+}
+
+/// Both ends of the joint's range as a CiA 402 target position (0x607A), which is an i32.
+fn check_counts(table: &Table<'_>, servo: &Servo, robot: &Robot) {
+    let Some(joint) = robot.joints.get(servo.joint) else { return };
+    let counts_per_rad = servo.sign * servo.gear_ratio * servo.counts_per_rev / TAU;
+    for position_rad in joint.limits.position_rad {
+        let counts = (position_rad - servo.zero_offset_rad) * counts_per_rad;
+        if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts.round()) {
+            let value = format!("{:?}", servo.counts_per_rev);
+            let expected = format!(
+                "counts that fit 32 bits: joint {} at {position_rad} rad would be {counts:.0} counts",
+                joint.name
+            );
+            table.fault("counts_per_rev", &value, &expected);
+            return;
+        }
+    }
+}
