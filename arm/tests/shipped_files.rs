@@ -26,7 +26,10 @@ fn shipped_file_of_every_kind_loads() {
         Settings::load(file).unwrap_or_else(|faults| panic!("{faults}"));
     }
     // An empty folder would make this pass without a look at anything.
-    assert!(!robots.is_empty() && scenes.len() >= 3 && !settings.is_empty(), "{robots:?} {scenes:?} {settings:?}");
+    assert!(
+        !robots.is_empty() && scenes.len() >= 3 && !settings.is_empty(),
+        "{robots:?} {scenes:?} {settings:?}"
+    );
 }
 
 #[test]
@@ -36,7 +39,9 @@ fn ur5_contact_rule_lets_neighbours_and_short_wrist_links_touch() {
     expected.extend([(3, 5), (4, 6)]);
     expected.sort_unstable();
     assert_eq!(robot.allowed_by_rule, expected);
-    assert!(robot.may_touch(5, 3) && robot.may_touch(3, 5) && !robot.may_touch(3, 6) && !robot.may_touch(6, 3));
+    assert!(
+        robot.may_touch(5, 3) && robot.may_touch(3, 5) && !robot.may_touch(3, 6) && !robot.may_touch(6, 3)
+    );
 }
 
 #[test]
