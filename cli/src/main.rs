@@ -1,2 +1,110 @@
-//! Placeholder.
-fn main() {}
+//! The `taustream` command: plans, runs and watches the motion of CAN-connected arms.
+#![forbid(unsafe_code)]
+
+mod angles;
+mod args;
+mod arm;
+mod failure;
+mod interrupt;
+mod live;
+mod offline;
+mod output;
+mod words;
+
+use args::{Action, Cli};
+use arm::ArmName;
+use clap::{CommandFactory, Parser};
+use failure::Failure;
+use output::{Form, note};
+use serde::Serialize;
+use std::env;
+use std::fmt;
+use std::path::Path;
+use std::process::ExitCode;
+use taustream_messages::Command;
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let form = if cli.json { Form::Json } else { Form::Text };
+    match run(form, &cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => report(form, &failure),
+    }
+}
+
+fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
+    let settings = cli.settings.as_deref();
+    match &cli.action {
+        Action::Plan(args) => offline::plan::run(form, args),
+        Action::Sample(args) => offline::sample::run(form, args),
+        Action::Cost(args) => offline::cost::run(form, args),
+        Action::Verify(args) => offline::verify::run(form, args),
+        Action::Check(args) => offline::check::run(form, args),
+        Action::Replan(args) => interrupt::watch().and_then(|()| live::replan::run(form, settings, args)),
+        Action::Run(args) => interrupt::watch().and_then(|()| live::run::run(form, settings, args)),
+        Action::Enable(args) => command(form, settings, Command::Enable, args.wait_s),
+        Action::Disable(args) => command(form, settings, Command::Disable, args.wait_s),
+        Action::Pause(args) => command(form, settings, Command::Pause, args.wait_s),
+        Action::Resume(args) => command(form, settings, Command::Resume, args.wait_s),
+        Action::Speed(args) => command(form, settings, Command::Speed { percent: args.percent }, 0.0),
+        Action::Stop(args) if args.fast => command(form, settings, Command::FastStop, args.waiting.wait_s),
+        Action::Stop(args) => command(form, settings, Command::Stop, args.waiting.wait_s),
+        Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
+        Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
+        Action::Status => live::status::run(form, &ArmName::read(settings)?),
+        Action::Completions { shell } => completions(form, *shell),
+    }
+}
+
+fn command(form: Form, settings: Option<&Path>, command: Command, wait_s: f64) -> Result<(), Failure> {
+    interrupt::watch()?;
+    live::command::run(form, &ArmName::read(settings)?, command, wait_s)
+}
+
+/// A completion script.
+#[derive(Serialize)]
+struct Completions {
+    shell: String,
+    script: String,
+}
+
+impl fmt::Display for Completions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.script)
+    }
+}
+
+fn completions(form: Form, shell: clap_complete::Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "taustream", &mut script);
+    let script = String::from_utf8_lossy(&script).into_owned();
+    form.print(&Completions { shell: shell.to_string(), script })
+}
+
+/// Says why on stderr, in the form that was asked for.
+fn report(form: Form, failure: &Failure) -> ExitCode {
+    if !matches!(failure, Failure::BrokenPipe) {
+        match form {
+            Form::Text => note(format_args!("taustream: {failure}")),
+            Form::Json => note(failure.to_json()),
+        }
+    }
+    ExitCode::from(failure.exit_code())
+}
+
+/// Words that clap does not take. Help and version come this way too, and are no failure.
+fn usage(error: &clap::Error) -> ExitCode {
+    let wants_json = env::args_os().any(|word| word == "--json");
+    if error.use_stderr() && wants_json {
+        // clap's first paragraph is the reason; what follows is the usage, which is of no use to a program.
+        let text = error.to_string();
+        let reason = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").trim();
+        return report(Form::Json, &Failure::Usage(reason.to_owned()));
+    }
+    // A closed stdout or stderr leaves nobody to tell.
+    let _closed = error.print();
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+}

@@ -1,0 +1,158 @@
+//! Lists of joint angles on the command line: `"0,-1.57,1.57,0,0,0"`, in rad.
+use crate::failure::Failure;
+use std::f64::consts::{PI, TAU};
+use std::str::FromStr;
+use taustream_arm::Robot;
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// One to eight finite angles, base to tip.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Angles(Vec<f64>);
+
+/// Why text is no list of angles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(crate) enum AnglesError {
+    /// A word that is no number.
+    #[error(
+        "value {position} is `{word}`, which is no number; write angles in rad, separated by commas: \"0,-1.57,1.57\""
+    )]
+    Word {
+        /// One-based place in the list.
+        position: usize,
+        /// What stands there.
+        word: String,
+    },
+    /// NaN or infinite.
+    #[error("value {position} is {value}; an angle must be finite (rad)")]
+    NotFinite {
+        /// One-based place in the list.
+        position: usize,
+        /// The value.
+        value: f64,
+    },
+    /// More than an arm can have.
+    #[error("{count} values; an arm has 1 to {MAX_JOINTS} joints")]
+    Count {
+        /// How many were given.
+        count: usize,
+    },
+}
+
+impl FromStr for Angles {
+    type Err = AnglesError;
+
+    fn from_str(text: &str) -> Result<Self, AnglesError> {
+        let mut values = Vec::with_capacity(MAX_JOINTS);
+        for (i, word) in text.split(',').enumerate() {
+            let (position, word) = (i + 1, word.trim());
+            let value: f64 =
+                word.parse().map_err(|_| AnglesError::Word { position, word: word.to_owned() })?;
+            if !value.is_finite() {
+                return Err(AnglesError::NotFinite { position, value });
+            }
+            values.push(value);
+        }
+        match values.len() {
+            1..=MAX_JOINTS => Ok(Self(values)),
+            count => Err(AnglesError::Count { count }),
+        }
+    }
+}
+
+impl From<Vec<f64>> for Angles {
+    fn from(values: Vec<f64>) -> Self {
+        Self(values)
+    }
+}
+
+impl Angles {
+    /// The angles as a pose of `robot`; `option` is the word that gave them.
+    ///
+    /// # Errors
+    /// When there is not one value a joint.
+    pub(crate) fn pose_of(&self, robot: &Robot, option: &str) -> Result<JointArray, Failure> {
+        let (got, joints) = (self.0.len(), robot.joints.len());
+        if got != joints {
+            let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+            return Err(Failure::Usage(format!(
+                "{option} has {got} values, but robot `{}` has {joints} joints; give one angle (rad) for each of: {}",
+                robot.name,
+                names.join(", ")
+            )));
+        }
+        let mut pose = [0.0; MAX_JOINTS];
+        for (slot, value) in pose.iter_mut().zip(&self.0) {
+            *slot = *value;
+        }
+        Ok(pose)
+    }
+
+    /// A second sentence for values that look like degrees: beyond any turn, or beyond the joint's range while
+    /// the same number in degrees lies inside it. It never changes what is done with them.
+    pub(crate) fn degrees_hint(&self, robot: &Robot) -> Option<String> {
+        let suspicious = self.0.iter().zip(&robot.joints).find(|(value, joint)| {
+            let [low, high] = joint.limits.position_rad;
+            let outside = **value < low || **value > high;
+            let as_degrees = **value * PI / 180.0;
+            outside && value.abs() > TAU && (low..=high).contains(&as_degrees)
+        })?;
+        let degrees = suspicious.0;
+        Some(format!(
+            "angles are in rad, and {degrees} looks like degrees: {degrees} deg = {:.4} rad",
+            degrees * PI / 180.0
+        ))
+    }
+}
+
+/// Times of `sample --at`: any number of finite seconds.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Times(pub(crate) Vec<f64>);
+
+impl FromStr for Times {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |(i, word): (usize, &str)| match word.trim().parse::<f64>() {
+            Ok(t_s) if t_s.is_finite() => Ok(t_s),
+            Ok(t_s) => Err(format!("time {} is {t_s}; it must be finite (s)", i + 1)),
+            Err(_) => Err(format!("time {} is `{}`, which is no number of seconds", i + 1, word.trim())),
+        };
+        text.split(',').enumerate().map(parse).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_parse_one_value_a_joint() {
+        assert_eq!("0, -1.5,2e-3".parse::<Angles>(), Ok(Angles(vec![0.0, -1.5, 0.002])));
+    }
+
+    #[test]
+    fn angles_refuse_what_is_no_finite_number_and_say_which() {
+        let cases = [
+            ("", "value 1 is ``"),
+            ("0,,0", "value 2 is ``"),
+            ("0,x", "value 2 is `x`"),
+            ("0;1", "value 1 is `0;1`"),
+            ("1.0,NaN", "value 2 is NaN"),
+            ("inf", "value 1 is inf"),
+            ("0,1e999", "value 2 is inf"),
+            ("90deg", "value 1 is `90deg`"),
+            ("0,0,0,0,0,0,0,0,0", "9 values"),
+        ];
+        for (text, expected) in cases {
+            let error = text.parse::<Angles>().unwrap_err().to_string();
+            assert!(error.contains(expected), "`{text}`: {error}");
+        }
+    }
+
+    #[test]
+    fn times_refuse_what_is_not_finite() {
+        assert_eq!("0,0.5".parse::<Times>(), Ok(Times(vec![0.0, 0.5])));
+        assert!("0,nan".parse::<Times>().unwrap_err().contains("time 2"));
+        assert!("".parse::<Times>().unwrap_err().contains("time 1"));
+    }
+}

@@ -1,0 +1,155 @@
+//! Words of the commands that talk to the running streamer and planner.
+use super::offline::planner_kind;
+use crate::angles::Angles;
+use clap::Args;
+use std::path::PathBuf;
+use taustream_drivers::link::LinkChoice;
+use taustream_planner::PlannerKind;
+
+/// A command to the streamer that has no words of its own.
+#[derive(Args, Debug)]
+pub(crate) struct CommandArgs {
+    /// How long to wait until the arm has done it, s; 0 returns as soon as the streamer has agreed.
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = waiting_s)]
+    pub(crate) wait_s: f64,
+}
+
+/// `taustream speed`
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  taustream speed 25      a quarter of the planned speed, on the same path\n  taustream speed 100     as planned"
+)]
+pub(crate) struct SpeedArgs {
+    /// Override, percent of the planned speed, 0 to 100.
+    #[arg(value_name = "PCT", allow_hyphen_values = true, value_parser = percent)]
+    pub(crate) percent: f64,
+}
+
+/// `taustream stop`
+#[derive(Args, Debug)]
+pub(crate) struct StopArgs {
+    /// As fast as the stop limits allow; ends in a fault that `clear-fault` forgets.
+    #[arg(long)]
+    pub(crate) fast: bool,
+    /// Waiting.
+    #[command(flatten)]
+    pub(crate) waiting: CommandArgs,
+}
+
+const REPLAN_HELP: &str = "\
+Examples:
+  taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait
+  taustream replan --goal \"..\" --after-current --deadline-ms 5000
+
+The planner starts from the pose that the streamer commands, verifies the whole motion and sends it; the streamer's
+receipt says whether, and from which cycle, it runs. Exit code 0 means: accepted (with --wait: executed).";
+
+/// `taustream replan`
+#[derive(Args, Debug)]
+#[command(after_help = REPLAN_HELP)]
+pub(crate) struct ReplanArgs {
+    /// Pose to go to, rad, one value a joint.
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
+    pub(crate) goal: Angles,
+    /// Take over as soon as the plan is there (the default).
+    #[arg(long, conflicts_with = "after_current")]
+    pub(crate) at_once: bool,
+    /// Plan from the end of the running motion, and start when it has ended.
+    #[arg(long)]
+    pub(crate) after_current: bool,
+    /// How long planning may take, ms.
+    #[arg(long, value_name = "MS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    pub(crate) deadline_ms: u32,
+    /// Seed of every random choice.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Which planner.
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
+    pub(crate) planner: PlannerKind,
+    /// Return only when the motion has ended.
+    #[arg(long)]
+    pub(crate) wait: bool,
+}
+
+const RUN_HELP: &str = "\
+Examples:
+  taustream run move.json --wait
+
+The file must hold the digest of the robot that the streamer drives. The motion is verified against the robot and the
+scene of the settings first, and the arm must stand at its base pose: `taustream replan --goal BASE` takes it there.";
+
+/// `taustream run`
+#[derive(Args, Debug)]
+#[command(after_help = RUN_HELP)]
+pub(crate) struct RunArgs {
+    /// Trajectory file.
+    #[arg(value_name = "FILE")]
+    pub(crate) trajectory: PathBuf,
+    /// Return only when the motion has ended.
+    #[arg(long)]
+    pub(crate) wait: bool,
+}
+
+const DEMO_HELP: &str = "\
+Examples:
+  taustream demo --output /tmp/demo
+  taustream demo --config config/demo.toml --link local --output out
+
+Starts taustream-servosim, taustream-streamer and taustream-planner (from beside this program), enables the simulated
+arm, goes to every goal of the demo file, disables, and writes SVG plots. Nothing outside the output directory is
+touched. Ctrl-C stops the arm first.";
+
+/// `taustream demo`
+#[derive(Args, Debug)]
+#[command(after_help = DEMO_HELP)]
+pub(crate) struct DemoArgs {
+    /// Demo file: `settings`, `start_rad`, `goals_rad`.
+    #[arg(long, value_name = "FILE", default_value = "config/demo.toml")]
+    pub(crate) config: PathBuf,
+    /// Directory for plots, logs and the cycle log; made when it is missing.
+    #[arg(long, value_name = "DIR", default_value = "demo-output")]
+    pub(crate) output: PathBuf,
+    /// What carries the frames.
+    #[arg(long, value_name = "LINK", default_value = "auto")]
+    pub(crate) link: LinkChoice,
+    /// Give up after this long, s.
+    #[arg(long, value_name = "S", default_value_t = 110.0, value_parser = waiting_s)]
+    pub(crate) limit_s: f64,
+}
+
+/// A time to wait: finite, not negative, at most a day.
+fn waiting_s(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
+        _ => Err("expected seconds from 0 to 86400".to_owned()),
+    }
+}
+
+/// A speed override.
+fn percent(text: &str) -> Result<f64, String> {
+    match text.strip_suffix('%').unwrap_or(text).parse::<f64>() {
+        Ok(percent) if (0.0..=100.0).contains(&percent) => Ok(percent),
+        _ => Err("expected percent of the planned speed, from 0 to 100".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_outside_0_to_100_is_refused() {
+        for text in ["-1", "100.1", "nan", "inf", "", "fast", "50%%"] {
+            assert!(percent(text).is_err(), "{text}");
+        }
+        assert_eq!(percent("50%"), Ok(50.0));
+        assert_eq!(percent("0"), Ok(0.0));
+    }
+
+    #[test]
+    fn waiting_time_must_be_finite_and_not_negative() {
+        for text in ["-1", "nan", "inf", "86401", "1s"] {
+            assert!(waiting_s(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! The words of the command line. Units stand in every name; every default stands in the help.
+mod live;
+mod offline;
+
+pub(crate) use live::{CommandArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs};
+pub(crate) use offline::{CheckArgs, CostArgs, MotionArgs, PlanArgs, SampleArgs};
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  taustream check vcan6                                   is the configuration sound?
+  taustream plan --robot ur5 --scene pillars \\
+      --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
+  taustream verify --robot ur5 --scene pillars --trajectory move.json
+  taustream sample move.json --rate-hz 1000 > move.csv
+  taustream enable && taustream run move.json --wait      with streamer and planner running
+  taustream replan --goal \"0,-1.57,1.57,-1.57,-1.57,0\" --wait
+  taustream status --json | jq .phase
+
+Units: angles are rad, times s, lengths m. Robots, scenes and settings are given by path, or by the name of a
+shipped file (`ur5`, `pillars`, `vcan6`).
+
+Exit codes: 0 done; 1 refused or failed, with the reason on stderr; 2 bad usage or bad file; 130 interrupted.
+With --json, errors are JSON on stderr too: {\"error\":{\"kind\":\"..\",\"message\":\"..\"}}.
+
+taustream is not a safety function: its stops are best effort by software over a bus. A machine needs its own
+hard-wired emergency stop and safe torque off.";
+
+/// Plans, runs and watches the motion of CAN-connected robot arms.
+#[derive(Debug, Parser)]
+#[command(name = "taustream", version, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(max_term_width = 110)]
+pub(crate) struct Cli {
+    /// Answer with one JSON object on stdout, and with errors as JSON on stderr.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+
+    /// Settings of the arm to talk to: a path, or the name of shipped settings.
+    ///
+    /// Without it: $TAUSTREAM_SETTINGS, else /etc/taustream/settings.toml if that exists, else the shipped
+    /// `vcan6`. `plan`, `sample`, `cost`, `verify` and `check` do not use it.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) settings: Option<PathBuf>,
+
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) action: Action,
+}
+
+/// What the user wants.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Action {
+    /// Plan a collision-free motion offline and write it down.
+    Plan(PlanArgs),
+    /// Print a trajectory file as a table of positions, velocities, accelerations and jerks.
+    Sample(SampleArgs),
+    /// Rate a trajectory by the cost of the IBFOA paper, in its own model.
+    Cost(CostArgs),
+    /// Prove that a trajectory keeps limits and clearance, or name the first violation.
+    Verify(MotionArgs),
+    /// Check a configuration: robot, scene, settings or trajectory file; every fault at once.
+    Check(CheckArgs),
+    /// Ask the running planner for a motion to a new goal; prints the streamer's receipt.
+    Replan(ReplanArgs),
+    /// Execute a saved trajectory from its base pose, after verification.
+    Run(RunArgs),
+    /// Energise the drives and hold the pose.
+    Enable(CommandArgs),
+    /// De-energise the drives; only at rest.
+    Disable(CommandArgs),
+    /// Slow down to rest on the path and keep the motion.
+    Pause(CommandArgs),
+    /// Go on with a paused motion.
+    Resume(CommandArgs),
+    /// Set the speed override, 0 to 100 percent.
+    Speed(SpeedArgs),
+    /// Slow down to rest on the path, drop the motion and hold.
+    Stop(StopArgs),
+    /// De-energise the drives at once. THE ARM MAY FALL.
+    TorqueOff(CommandArgs),
+    /// Forget a fault whose cause is gone; `enable` makes the arm ready again.
+    ClearFault(CommandArgs),
+    /// Show what the streamer does: phase, joints, timing, bus.
+    Status,
+    /// Print a completion script for a shell: `taustream completions bash > /etc/bash_completion.d/taustream`.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn command_line_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,194 @@
+//! Words of the commands that need no running process.
+use crate::angles::{Angles, Times};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+use std::str::FromStr;
+use taustream_drivers::link::LinkChoice;
+use taustream_planner::PlannerKind;
+
+const PLAN_HELP: &str = "\
+Examples:
+  taustream plan --robot ur5 --scene pillars \\
+      --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
+  taustream plan ... --planner ibfoa --seed 7 --deadline-ms 5000 --json
+  taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
+
+The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
+cut the search short; the summary says so then.";
+
+/// `taustream plan`
+#[derive(Args, Debug)]
+#[command(after_help = PLAN_HELP)]
+pub(crate) struct PlanArgs {
+    /// Robot: a path, or the name of a shipped robot.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: PathBuf,
+    /// Scene: a path, or the name of a shipped scene.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: PathBuf,
+    /// Pose to start from, rad, one value a joint: "0,-1.57,1.57,-1.57,-1.57,0".
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
+    pub(crate) start: Angles,
+    /// Pose to go to, rad, one value a joint.
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
+    pub(crate) goal: Angles,
+    /// Which planner.
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
+    pub(crate) planner: PlannerKind,
+    /// Seed of every random choice.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How long planning may take, ms.
+    #[arg(long, value_name = "MS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    pub(crate) deadline_ms: u32,
+    /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+const SAMPLE_HELP: &str = "\
+Examples:
+  taustream sample move.json > move.csv
+  taustream sample move.json --rate-hz 50 | head
+  taustream sample move.json --at 0,0.5,1.25 --json
+
+The table begins with t_s, then q1_rad.. (position), v1_rad_s.. (velocity), a1_rad_s2.. (acceleration) and
+j1_rad_s3.. (jerk). Samples lie on the grid k / rate from 0 on; the end of the motion is always the last one.
+Numbers are written so that reading them gives the same bits.";
+
+/// `taustream sample`
+#[derive(Args, Debug)]
+#[command(after_help = SAMPLE_HELP)]
+pub(crate) struct SampleArgs {
+    /// Trajectory file.
+    #[arg(value_name = "FILE")]
+    pub(crate) trajectory: PathBuf,
+    /// Samples a second, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, conflicts_with = "at")]
+    pub(crate) rate_hz: f64,
+    /// Sample at these times instead, s. Before the start and after the end the arm rests.
+    #[arg(long, value_name = "S,..", allow_hyphen_values = true)]
+    pub(crate) at: Option<Times>,
+}
+
+const COST_HELP: &str = "\
+Examples:
+  taustream cost --robot ur5 --scene spheres.toml --trajectory move.json
+  taustream cost ... --weights 7,300,1.2e7 --expansion-m 0.1 --json
+
+The paper's model: links are bare segments between frame origins, obstacles are spheres only, each stroke is
+sampled at equal time steps plus the end, strokes must not overlap.
+cost = w1 path_length_m + w2 joint_travel_rad + w3 penalty (the penalty counts only in collision).";
+
+/// `taustream cost`
+#[derive(Args, Debug)]
+#[command(after_help = COST_HELP)]
+pub(crate) struct CostArgs {
+    /// What to rate.
+    #[command(flatten)]
+    pub(crate) motion: MotionArgs,
+    /// Equal time steps a stroke.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = waypoints)]
+    pub(crate) waypoints_per_segment: usize,
+    /// How much the paper's obstacles grow, m.
+    #[arg(long, value_name = "M", default_value_t = 0.1, allow_hyphen_values = true)]
+    pub(crate) expansion_m: f64,
+    /// Weights of path length, joint travel and penalty.
+    #[arg(long, value_name = "W1,W2,W3", default_value = "7,300,1.2e7", allow_hyphen_values = true)]
+    pub(crate) weights: Weights,
+}
+
+/// Robot, scene and trajectory; `taustream verify`
+#[derive(Args, Debug)]
+pub(crate) struct MotionArgs {
+    /// Robot: a path, or the name of a shipped robot.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: PathBuf,
+    /// Scene: a path, or the name of a shipped scene.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: PathBuf,
+    /// Trajectory file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trajectory: PathBuf,
+}
+
+/// `taustream check`
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  taustream check vcan6\n  taustream check config/robots/ur5.toml --json")]
+pub(crate) struct CheckArgs {
+    /// Settings, robot, scene or trajectory file: a path, or the name of a shipped file.
+    #[arg(value_name = "CONFIG")]
+    pub(crate) config: PathBuf,
+}
+
+/// `taustream bench`
+#[derive(Args, Debug)]
+pub(crate) struct BenchArgs {
+    /// Which measurement.
+    #[command(subcommand)]
+    pub(crate) name: BenchName,
+}
+
+/// The measurements.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchName {
+    /// Wake-up lateness and time of the streamer's cycle, beside bare loops in alternating slices of one run.
+    Cycle {
+        /// How long to measure, s.
+        #[arg(long, value_name = "S", default_value_t = 20.0)]
+        seconds: f64,
+        /// Alternating slices a loop.
+        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+        slices: u32,
+        /// What carries the frames.
+        #[arg(long, value_name = "LINK", default_value = "auto")]
+        link: LinkChoice,
+    },
+}
+
+/// The planners by name; clap lists them in the help and suggests the nearest.
+pub(super) fn planner_kind() -> impl TypedValueParser<Value = PlannerKind> {
+    PossibleValuesParser::new(PlannerKind::ALL.map(PlannerKind::name))
+        .map(|name| PlannerKind::from_name(&name).unwrap_or_default())
+}
+
+fn waypoints(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(steps) if (1..=100_000).contains(&steps) => Ok(steps),
+        _ => Err("expected a whole number from 1 to 100000".to_owned()),
+    }
+}
+
+/// The three weights of the cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Weights(pub(crate) [f64; 3]);
+
+impl FromStr for Weights {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |word: &str| match word.trim().parse::<f64>() {
+            Ok(weight) if weight.is_finite() && weight >= 0.0 => Ok(weight),
+            _ => Err(format!("`{}` is no weight; expected a finite number of 0 or more", word.trim())),
+        };
+        let weights = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
+        let count = weights.len();
+        let three =
+            weights.try_into().map_err(|_| format!("{count} weights; expected 3: \"7,300,1.2e7\""))?;
+        Ok(Self(three))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_three_finite_numbers() {
+        assert_eq!("7,300,1.2e7".parse::<Weights>(), Ok(Weights([7.0, 300.0, 1.2e7])));
+        for text in ["", "1,2", "1,2,3,4", "1,2,nan", "1,-2,3", "a,b,c"] {
+            assert!(text.parse::<Weights>().is_err(), "{text}");
+        }
+    }
+}

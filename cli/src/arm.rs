@@ -1,0 +1,170 @@
+//! Which arm a command talks to, and which files it reads.
+use crate::failure::Failure;
+use crate::output::note;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+use taustream_arm::{Kind, Robot, Scene, Settings, TrajectoryFile};
+use taustream_messages::service::is_arm_name;
+
+/// Where an installed controller keeps its settings.
+const INSTALLED: &str = "/etc/taustream/settings.toml";
+/// The shipped settings that serve when nothing else is named.
+const SHIPPED: &str = "vcan6";
+
+/// Name of an arm and of its joints: all that commands and status need.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ArmName {
+    /// Names its services.
+    pub(crate) name: String,
+    /// Names of the joints, base to tip; empty when the robot file could not be read.
+    pub(crate) joints: Vec<String>,
+}
+
+impl ArmName {
+    /// A joint in words, by its zero-based index.
+    pub(crate) fn joint(&self, joint: usize) -> String {
+        match self.joints.get(joint) {
+            Some(name) => format!("joint {} `{name}`", joint + 1),
+            None => format!("joint {}", joint + 1),
+        }
+    }
+
+    /// The arm of settings that were read as a whole.
+    pub(crate) fn of(settings: &Settings) -> Self {
+        let joints = settings.robot.joints.iter().map(|j| j.name.clone()).collect();
+        Self { name: settings.name.clone(), joints }
+    }
+
+    /// The arm that settings name. A fault elsewhere in them must not keep anybody from stopping the arm: the name
+    /// is all that counts then, and the fault is only mentioned.
+    pub(crate) fn read(given: Option<&Path>) -> Result<Self, Failure> {
+        let path = settings_path(given)?;
+        match Settings::load(&path) {
+            Ok(settings) => Ok(Self::of(&settings)),
+            Err(faults) => {
+                let Some(name) = name_alone(&path) else { return Err(faults.into()) };
+                note(format_args!(
+                    "note: {} has faults (`taustream check` shows them); using only its name `{name}`",
+                    path.display()
+                ));
+                Ok(Self { name, joints: Vec::new() })
+            }
+        }
+    }
+}
+
+/// The `name` of a settings file whatever else stands in it.
+fn name_alone(path: &Path) -> Option<String> {
+    let table: toml::Table = fs::read_to_string(path).ok()?.parse().ok()?;
+    let name = table.get("name")?.as_str()?;
+    is_arm_name(name).then(|| name.to_owned())
+}
+
+/// The settings file: as given, else by environment, else as installed, else as shipped.
+pub(crate) fn settings_path(given: Option<&Path>) -> Result<PathBuf, Failure> {
+    if let Some(given) = given {
+        return find(Kind::Settings, given);
+    }
+    if let Some(named) = env::var_os("TAUSTREAM_SETTINGS").filter(|v| !v.is_empty()) {
+        return find(Kind::Settings, Path::new(&named));
+    }
+    let installed = Path::new(INSTALLED);
+    if installed.exists() {
+        return Ok(installed.to_owned());
+    }
+    find(Kind::Settings, Path::new(SHIPPED))
+}
+
+/// Settings as a whole, for commands that need robot and scene too.
+pub(crate) fn settings(given: Option<&Path>) -> Result<Settings, Failure> {
+    Ok(Settings::load(&settings_path(given)?)?)
+}
+
+/// A robot by path or shipped name.
+pub(crate) fn robot(given: &Path) -> Result<Robot, Failure> {
+    Ok(Robot::load(&find(Kind::Robot, given)?)?)
+}
+
+/// A scene by path or shipped name.
+pub(crate) fn scene(given: &Path) -> Result<Scene, Failure> {
+    Ok(Scene::load(&find(Kind::Scene, given)?)?)
+}
+
+/// A trajectory file that fits a robot: same number of joints, and the same digest where the file has one.
+pub(crate) fn trajectory_for(path: &Path, robot: &Robot) -> Result<TrajectoryFile, Failure> {
+    let file = TrajectoryFile::load(path)?;
+    let (got, joints) = (file.trajectory.joints(), robot.joints.len());
+    if got != joints {
+        return Err(Failure::unfit(
+            path,
+            format!(
+                "made for {got} joints, but robot `{}` has {joints}; name the robot it was made for",
+                robot.name
+            ),
+        ));
+    }
+    match &file.digest {
+        Some(digest) if !digest.eq_ignore_ascii_case(&robot.digest_hex()) => Err(Failure::unfit(
+            path,
+            format!(
+                "made for another description of robot `{}` (digest {}.., {} has {}..); plan again with this robot file",
+                file.robot,
+                digest.get(..12).unwrap_or(digest),
+                robot.file.display(),
+                robot.digest_hex().get(..12).unwrap_or_default()
+            ),
+        )),
+        _ => Ok(file),
+    }
+}
+
+fn find(kind: Kind, given: &Path) -> Result<PathBuf, Failure> {
+    // Names of shipped files are text; a path that is none can only be opened as it stands.
+    match given.to_str() {
+        Some(text) => Ok(taustream_arm::find(kind, text)?),
+        None => Ok(given.to_owned()),
+    }
+}
+
+/// A file of whatever kind.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum AnyFile {
+    /// Settings of an arm.
+    Settings(PathBuf),
+    /// A robot.
+    Robot(PathBuf),
+    /// A scene.
+    Scene(PathBuf),
+    /// A trajectory.
+    Trajectory(PathBuf),
+}
+
+/// Finds a file by path or shipped name, and tells its kind by what stands in it.
+pub(crate) fn find_any(given: &Path) -> Result<AnyFile, Failure> {
+    if given.exists() {
+        return Ok(kind_of(given));
+    }
+    let robot = || find(Kind::Robot, given).map(AnyFile::Robot);
+    let scene = || find(Kind::Scene, given).map(AnyFile::Scene);
+    let settings = find(Kind::Settings, given).map(AnyFile::Settings);
+    // When there is nothing at all, the first search says where it looked.
+    settings.or_else(|nothing| robot().or_else(|_| scene()).map_err(|_| nothing))
+}
+
+/// Trajectories are JSON; settings name a robot, robots have joints, and everything else is a scene. A file that
+/// cannot be parsed is read as settings, whose reader then says what is wrong with it.
+fn kind_of(path: &Path) -> AnyFile {
+    let owned = path.to_owned();
+    if path.extension().is_some_and(|e| e == "json") {
+        return AnyFile::Trajectory(owned);
+    }
+    let table = fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    match table {
+        Some(t) if t.contains_key("joint") => AnyFile::Robot(owned),
+        Some(t) if ["robot", "bus", "servo", "cycle"].iter().any(|k| t.contains_key(*k)) => {
+            AnyFile::Settings(owned)
+        }
+        Some(_) => AnyFile::Scene(owned),
+        None => AnyFile::Settings(owned),
+    }
+}

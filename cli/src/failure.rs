@@ -1,0 +1,153 @@
+//! Why a command did not do its work, and what the process says and returns then.
+//!
+//! Exit codes (design: command-line contract): 1 refused or failed, 2 bad usage or bad file; 130 after Ctrl-C,
+//! as shells have it. The reason goes to stderr, as one sentence or, with `--json`, as one JSON object.
+use serde_json::{Value, json};
+use std::io;
+use std::path::{Path, PathBuf};
+use taustream_arm::Faults;
+use taustream_messages::service::ServiceError;
+
+/// Every way in which a command ends without having done its work.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    /// The words on the command line do not fit together, or do not fit the files that they name.
+    #[error("{0}")]
+    Usage(String),
+    /// A file has faults; each is one line.
+    #[error("{0}")]
+    File(#[from] Faults),
+    /// A file is sound in itself but is no use here.
+    #[error("{}: {why}", path.display())]
+    Unfit {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it for this command, and what to do.
+        why: String,
+    },
+    /// A file or a pipe could not be written.
+    #[error("{what} cannot be written: {error}")]
+    Write {
+        /// The file, or "standard output".
+        what: String,
+        /// The operating system's reason.
+        error: io::Error,
+    },
+    /// The reader of our output has gone; nobody is left to tell.
+    #[error("the reader of the output has gone")]
+    BrokenPipe,
+    /// Shared memory cannot be used, or nobody serves.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// A process took the request and did not answer.
+    #[error(
+        "{who} of arm `{arm}` did not answer within {waited_s:.1} s; look at its log, and restart it if it hangs"
+    )]
+    NoAnswer {
+        /// `taustream-streamer` or `taustream-planner`.
+        who: &'static str,
+        /// The arm's name.
+        arm: String,
+        /// How long we waited.
+        waited_s: f64,
+    },
+    /// Planner or streamer said no, or a verification found a violation. Nothing moved because of us.
+    #[error("{0}")]
+    Refused(String),
+    /// It was begun and did not come to its end.
+    #[error("{0}")]
+    Failed(String),
+    /// Ctrl-C.
+    #[error("interrupted: {0}")]
+    Interrupted(String),
+}
+
+impl Failure {
+    /// A failure to write `what`; a reader that has gone is told apart because it is no error of a filter.
+    pub(crate) fn writing(what: impl Into<String>, error: io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            Self::BrokenPipe
+        } else {
+            Self::Write { what: what.into(), error }
+        }
+    }
+
+    /// A file that is sound in itself and is no use here.
+    pub(crate) fn unfit(path: &Path, why: impl Into<String>) -> Self {
+        Self::Unfit { path: path.to_owned(), why: why.into() }
+    }
+
+    /// The exit code of the process.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::BrokenPipe => 0,
+            Self::Usage(_) | Self::File(_) | Self::Unfit { .. } => 2,
+            Self::Write { .. }
+            | Self::Service(_)
+            | Self::NoAnswer { .. }
+            | Self::Refused(_)
+            | Self::Failed(_) => 1,
+            Self::Interrupted(_) => 130,
+        }
+    }
+
+    /// The word that scripts tell failures apart by.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self {
+            Self::Usage(_) => "usage",
+            Self::File(_) | Self::Unfit { .. } => "file",
+            Self::Write { .. } | Self::BrokenPipe => "write",
+            Self::Service(ServiceError::NotRunning { .. }) => "not-running",
+            Self::Service(_) => "service",
+            Self::NoAnswer { .. } => "no-answer",
+            Self::Refused(_) => "refused",
+            Self::Failed(_) => "failed",
+            Self::Interrupted(_) => "interrupted",
+        }
+    }
+
+    /// The JSON object that `--json` prints on stderr. Faults of files come one by one as well.
+    pub(crate) fn to_json(&self) -> Value {
+        let mut error = json!({ "kind": self.kind(), "message": self.to_string() });
+        if let Self::File(Faults(faults)) = self {
+            error["faults"] = faults
+                .iter()
+                .map(|f| {
+                    json!({ "file": f.file.display().to_string(), "line": f.line, "key": f.key, "value": f.value,
+                            "expected": f.expected })
+                })
+                .collect();
+        }
+        json!({ "error": error })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taustream_arm::Fault;
+
+    fn fault(key: &str) -> Fault {
+        Fault::new(std::path::Path::new("arm.toml"), key, "NaN", "a number")
+    }
+
+    #[test]
+    fn failure_of_a_file_names_every_fault_in_text_and_json() {
+        let failure = Failure::File(Faults(vec![fault("joint[0].dh.a_m"), fault("joint[1].dh.a_m")]));
+        assert_eq!(failure.exit_code(), 2);
+        let text = failure.to_string();
+        assert!(text.contains("joint[0].dh.a_m") && text.contains("joint[1].dh.a_m"), "{text}");
+        let json = failure.to_json();
+        assert_eq!(json["error"]["kind"], "file");
+        assert_eq!(json["error"]["faults"].as_array().map(Vec::len), Some(2));
+        assert_eq!(json["error"]["faults"][1]["key"], "joint[1].dh.a_m");
+    }
+
+    #[test]
+    fn failure_to_write_tells_a_gone_reader_apart() {
+        let gone = Failure::writing("standard output", io::ErrorKind::BrokenPipe.into());
+        assert_eq!((gone.exit_code(), gone.kind()), (0, "write"));
+        let full = Failure::writing("F", io::ErrorKind::StorageFull.into());
+        assert_eq!(full.exit_code(), 1);
+    }
+}

@@ -1,0 +1,166 @@
+//! Waiting until a motion has ended.
+use super::client::{Client, Limit};
+use crate::arm::ArmName;
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::words::fault_sentence;
+use serde::Serialize;
+use std::thread;
+use std::time::Duration;
+use taustream_messages::{Phase, Report};
+
+/// Without a report for this long the streamer counts as gone; so does a motion that never shows up in one.
+const SILENCE_S_MAX: f64 = 2.0;
+/// Rounding that the last step of trajectory time may leave.
+const END_TOLERANCE_S: f64 = 1e-6;
+
+/// How a motion went, as far as reports tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Executed {
+    /// From the first report in which it moved to the first in which it rested, by the streamer's clock.
+    pub(crate) executed_s: f64,
+    /// Largest tracking error of any joint while it moved.
+    pub(crate) tracking_error_rad_max: f64,
+}
+
+/// Waits until the motion has ended; `see` gets every report on the way.
+///
+/// # Errors
+/// When it does not reach its end: fault, stop, another motion, no reports any more, or Ctrl-C.
+pub(crate) fn follow(
+    client: &Client,
+    arm: &ArmName,
+    trajectory_id: u64,
+    mut see: impl FnMut(&Report, Phase),
+) -> Result<Executed, Failure> {
+    let mut watch = Watch::of(trajectory_id);
+    let mut silence = Limit::after_s(SILENCE_S_MAX);
+    loop {
+        interrupt::check()?;
+        let mut news = Vec::new();
+        client.drain_reports(|report, phase| news.push((*report, phase)))?;
+        for (report, phase) in &news {
+            see(report, *phase);
+            if let Some(executed) = watch.judge(report, *phase, arm)? {
+                return Ok(executed);
+            }
+        }
+        if !news.is_empty() && watch.seen {
+            silence = Limit::after_s(SILENCE_S_MAX);
+        } else if silence.is_over() {
+            let why = if news.is_empty() {
+                "the streamer's reports have ended in mid-motion; look at its log, and at the arm"
+            } else {
+                "the motion was accepted, but another one runs; `taustream status` shows it"
+            };
+            return Err(Failure::Failed(why.to_owned()));
+        }
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Judges reports one after another.
+struct Watch {
+    trajectory_id: u64,
+    seen: bool,
+    first_ns: Option<u64>,
+    tracking_error_rad_max: f64,
+}
+
+impl Watch {
+    fn of(trajectory_id: u64) -> Self {
+        Self { trajectory_id, seen: false, first_ns: None, tracking_error_rad_max: 0.0 }
+    }
+
+    /// `Some` when the motion has ended at its end; an error when it has ended elsewhere.
+    fn judge(&mut self, r: &Report, phase: Phase, arm: &ArmName) -> Result<Option<Executed>, Failure> {
+        let stopped = |how: &str, why: &str| {
+            let (at_s, of_s) = (r.trajectory_s, r.trajectory_duration_s);
+            Failure::Failed(format!("the motion was {how} at {at_s:.3} of {of_s:.3} s: {why}"))
+        };
+        if r.trajectory_id != self.trajectory_id {
+            // Until the first report after the acceptance an older motion stands there.
+            let why = format!("another one, {}, took over", r.trajectory_id);
+            return if self.seen { Err(stopped("dropped", &why)) } else { Ok(None) };
+        }
+        self.seen = true;
+        let errors = r.tracking_error_rad.iter().take(r.joints());
+        self.tracking_error_rad_max = errors.fold(self.tracking_error_rad_max, |max, e| max.max(e.abs()));
+        match phase {
+            Phase::Holding => {}
+            Phase::Fault | Phase::FastStopping | Phase::Braking | Phase::Locked => {
+                return Err(stopped("stopped", &fault_sentence(r, arm)));
+            }
+            Phase::Moving | Phase::Pausing | Phase::Paused | Phase::Stopping => {
+                self.first_ns.get_or_insert(r.time_ns);
+                return Ok(None);
+            }
+            Phase::Configuring | Phase::Disabled | Phase::Enabling | Phase::Disabling => {
+                return Err(stopped("dropped", &format!("the arm is {}", phase.word())));
+            }
+        }
+        if r.trajectory_s + END_TOLERANCE_S < r.trajectory_duration_s {
+            return Err(stopped("dropped", "somebody stopped the arm"));
+        }
+        let executed_ns = self.first_ns.map_or(0, |first| r.time_ns.saturating_sub(first));
+        Ok(Some(Executed {
+            executed_s: Duration::from_nanos(executed_ns).as_secs_f64(),
+            tracking_error_rad_max: self.tracking_error_rad_max,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(id: u64, at_s: f64, time_ms: u64) -> Report {
+        Report {
+            joint_count: 1,
+            trajectory_id: id,
+            trajectory_s: at_s,
+            trajectory_duration_s: 1.0,
+            time_ns: time_ms * 1_000_000,
+            ..Report::default()
+        }
+    }
+
+    fn arm() -> ArmName {
+        ArmName { name: "a".into(), joints: Vec::new() }
+    }
+
+    fn walk(steps: &[(Report, Phase)]) -> Result<Option<Executed>, String> {
+        let mut watch = Watch::of(7);
+        for (report, phase) in steps {
+            if let Some(end) = watch.judge(report, *phase, &arm()).map_err(|e| e.to_string())? {
+                return Ok(Some(end));
+            }
+        }
+        Ok(None)
+    }
+
+    #[test]
+    fn motion_that_reaches_its_end_is_done_and_timed_by_the_streamers_clock() {
+        let steps = [
+            (report(3, 1.0, 90), Phase::Holding),
+            (report(7, 0.0, 100), Phase::Moving),
+            (report(7, 0.5, 600), Phase::Paused),
+            (report(7, 1.0, 1350), Phase::Holding),
+        ];
+        let end = walk(&steps).unwrap().unwrap();
+        assert!((end.executed_s - 1.25).abs() < 1e-12, "{end:?}");
+    }
+
+    #[test]
+    fn motion_that_does_not_reach_its_end_says_why() {
+        let moving = (report(7, 0.4, 100), Phase::Moving);
+        let stopped = walk(&[moving, (report(7, 0.5, 200), Phase::Holding)]).unwrap_err();
+        assert!(stopped.contains("0.500 of 1.000 s"), "{stopped}");
+        let replaced = walk(&[moving, (report(9, 0.1, 200), Phase::Moving)]).unwrap_err();
+        assert!(replaced.contains("another one, 9"), "{replaced}");
+        let faulted = walk(&[moving, (report(7, 0.5, 200), Phase::Fault)]).unwrap_err();
+        assert!(faulted.contains("no fault is reported"), "{faulted}");
+        let disabled = walk(&[moving, (report(7, 0.5, 200), Phase::Disabled)]).unwrap_err();
+        assert!(disabled.contains("disabled"), "{disabled}");
+    }
+}

@@ -1,0 +1,7 @@
+//! Commands that talk to the running streamer and planner.
+pub(crate) mod client;
+pub(crate) mod command;
+pub(crate) mod follow;
+pub(crate) mod replan;
+pub(crate) mod run;
+pub(crate) mod status;

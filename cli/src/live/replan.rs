@@ -1,0 +1,177 @@
+//! `taustream replan`: asks the running planner for a motion to a new goal.
+use super::client::{Client, PLANNER};
+use super::follow::{Executed, follow};
+use crate::args::ReplanArgs;
+use crate::arm::{self, ArmName};
+use crate::failure::Failure;
+use crate::output::Form;
+use crate::words::receipt_sentence;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::{Outcome, PlanRequest, Receipt, Report};
+use taustream_planner::PlannerKind;
+
+/// What a planner may take beyond its deadline: verification, sending, and the streamer's receipt.
+const ANSWER_S: f64 = 5.0;
+
+/// A motion that planner and streamer agreed on.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Planned {
+    pub(crate) trajectory_id: u64,
+    pub(crate) generation: u64,
+    pub(crate) planner: String,
+    pub(crate) planning_s: f64,
+    pub(crate) duration_s: f64,
+    pub(crate) clearance_m: f64,
+    pub(crate) strokes: u32,
+    pub(crate) accepted: bool,
+    pub(crate) from_s: f64,
+    pub(crate) tick: u64,
+}
+
+/// The whole answer.
+#[derive(Debug, Serialize)]
+struct Answer {
+    arm: String,
+    #[serde(flatten)]
+    planned: Planned,
+    #[serde(flatten)]
+    executed: Option<Executed>,
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.planned)?;
+        if let Some(e) = &self.executed {
+            let error_mrad = e.tracking_error_rad_max * 1e3;
+            write!(
+                f,
+                "\nexecuted      in {:.3} s, largest tracking error {error_mrad:.3} mrad",
+                e.executed_s
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Planned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "planned by    {} in {:.3} s", self.planner, self.planning_s)?;
+        writeln!(f, "duration      {:.3} s at full speed, {} strokes", self.duration_s, self.strokes)?;
+        writeln!(f, "clearance     {:.4} m", self.clearance_m)?;
+        write!(
+            f,
+            "receipt       accepted: trajectory {} (generation {}) from {:.3} s on, at cycle {}",
+            self.trajectory_id, self.generation, self.from_s, self.tick
+        )
+    }
+}
+
+/// What to ask the planner for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    pub(crate) when: When,
+    pub(crate) deadline_ms: u32,
+    pub(crate) seed: u64,
+    pub(crate) planner: PlannerKind,
+}
+
+/// Asks, prints the receipt, and waits for the end of the motion if told to.
+pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
+    let settings = arm::settings(settings)?;
+    let arm = ArmName::of(&settings);
+    let goal_rad = args.goal.pose_of(&settings.robot, "--goal")?;
+    let client = Client::join(&arm.name)?;
+    let wanted = Wanted {
+        when: if args.after_current { When::AfterCurrent } else { When::AtOnce },
+        deadline_ms: args.deadline_ms,
+        seed: args.seed,
+        planner: args.planner,
+    };
+    let request = CheckedPlanRequest {
+        joints: settings.robot.joints.len(),
+        goal_rad,
+        when: wanted.when,
+        deadline_ms: wanted.deadline_ms,
+        seed: wanted.seed,
+        planner: wanted.planner.name().to_owned(),
+    };
+    form.progress(format_args!("planning, {:.1} s at most ..", f64::from(args.deadline_ms) * 1e-3));
+    let planned =
+        ask(&client, &arm, &request).map_err(|failure| match args.goal.degrees_hint(&settings.robot) {
+            Some(hint) if matches!(failure, Failure::Refused(_)) => {
+                Failure::Refused(format!("{failure} ({hint})"))
+            }
+            _ => failure,
+        })?;
+    let executed = if args.wait {
+        form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
+        Some(follow(&client, &arm, planned.trajectory_id, |_, _| {})?)
+    } else {
+        None
+    };
+    form.print(&Answer { arm: arm.name, planned, executed })
+}
+
+/// Sends a request and reads the answer; an answer without an accepting receipt is a failure.
+pub(crate) fn ask(client: &Client, arm: &ArmName, request: &CheckedPlanRequest) -> Result<Planned, Failure> {
+    // A planner without a streamer has no pose to start from; saying so here is clearer than a time-out.
+    let (report, _) = client.report()?;
+    let limit_s = f64::from(request.deadline_ms) * 1e-3 + ANSWER_S + remaining_s(&report, request.when);
+    let reply = client.plan(PlanRequest::from(request), limit_s)?;
+    match reply.outcome() {
+        PlanOutcome::Failed { reason } => Err(Failure::Refused(format!("no plan: {reason}"))),
+        PlanOutcome::Planned { receipt: None, trajectory_id, .. } => Err(Failure::Failed(format!(
+            "{PLANNER} sent trajectory {trajectory_id}, but the streamer gave no receipt; `taustream status` shows whether it runs"
+        ))),
+        PlanOutcome::Planned {
+            trajectory_id,
+            planning_s,
+            duration_s,
+            clearance_m,
+            strokes,
+            how,
+            receipt: Some(receipt),
+        } => {
+            let (from_s, tick) = accepted(&receipt, arm)?;
+            Ok(Planned {
+                trajectory_id,
+                generation: receipt.generation(),
+                planner: how,
+                planning_s,
+                duration_s,
+                clearance_m,
+                strokes,
+                accepted: true,
+                from_s,
+                tick,
+            })
+        }
+    }
+}
+
+/// Trajectory time and cycle from which an accepted motion runs.
+///
+/// # Errors
+/// The streamer's reason when it was rejected.
+pub(crate) fn accepted(receipt: &Receipt, arm: &ArmName) -> Result<(f64, u64), Failure> {
+    match receipt.outcome() {
+        Some(Outcome::Accepted { from_s, tick }) => Ok((from_s, tick)),
+        outcome @ (Some(Outcome::Rejected(_)) | None) => {
+            Err(Failure::Refused(receipt_sentence(outcome.as_ref(), arm)))
+        }
+    }
+}
+
+/// How long a motion that must end first may still take.
+fn remaining_s(report: &Report, when: When) -> f64 {
+    match when {
+        When::AtOnce => 0.0,
+        When::AfterCurrent => {
+            let left_s = (report.trajectory_duration_s - report.trajectory_s).max(0.0);
+            left_s * 100.0 / report.speed_percent.clamp(1.0, 100.0)
+        }
+    }
+}

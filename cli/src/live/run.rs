@@ -1,0 +1,161 @@
+//! `taustream run`: executes a saved trajectory from its base pose, after verification.
+use super::client::Client;
+use super::follow::{Executed, follow};
+use super::replan::accepted;
+use crate::args::RunArgs;
+use crate::arm::{self, ArmName};
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use std::time::Duration;
+use taustream_arm::{Settings, TrajectoryFile};
+use taustream_messages::{Phase, Report};
+use taustream_planner::send::{SendError, send_trajectory};
+use taustream_planner::verify;
+
+/// Longest wait for the receipt; the streamer checks a trajectory within milliseconds.
+const RECEIPT: Duration = Duration::from_secs(5);
+
+/// What became of it.
+#[derive(Debug, Serialize)]
+struct Answer {
+    arm: String,
+    trajectory: String,
+    trajectory_id: u64,
+    generation: u64,
+    duration_s: f64,
+    clearance_m: f64,
+    accepted: bool,
+    from_s: f64,
+    tick: u64,
+    #[serde(flatten)]
+    executed: Option<Executed>,
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "verified      {}: {:.3} s, clearance {:.4} m",
+            self.trajectory, self.duration_s, self.clearance_m
+        )?;
+        write!(
+            f,
+            "receipt       accepted: trajectory {} (generation {}) from {:.3} s on, at cycle {}",
+            self.trajectory_id, self.generation, self.from_s, self.tick
+        )?;
+        if let Some(e) = &self.executed {
+            let error_mrad = e.tracking_error_rad_max * 1e3;
+            write!(
+                f,
+                "\nexecuted      in {:.3} s, largest tracking error {error_mrad:.3} mrad",
+                e.executed_s
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Verifies, sends and prints the receipt.
+pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result<(), Failure> {
+    let settings = arm::settings(settings)?;
+    let arm = ArmName::of(&settings);
+    let file = load(&args.trajectory, &settings)?;
+    let proof = verify(&settings.robot, &settings.scene, &file.trajectory).map_err(|v| {
+        Failure::Refused(format!("{}: not safe, nothing was sent: {v}", args.trajectory.display()))
+    })?;
+
+    let client = Client::join(&arm.name)?;
+    let (report, phase) = client.report()?;
+    check_ready(&report, phase, &file, &settings)?;
+    let sent = send_trajectory(client.wire(), &settings.robot, &file.trajectory, RECEIPT).map_err(explain)?;
+    let Some(receipt) = sent.receipt else {
+        return Err(Failure::Failed(format!(
+            "trajectory {} was sent, but the streamer gave no receipt within {} s; `taustream status` shows whether it runs",
+            sent.trajectory_id,
+            RECEIPT.as_secs()
+        )));
+    };
+    let (from_s, tick) = accepted(&receipt, &arm)?;
+    let executed = if args.wait {
+        form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", proof.duration_s));
+        Some(follow(&client, &arm, sent.trajectory_id, |_, _| {})?)
+    } else {
+        None
+    };
+    form.print(&Answer {
+        arm: arm.name,
+        trajectory: args.trajectory.display().to_string(),
+        trajectory_id: sent.trajectory_id,
+        generation: sent.generation,
+        duration_s: proof.duration_s,
+        clearance_m: proof.clearance_m,
+        accepted: true,
+        from_s,
+        tick,
+        executed,
+    })
+}
+
+/// A trajectory file that says which robot it was made for; offline use may leave that out, metal may not.
+fn load(path: &Path, settings: &Settings) -> Result<TrajectoryFile, Failure> {
+    let file = arm::trajectory_for(path, &settings.robot)?;
+    if file.digest.is_none() {
+        let why = "has no `digest`, so nobody knows which robot it was made for; `taustream plan` writes one";
+        return Err(Failure::unfit(path, why));
+    }
+    Ok(file)
+}
+
+/// Says before anything is sent what the streamer would refuse anyway, in the user's terms.
+fn check_ready(
+    report: &Report,
+    phase: Phase,
+    file: &TrajectoryFile,
+    settings: &Settings,
+) -> Result<(), Failure> {
+    if report.robot_digest != settings.robot.digest {
+        return Err(Failure::Refused(format!(
+            "the streamer of arm `{}` drives another robot than {}; start it with these settings, or name its settings",
+            settings.name,
+            settings.robot.file.display()
+        )));
+    }
+    if phase != Phase::Holding {
+        return Err(Failure::Refused(format!(
+            "the arm is {}; it must be holding (`taustream enable`, or wait for the running motion)",
+            phase.word()
+        )));
+    }
+    let away = |(command, base): (&f64, &f64)| (command - base).abs();
+    let worst = report
+        .command_rad
+        .iter()
+        .zip(file.trajectory.base_rad())
+        .map(away)
+        .enumerate()
+        .take(report.joints())
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    match worst {
+        Some((joint, by_rad)) if by_rad > settings.supervision.base_tolerance_rad => {
+            let arm = ArmName::of(settings);
+            let base: Vec<String> =
+                file.trajectory.base_rad().iter().take(report.joints()).map(f64::to_string).collect();
+            Err(Failure::Refused(format!(
+                "the arm is not at the trajectory's base pose: {} is {by_rad:.6} rad away; go there first: taustream replan --wait --goal \"{}\"",
+                arm.joint(joint),
+                base.join(",")
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn explain(error: SendError) -> Failure {
+    match error {
+        SendError::Service(error) => Failure::Service(error),
+        SendError::WrongRobot { .. } | SendError::Publish { .. } => Failure::Refused(error.to_string()),
+    }
+}

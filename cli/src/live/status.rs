@@ -1,0 +1,214 @@
+//! `taustream status`: one report of the streamer, in words or as JSON.
+use super::client::Client;
+use crate::arm::ArmName;
+use crate::failure::Failure;
+use crate::output::Form;
+use crate::words::fault_sentence;
+use serde::Serialize;
+use std::fmt;
+use taustream_messages::{Phase, Report};
+
+/// One joint.
+#[derive(Debug, Serialize)]
+struct JointStatus {
+    name: String,
+    command_rad: f64,
+    command_velocity_rad_s: f64,
+    command_acceleration_rad_s2: f64,
+    command_jerk_rad_s3: f64,
+    measured_rad: f64,
+    /// Null where the drive does not send it.
+    measured_velocity_rad_s: f64,
+    tracking_error_rad: f64,
+    tracking_error_rad_max: f64,
+    feedback_age_s: f64,
+    drive_status: u32,
+    drive_error: u32,
+}
+
+/// The fault of the arm.
+#[derive(Debug, Serialize)]
+struct FaultStatus {
+    code: u32,
+    joint: Option<u32>,
+    value: f64,
+    limit: f64,
+    message: String,
+}
+
+/// The motion that runs or ran last.
+#[derive(Debug, Serialize)]
+struct MotionStatus {
+    trajectory_id: u64,
+    generation: u64,
+    at_s: f64,
+    duration_s: f64,
+    end_rad: Vec<f64>,
+}
+
+/// What the streamer says.
+#[derive(Debug, Serialize)]
+struct Status {
+    arm: String,
+    robot_digest: String,
+    phase: &'static str,
+    energised: bool,
+    fault: Option<FaultStatus>,
+    sigma: f64,
+    speed_percent: f64,
+    motion: Option<MotionStatus>,
+    joints: Vec<JointStatus>,
+    tick: u64,
+    time_ns: u64,
+    cycles: u64,
+    cycles_late: u64,
+    cycles_skipped: u64,
+    stalls: u64,
+    frames_sent: u64,
+    frames_lost: u64,
+    frames_received: u64,
+    guard_trips: u64,
+    accepted: u64,
+    rejected: u64,
+    lateness_ns_p50: u64,
+    lateness_ns_p99: u64,
+    lateness_ns_p999: u64,
+    lateness_ns_max: u64,
+    cycle_ns_p99: u64,
+    cycle_ns_max: u64,
+}
+
+/// Waits for a report and prints it.
+pub(crate) fn run(form: Form, arm: &ArmName) -> Result<(), Failure> {
+    let (report, phase) = Client::join(&arm.name)?.report()?;
+    form.print(&Status::of(&report, phase, arm))
+}
+
+impl Status {
+    fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
+        let fault = (r.fault_reason != 0).then(|| FaultStatus {
+            code: r.fault_reason,
+            joint: (r.fault_joint != u32::MAX).then_some(r.fault_joint),
+            value: r.fault_value,
+            limit: r.fault_limit,
+            message: fault_sentence(r, arm),
+        });
+        let motion = (r.trajectory_id != 0).then(|| MotionStatus {
+            trajectory_id: r.trajectory_id,
+            generation: r.generation,
+            at_s: r.trajectory_s,
+            duration_s: r.trajectory_duration_s,
+            end_rad: r.end_rad.iter().take(r.joints()).copied().collect(),
+        });
+        Self {
+            arm: arm.name.clone(),
+            robot_digest: r.robot_digest.iter().map(|byte| format!("{byte:02x}")).collect(),
+            phase: phase.word(),
+            energised: r.energised == 1,
+            fault,
+            sigma: r.sigma,
+            speed_percent: r.speed_percent,
+            motion,
+            joints: joints(r, arm),
+            tick: r.tick,
+            time_ns: r.time_ns,
+            cycles: r.cycles,
+            cycles_late: r.cycles_late,
+            cycles_skipped: r.cycles_skipped,
+            stalls: r.stalls,
+            frames_sent: r.frames_sent,
+            frames_lost: r.frames_lost,
+            frames_received: r.frames_received,
+            guard_trips: r.guard_trips,
+            accepted: r.accepted,
+            rejected: r.rejected,
+            lateness_ns_p50: r.lateness_ns_p50,
+            lateness_ns_p99: r.lateness_ns_p99,
+            lateness_ns_p999: r.lateness_ns_p999,
+            lateness_ns_max: r.lateness_ns_max,
+            cycle_ns_p99: r.cycle_ns_p99,
+            cycle_ns_max: r.cycle_ns_max,
+        }
+    }
+}
+
+fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
+    let at = |array: &[f64], joint: usize| array.get(joint).copied().unwrap_or(f64::NAN);
+    let word = |array: &[u32], joint: usize| array.get(joint).copied().unwrap_or(0);
+    (0..r.joints())
+        .map(|j| JointStatus {
+            name: arm.joints.get(j).cloned().unwrap_or_else(|| format!("joint{}", j + 1)),
+            command_rad: at(&r.command_rad, j),
+            command_velocity_rad_s: at(&r.command_velocity_rad_s, j),
+            command_acceleration_rad_s2: at(&r.command_acceleration_rad_s2, j),
+            command_jerk_rad_s3: at(&r.command_jerk_rad_s3, j),
+            measured_rad: at(&r.measured_rad, j),
+            measured_velocity_rad_s: at(&r.measured_velocity_rad_s, j),
+            tracking_error_rad: at(&r.tracking_error_rad, j),
+            tracking_error_rad_max: at(&r.tracking_error_rad_max, j),
+            feedback_age_s: at(&r.feedback_age_s, j),
+            drive_status: word(&r.drive_status, j),
+            drive_error: word(&r.drive_error, j),
+        })
+        .collect()
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let energised = if self.energised { "energised" } else { "not energised" };
+        writeln!(
+            f,
+            "arm {}: {}, {energised}, speed {} %, sigma {:.3}",
+            self.arm, self.phase, self.speed_percent, self.sigma
+        )?;
+        if let Some(fault) = &self.fault {
+            writeln!(f, "fault: {}", fault.message)?;
+        }
+        match &self.motion {
+            Some(m) => writeln!(
+                f,
+                "motion {} (generation {}): {:.3} of {:.3} s",
+                m.trajectory_id, m.generation, m.at_s, m.duration_s
+            )?,
+            None => writeln!(f, "motion: none since the streamer started")?,
+        }
+        writeln!(
+            f,
+            "  joint              command (rad)  measured (rad)  tracking error (mrad), largest  feedback age (ms)  drive"
+        )?;
+        for j in &self.joints {
+            writeln!(
+                f,
+                "  {:<18} {:>12.6}  {:>14.6}  {:>21.3}  {:>7.3}  {:>17.1}  {:#06x}{}",
+                j.name,
+                j.command_rad,
+                j.measured_rad,
+                j.tracking_error_rad * 1e3,
+                j.tracking_error_rad_max * 1e3,
+                j.feedback_age_s * 1e3,
+                j.drive_status,
+                if j.drive_error == 0 { String::new() } else { format!(" error {:#06x}", j.drive_error) }
+            )?;
+        }
+        writeln!(
+            f,
+            "cycle {}: late {}, skipped {}, stalls {}, guard trips {}",
+            self.cycles, self.cycles_late, self.cycles_skipped, self.stalls, self.guard_trips
+        )?;
+        writeln!(
+            f,
+            "lateness (us): p50 {}, p99 {}, p99.9 {}, max {}; time in the cycle: p99 {}, max {}",
+            self.lateness_ns_p50 / 1000,
+            self.lateness_ns_p99 / 1000,
+            self.lateness_ns_p999 / 1000,
+            self.lateness_ns_max / 1000,
+            self.cycle_ns_p99 / 1000,
+            self.cycle_ns_max / 1000
+        )?;
+        write!(
+            f,
+            "frames: {} sent, {} lost, {} received; trajectories: {} accepted, {} rejected",
+            self.frames_sent, self.frames_lost, self.frames_received, self.accepted, self.rejected
+        )
+    }
+}

@@ -1,0 +1,297 @@
+//! `taustream check`: is a configuration sound, and what does it mean?
+use super::bus_load::{BusLoad, loads};
+use crate::args::CheckArgs;
+use crate::arm;
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use taustream_arm::{Robot, Scene, Servo, Settings, TrajectoryFile};
+use taustream_motion::time_scale::ramp_duration_s;
+
+/// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
+pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
+    match arm::find_any(&args.config)? {
+        arm::AnyFile::Settings(path) => {
+            let settings = Settings::load(&path)?;
+            let checked = CheckedSettings::of(&settings);
+            let refusals: Vec<String> = checked.buses.iter().filter_map(BusLoad::refusal).collect();
+            if !refusals.is_empty() {
+                return Err(Failure::unfit(&path, refusals.join("; ")));
+            }
+            form.print(&checked)
+        }
+        arm::AnyFile::Robot(path) => form.print(&CheckedRobot::of(&Robot::load(&path)?)),
+        arm::AnyFile::Scene(path) => form.print(&CheckedScene::of(&Scene::load(&path)?)),
+        arm::AnyFile::Trajectory(path) => {
+            form.print(&CheckedTrajectory::of(&path, &TrajectoryFile::load(&path)?))
+        }
+    }
+}
+
+/// One joint's limits.
+#[derive(Debug, Serialize)]
+struct JointLine {
+    name: String,
+    position_rad: [f64; 2],
+    velocity_rad_s: f64,
+    acceleration_rad_s2: f64,
+    jerk_rad_s3: f64,
+    stop_acceleration_rad_s2: f64,
+    stop_jerk_rad_s3: f64,
+}
+
+/// A robot that is sound.
+#[derive(Debug, Serialize)]
+struct CheckedRobot {
+    kind: &'static str,
+    name: String,
+    file: String,
+    digest: String,
+    joints: Vec<JointLine>,
+    shapes: usize,
+    may_touch_by_rule: Vec<[String; 2]>,
+    may_touch_by_file: Vec<[String; 2]>,
+    /// How long a pause or stop from full speed takes.
+    pause_s: f64,
+}
+
+impl CheckedRobot {
+    fn of(robot: &Robot) -> Self {
+        let link = |i: usize| robot.links.get(i).cloned().unwrap_or_else(|| format!("link{i}"));
+        let names = |pairs: &[(usize, usize)]| pairs.iter().map(|(a, b)| [link(*a), link(*b)]).collect();
+        let joints = robot.joints.iter().map(|joint| {
+            let (motion, stop) = (joint.limits.motion, joint.limits.stop);
+            JointLine {
+                name: joint.name.clone(),
+                position_rad: joint.limits.position_rad,
+                velocity_rad_s: motion.velocity_rad_s,
+                acceleration_rad_s2: motion.acceleration_rad_s2,
+                jerk_rad_s3: motion.jerk_rad_s3,
+                stop_acceleration_rad_s2: stop.acceleration_rad_s2,
+                stop_jerk_rad_s3: stop.jerk_rad_s3,
+            }
+        });
+        Self {
+            kind: "robot",
+            name: robot.name.clone(),
+            file: robot.file.display().to_string(),
+            digest: robot.digest_hex(),
+            joints: joints.collect(),
+            shapes: robot.shapes.len(),
+            may_touch_by_rule: names(&robot.allowed_by_rule),
+            may_touch_by_file: names(&robot.allowed_by_file),
+            pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
+        }
+    }
+}
+
+impl fmt::Display for CheckedRobot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "robot {} ({}): {} joints, {} collision shapes",
+            self.name,
+            self.file,
+            self.joints.len(),
+            self.shapes
+        )?;
+        writeln!(f, "  digest {}", self.digest)?;
+        writeln!(
+            f,
+            "  joint               position (rad)         velocity   acceleration  jerk; stop: acceleration, jerk"
+        )?;
+        for j in &self.joints {
+            let [low, high] = j.position_rad;
+            writeln!(
+                f,
+                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8.2} rad/s {:>8.2} rad/s2 {:>8.1} rad/s3; {:.2}, {:.1}",
+                j.name,
+                j.velocity_rad_s,
+                j.acceleration_rad_s2,
+                j.jerk_rad_s3,
+                j.stop_acceleration_rad_s2,
+                j.stop_jerk_rad_s3
+            )?;
+        }
+        contacts(
+            f,
+            "links that MAY TOUCH by the contact rule (neighbours, and pairs that touch in every pose)",
+            &self.may_touch_by_rule,
+        )?;
+        contacts(f, "links that MAY TOUCH because the file says so", &self.may_touch_by_file)?;
+        write!(
+            f,
+            "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
+            self.pause_s
+        )
+    }
+}
+
+/// Contacts that nothing will warn about: said aloud.
+fn contacts(f: &mut fmt::Formatter<'_>, title: &str, pairs: &[[String; 2]]) -> fmt::Result {
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    let list: Vec<String> = pairs.iter().map(|[a, b]| format!("{a}-{b}")).collect();
+    writeln!(f, "  {title}: {}", list.join(", "))
+}
+
+/// A scene that is sound.
+#[derive(Debug, Serialize)]
+struct CheckedScene {
+    kind: &'static str,
+    file: String,
+    margin_m: f64,
+    obstacles: Vec<String>,
+}
+
+impl CheckedScene {
+    fn of(scene: &Scene) -> Self {
+        Self {
+            kind: "scene",
+            file: scene.file.display().to_string(),
+            margin_m: scene.margin_m,
+            obstacles: scene.obstacles.iter().map(|o| o.name.clone()).collect(),
+        }
+    }
+}
+
+impl fmt::Display for CheckedScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (count, names) = (self.obstacles.len(), self.obstacles.join(", "));
+        write!(f, "scene {}: margin {} m, {count} obstacles", self.file, self.margin_m)?;
+        if count > 0 { write!(f, ": {names}") } else { write!(f, " (an empty world)") }
+    }
+}
+
+/// A trajectory file that is sound in itself.
+#[derive(Debug, Serialize)]
+struct CheckedTrajectory {
+    kind: &'static str,
+    file: String,
+    robot: String,
+    digest: Option<String>,
+    joints: usize,
+    strokes: usize,
+    duration_s: f64,
+}
+
+impl CheckedTrajectory {
+    fn of(path: &Path, file: &TrajectoryFile) -> Self {
+        Self {
+            kind: "trajectory",
+            file: path.display().to_string(),
+            robot: file.robot.clone(),
+            digest: file.digest.clone(),
+            joints: file.trajectory.joints(),
+            strokes: file.trajectory.strokes().len(),
+            duration_s: file.trajectory.duration_s(),
+        }
+    }
+}
+
+impl fmt::Display for CheckedTrajectory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, robot, joints, strokes, duration_s, .. } = self;
+        write!(
+            f,
+            "trajectory {file}: robot {robot}, {joints} joints, {strokes} strokes, {duration_s:.3} s; "
+        )?;
+        match &self.digest {
+            Some(digest) => write!(f, "digest {digest}; `taustream verify` checks limits and clearance"),
+            None => write!(f, "no digest, so `run` will refuse it; `taustream plan` writes one"),
+        }
+    }
+}
+
+/// One servo's binding.
+#[derive(Debug, Serialize)]
+struct ServoLine {
+    joint: String,
+    bus: String,
+    node_id: u8,
+    protocol: String,
+    sign: f64,
+    gear_ratio: f64,
+    counts_per_rev: f64,
+    zero_offset_rad: f64,
+    limp_is_safe: bool,
+}
+
+/// Settings that are sound.
+#[derive(Debug, Serialize)]
+struct CheckedSettings {
+    kind: &'static str,
+    name: String,
+    file: String,
+    robot: CheckedRobot,
+    scene: CheckedScene,
+    period_us: u32,
+    priority: u8,
+    cpu: Option<usize>,
+    buses: Vec<BusLoad>,
+    servos: Vec<ServoLine>,
+}
+
+impl CheckedSettings {
+    fn of(settings: &Settings) -> Self {
+        let line = |servo: &Servo| ServoLine {
+            joint: settings.robot.joints.get(servo.joint).map(|j| j.name.clone()).unwrap_or_default(),
+            bus: settings.buses.get(servo.bus).map(|b| b.name.clone()).unwrap_or_default(),
+            node_id: servo.node_id,
+            protocol: format!("{:?}", servo.protocol).to_lowercase(),
+            sign: servo.sign,
+            gear_ratio: servo.gear_ratio,
+            counts_per_rev: servo.counts_per_rev,
+            zero_offset_rad: servo.zero_offset_rad,
+            limp_is_safe: servo.limp_is_safe,
+        };
+        Self {
+            kind: "settings",
+            name: settings.name.clone(),
+            file: settings.file.display().to_string(),
+            robot: CheckedRobot::of(&settings.robot),
+            scene: CheckedScene::of(&settings.scene),
+            period_us: settings.cycle.period_us,
+            priority: settings.cycle.priority,
+            cpu: settings.cycle.cpu,
+            buses: loads(settings),
+            servos: settings.servos.iter().map(line).collect(),
+        }
+    }
+}
+
+impl fmt::Display for CheckedSettings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "settings {} ({})", self.name, self.file)?;
+        writeln!(f, "{}", self.robot)?;
+        writeln!(f, "{}", self.scene)?;
+        let cpu = self.cpu.map_or_else(|| "not bound to a CPU".to_owned(), |cpu| format!("on CPU {cpu}"));
+        writeln!(f, "cycle {} us at SCHED_FIFO priority {}, {cpu}", self.period_us, self.priority)?;
+        for bus in &self.buses {
+            writeln!(f, "bus {bus}")?;
+        }
+        writeln!(
+            f,
+            "  joint              bus        node  protocol  sign  gear ratio  counts/rev   zero (rad)  without torque"
+        )?;
+        for s in &self.servos {
+            let limp = if s.limp_is_safe { "safe" } else { "MAY FALL" };
+            writeln!(
+                f,
+                "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>11} {:>11} {:>12.6}  {limp}",
+                s.joint,
+                s.bus,
+                s.node_id,
+                s.protocol,
+                s.sign,
+                s.gear_ratio,
+                s.counts_per_rev,
+                s.zero_offset_rad
+            )?;
+        }
+        write!(f, "sound")
+    }
+}

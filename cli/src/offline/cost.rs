@@ -1,0 +1,63 @@
+//! `taustream cost`: the paper's cost of a motion, in the paper's own model.
+use crate::args::CostArgs;
+use crate::arm;
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use taustream_planner::{CostError, CostModel, paper_cost};
+
+/// The cost and its parts.
+#[derive(Debug, Serialize)]
+struct Answer {
+    path_length_m: f64,
+    joint_travel_rad: f64,
+    penalty: f64,
+    collision: u8,
+    cost: f64,
+    poses: usize,
+    waypoints_per_segment: usize,
+    expansion_m: f64,
+    weights: [f64; 3],
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "path_length_m     {}", self.path_length_m)?;
+        writeln!(f, "joint_travel_rad  {}", self.joint_travel_rad)?;
+        writeln!(f, "penalty           {}", self.penalty)?;
+        writeln!(f, "collision         {}", self.collision)?;
+        writeln!(f, "cost              {}", self.cost)?;
+        write!(f, "({} poses in the paper's model; `taustream verify` says what may move)", self.poses)
+    }
+}
+
+/// Rates and prints.
+pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
+    let model = CostModel {
+        waypoints_per_segment: args.waypoints_per_segment,
+        expansion_m: args.expansion_m,
+        weights: args.weights.0,
+    };
+    let robot = arm::robot(&args.motion.robot)?;
+    let scene = arm::scene(&args.motion.scene)?;
+    let file = arm::trajectory_for(&args.motion.trajectory, &robot)?;
+    let cost = paper_cost(&robot, &scene, &file.trajectory, &model).map_err(|error| match error {
+        CostError::Model { .. } => Failure::Usage(error.to_string()),
+        CostError::NotSpheres { .. } => Failure::unfit(&scene.file, error.to_string()),
+        CostError::Overlap { .. } | CostError::Joints { .. } => {
+            Failure::unfit(&args.motion.trajectory, error.to_string())
+        }
+    })?;
+    form.print(&Answer {
+        path_length_m: cost.path_length_m,
+        joint_travel_rad: cost.joint_travel_rad,
+        penalty: cost.penalty,
+        collision: u8::from(cost.collision),
+        cost: cost.cost,
+        poses: cost.poses,
+        waypoints_per_segment: model.waypoints_per_segment,
+        expansion_m: model.expansion_m,
+        weights: model.weights,
+    })
+}

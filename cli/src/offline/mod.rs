@@ -1,0 +1,7 @@
+//! Commands that need files only.
+pub(crate) mod bus_load;
+pub(crate) mod check;
+pub(crate) mod cost;
+pub(crate) mod plan;
+pub(crate) mod sample;
+pub(crate) mod verify;

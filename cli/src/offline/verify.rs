@@ -1,0 +1,114 @@
+//! `taustream verify`: the proof that a motion keeps limits and clearance, or the first violation.
+use crate::args::MotionArgs;
+use crate::arm;
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use taustream_arm::{Robot, RobotJoint};
+use taustream_motion::limits::Peaks;
+use taustream_planner::verify;
+
+/// Why every trajectory that passed the file's door is smooth: any sum of strokes with n >= 4 is C3.
+const CONTINUITY: &str = "position, velocity, acceleration and jerk are continuous (a sum of Tau-J* strokes)";
+
+/// What was proven.
+#[derive(Debug, Serialize)]
+struct Answer {
+    verified: bool,
+    robot: String,
+    trajectory: String,
+    duration_s: f64,
+    strokes: usize,
+    clearance_m: f64,
+    clearance_at_s: f64,
+    clearance_between: [String; 2],
+    continuity: &'static str,
+    peak_use: Vec<PeakUse>,
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [a, b] = &self.clearance_between;
+        writeln!(f, "verified      {} for robot {}", self.trajectory, self.robot)?;
+        writeln!(f, "duration      {:.3} s, {} strokes", self.duration_s, self.strokes)?;
+        writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        writeln!(f, "continuity    {}", self.continuity)?;
+        write!(f, "{}", PeakTable(&self.peak_use))
+    }
+}
+
+/// Verifies and prints the proof.
+pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
+    let robot = arm::robot(&args.robot)?;
+    let scene = arm::scene(&args.scene)?;
+    let file = arm::trajectory_for(&args.trajectory, &robot)?;
+    let proof = verify(&robot, &scene, &file.trajectory)
+        .map_err(|v| Failure::Refused(format!("{}: not safe: {v}", args.trajectory.display())))?;
+    let (a, b) = proof.clearance_between;
+    form.print(&Answer {
+        verified: true,
+        robot: robot.name.clone(),
+        trajectory: args.trajectory.display().to_string(),
+        duration_s: proof.duration_s,
+        strokes: file.trajectory.strokes().len(),
+        clearance_m: proof.clearance_m,
+        clearance_at_s: proof.clearance_at_s,
+        clearance_between: [a, b],
+        continuity: CONTINUITY,
+        peak_use: peak_use(&robot, &proof.peaks),
+    })
+}
+
+/// How much of its motion limits one joint uses at most; peaks are proven upper bounds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PeakUse {
+    joint: String,
+    velocity_rad_s: f64,
+    velocity_percent: f64,
+    acceleration_rad_s2: f64,
+    acceleration_percent: f64,
+    jerk_rad_s3: f64,
+    jerk_percent: f64,
+}
+
+/// Peaks beside the motion limits, one entry a joint.
+pub(crate) fn peak_use(robot: &Robot, peaks: &Peaks) -> Vec<PeakUse> {
+    let peaks = peaks.velocity_rad_s.iter().zip(&peaks.acceleration_rad_s2).zip(&peaks.jerk_rad_s3);
+    let entry = |(joint, ((v, a), j)): (&RobotJoint, ((&f64, &f64), &f64))| {
+        let motion = &joint.limits.motion;
+        PeakUse {
+            joint: joint.name.clone(),
+            velocity_rad_s: *v,
+            velocity_percent: 100.0 * v / motion.velocity_rad_s,
+            acceleration_rad_s2: *a,
+            acceleration_percent: 100.0 * a / motion.acceleration_rad_s2,
+            jerk_rad_s3: *j,
+            jerk_percent: 100.0 * j / motion.jerk_rad_s3,
+        }
+    };
+    robot.joints.iter().zip(peaks).map(entry).collect()
+}
+
+/// Peak use as a table for people.
+pub(crate) struct PeakTable<'a>(pub(crate) &'a [PeakUse]);
+
+impl fmt::Display for PeakTable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "peak use of the motion limits (velocity, acceleration, jerk):")?;
+        for p in self.0 {
+            let (v, a, j) = (p.velocity_percent, p.acceleration_percent, p.jerk_percent);
+            writeln!(f, "  {:<18} {v:>4.0} % {a:>4.0} % {j:>4.0} %", p.joint)?;
+        }
+        Ok(())
+    }
+}
+
+/// Clearance in words; infinite when nothing can collide.
+pub(crate) fn clearance_words(clearance_m: f64, at_s: f64, between: (&str, &str)) -> String {
+    if clearance_m.is_finite() {
+        format!("{clearance_m:.4} m at t = {at_s:.3} s, between {} and {}", between.0, between.1)
+    } else {
+        "unlimited: nothing in this scene can collide".to_owned()
+    }
+}

@@ -1,0 +1,84 @@
+//! What commands say: sentences for people, or one JSON object for programs, on stdout.
+use crate::failure::Failure;
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::path::Path;
+use std::{fs, process};
+
+/// The form of the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// Sentences and tables.
+    Text,
+    /// One JSON object on one line; numbers that are not finite are null.
+    Json,
+}
+
+impl Form {
+    /// Prints an answer on stdout.
+    pub(crate) fn print(self, answer: &(impl Serialize + Display)) -> Result<(), Failure> {
+        let line = match self {
+            Self::Text => answer.to_string(),
+            Self::Json => to_json(answer)?,
+        };
+        let mut out = io::stdout().lock();
+        writeln!(out, "{}", line.trim_end())
+            .and_then(|()| out.flush())
+            .map_err(|e| Failure::writing("standard output", e))
+    }
+
+    /// Says what is going on, on stderr, where it is in nobody's way; silent for programs.
+    pub(crate) fn progress(self, text: impl Display) {
+        if self == Self::Text {
+            note(text);
+        }
+    }
+}
+
+/// Writes a line to stderr. A stderr that is closed is no reason to stop.
+pub(crate) fn note(text: impl Display) {
+    let _closed = writeln!(io::stderr(), "{text}");
+}
+
+fn to_json(answer: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string(answer)
+        .map_err(|e| Failure::Failed(format!("the answer does not fit into JSON: {e}")))
+}
+
+/// Writes a file as a whole or not at all: a reader, or a crash, never meets half of it.
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
+    let fail = |e| Failure::writing(path.display().to_string(), e);
+    let name = path.file_name().ok_or_else(|| {
+        Failure::Usage(format!("{} is no name of a file; give -o the file to write", path.display()))
+    })?;
+    let mut beside = name.to_owned();
+    beside.push(format!(".{}.part", process::id()));
+    let part = path.with_file_name(beside);
+    let written = fs::File::create_new(&part)
+        .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&part, path));
+    written.map_err(|e| {
+        // What we made ourselves may go; a failure to remove it changes nothing for the caller.
+        let _left = fs::remove_file(&part);
+        fail(e)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_that_cannot_be_written_leaves_nothing_behind() {
+        let dir = std::env::temp_dir().join(format!("taustream-output-{}", process::id()));
+        fs::create_dir_all(dir.join("taken/inside")).unwrap();
+        let failure = write_whole(&dir.join("taken"), "text").unwrap_err();
+        assert_eq!(failure.exit_code(), 1, "{failure}");
+        let left: Vec<_> = fs::read_dir(&dir).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(left, ["taken"]);
+        write_whole(&dir.join("new"), "text").unwrap();
+        assert_eq!(fs::read_to_string(dir.join("new")).unwrap(), "text");
+        fs::remove_dir_all(&dir).unwrap();
+    }
+}
