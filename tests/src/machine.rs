@@ -256,8 +256,12 @@ impl Machine {
 /// The Debian packages that are missing on this host.
 #[must_use]
 pub fn missing_packages() -> Vec<&'static str> {
-    let path = search_path();
-    let is_there = |program: &str| std::env::split_paths(&path).any(|folder| folder.join(program).is_file());
+    missing_in(&search_path())
+}
+
+/// As [`missing_packages`], for programs sought in these folders.
+fn missing_in(path: &OsStr) -> Vec<&'static str> {
+    let is_there = |program: &str| std::env::split_paths(path).any(|folder| folder.join(program).is_file());
     NEEDS.iter().filter(|(program, _)| !is_there(program)).map(|(_, package)| *package).collect()
 }
 
@@ -441,4 +445,33 @@ fn read_status(scratch: &Scratch, status: ExitStatus) -> Result<u8, MachineError
 
 fn host(doing: &'static str) -> impl Fn(Error) -> MachineError {
     move |source| MachineError::Host { doing, source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn machine_on_a_bare_host_names_the_packages_and_how_to_get_them() {
+        let packages = missing_in(OsStr::new("/nowhere:/proc"));
+        assert_eq!(packages, ["user-mode-linux", "iproute2", "can-utils", "kmod"]);
+        let text = MachineError::Missing { packages }.to_string();
+        assert!(
+            text.ends_with("apt-get install --no-install-recommends user-mode-linux iproute2 can-utils kmod")
+        );
+    }
+
+    #[test]
+    fn machine_command_script_lets_no_word_break_out() {
+        let command = ["a b", "'; rm -rf /; '", "", "$(x)"].map(OsString::from);
+        let script = command_script(Path::new("/it's"), 9, &command);
+        let last = r"cd -- '/it'\''s' || exit 125
+exec setsid --wait timeout -k 5 9 'a b' ''\''; rm -rf /; '\''' '' '$(x)'
+";
+        assert!(script.ends_with(last.as_bytes()), "{}", String::from_utf8_lossy(&script));
+        assert!(!may_travel(OsStr::new("BASH_FUNC_x%%")) && !may_travel(OsStr::new("UID")));
+        assert!(
+            !may_travel(OsStr::new("1X")) && !may_travel(OsStr::new("")) && may_travel(OsStr::new("PATH"))
+        );
+    }
 }

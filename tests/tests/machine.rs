@@ -152,19 +152,3 @@ fn processes_naming(folder: &std::path::Path) -> Vec<u32> {
     }
     found
 }
-
-/// Goal: a host without the packages is told which, and how to install them.
-#[test]
-fn machine_on_a_bare_host_names_the_packages() {
-    let missing = taustream_tests::machine::missing_packages();
-    if missing.is_empty() {
-        return; // This host has them, so the other tests here run.
-    }
-    let lab = Lab::new("bare");
-    let output = lab.run(&[], "true");
-    assert_eq!(output.status.code(), Some(125));
-    for package in missing {
-        assert!(text(&output.stderr).contains(package), "{}", text(&output.stderr));
-    }
-    panic!("{}", text(&output.stderr));
-}
