@@ -4,6 +4,7 @@
 //! joint feedback, and does no I/O. Simulated servos sit behind the same links and decode real frames.
 #![deny(unsafe_code)]
 
+pub mod bring_up;
 pub mod codec;
 pub mod frame;
 pub mod link;

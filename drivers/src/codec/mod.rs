@@ -2,8 +2,11 @@
 //!
 //! The encoders and decoders serve both ends: the master in this room, and the simulated drives. No I/O, no clock.
 pub mod canopen;
+pub mod cia402;
+pub mod cia402_words;
 pub mod object;
 pub mod sdo;
+pub mod sdo_client;
 pub mod words;
 
 pub use canopen::{Emcy, Nmt, NmtState, PdoEntry};

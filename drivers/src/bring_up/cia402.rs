@@ -1,0 +1,524 @@
+//! One CiA 402 node from silence to cyclic synchronous position (can-protocols section 1.5).
+//!
+//! First it only listens: a drive that is energised before this master has configured it is left as it is. Then the
+//! communication part is reset, the drive configured by SDO, and started. All times are on the driver's patient
+//! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
+use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
+use crate::bring_up::power::{Heard, Power};
+use crate::bring_up::trouble::Trouble;
+use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
+use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING, encode_rpdo};
+use crate::codec::object;
+use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
+use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
+use crate::codec::words::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
+use crate::frame::CanFrame;
+use crate::servo::{DriveState, DriveWish, Nanos};
+
+/// How long a boot-up may take.
+const BOOT_UP_TIMEOUT: Nanos = Nanos(5_000_000_000);
+/// Pause between two looks at a drive that is waited for.
+const LOOK_AGAIN: Nanos = Nanos(100_000_000);
+/// How long the bus is listened to before anything is reset: a foreign SYNC shows itself in this time.
+const LISTEN_LEAST: Nanos = Nanos(100_000_000);
+/// How long "voltage off" is sent to a lost drive before its setpoints end.
+const FAREWELL: Nanos = Nanos(100_000_000);
+const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
+/// NMT start is sent this often before the drive counts as refusing.
+const START_TRIES: u8 = 3;
+/// Heartbeats in a row that deny "operational" before it is believed: one may have been queued before the start.
+const DENIALS_MAX: u8 = 2;
+
+/// Where the bring-up stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Reading the statusword, changing nothing.
+    Listen { since: Nanos, next: Nanos, trouble: Option<Trouble> },
+    /// Found energised; watched, left alone.
+    Unowned { next: Nanos },
+    /// Waiting for boot-up.
+    Reset { since: Nanos },
+    /// At this step of the plan.
+    Configure { step: usize, since: Nanos },
+    /// NMT start sent; waiting for the first TPDO.
+    Start { since: Nanos, tries: u8 },
+    /// Process data flows.
+    Operational { farewell: Option<Nanos> },
+    /// Lost its configuration while in use; waits for the wish to be disabled.
+    Gone(Trouble),
+    /// A step was refused.
+    Refused { code: u32, object: u32 },
+}
+
+/// What a node wants sent after the setpoints of a cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Service {
+    /// A network command.
+    pub nmt: Option<Nmt>,
+    /// A request.
+    pub sdo: Option<SdoRequest>,
+}
+
+/// What the master knows in a cycle, beside the node itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycle {
+    /// Patient clock.
+    pub now: Nanos,
+    /// The wish.
+    pub wish: DriveWish,
+    /// Another master was heard a short while ago.
+    pub other_master: bool,
+}
+
+/// The command for a node in this cycle.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// In counts; `None` when the command was not a number.
+    pub counts: Option<i32>,
+    /// Close enough to the measured position to energise.
+    pub near: bool,
+}
+
+/// Limits of waiting.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    /// Each confirmation of a step.
+    pub step: Nanos,
+    /// Age up to which a statusword is recent.
+    pub feedback: Nanos,
+}
+
+/// The master's image of one node.
+#[derive(Clone, Debug)]
+pub struct Node {
+    plan: NodePlan,
+    steps: Vec<Step>,
+    patience: Patience,
+    stage: Stage,
+    sdo: SdoClient,
+    nmt: Option<NmtCommand>,
+    power: Power,
+    wished: DriveWish,
+    heard: bool,
+    status: u16,
+    position: Option<i32>,
+    sent_target: i32,
+    tpdo_at: Nanos,
+    heartbeat_at: Nanos,
+    denials: u8,
+    emcy: u16,
+    asked_error: bool,
+}
+
+impl Node {
+    /// A node of which nothing is known.
+    #[must_use]
+    pub fn new(plan: NodePlan, patience: Patience) -> Self {
+        Self {
+            plan,
+            steps: plan.steps(),
+            patience,
+            stage: Stage::Listen { since: Nanos(0), next: Nanos(0), trouble: None },
+            sdo: SdoClient::default(),
+            nmt: None,
+            power: Power::new(patience.step),
+            wished: DriveWish::Disabled,
+            heard: false,
+            status: 0,
+            position: None,
+            sent_target: 0,
+            tpdo_at: Nanos(0),
+            heartbeat_at: Nanos(0),
+            denials: 0,
+            emcy: 0,
+            asked_error: false,
+        }
+    }
+
+    /// True when the node needs SYNC to come up or to work.
+    #[must_use]
+    pub const fn needs_sync(&self) -> bool {
+        matches!(self.stage, Stage::Start { .. } | Stage::Operational { .. })
+    }
+
+    /// Newest position in counts.
+    #[must_use]
+    pub const fn position(&self) -> Option<i32> {
+        self.position
+    }
+
+    /// Newest statusword.
+    #[must_use]
+    pub const fn status(&self) -> u16 {
+        self.status
+    }
+
+    /// The drive warns.
+    #[must_use]
+    pub const fn warns(&self) -> bool {
+        self.status & STATUS_WARNING != 0
+    }
+
+    /// Where the drive is.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        match self.stage {
+            Stage::Listen { .. } if !self.heard => DriveState::Absent,
+            Stage::Listen { .. } | Stage::Reset { .. } | Stage::Configure { .. } | Stage::Start { .. } => {
+                DriveState::Configuring
+            }
+            Stage::Unowned { .. } => DriveState::EnergisedUnowned,
+            Stage::Operational { .. } => self.power.state(self.status),
+            Stage::Gone(_) => DriveState::Fault,
+            Stage::Refused { .. } => DriveState::Refused,
+        }
+    }
+
+    /// The code to report, and the object it concerns (`index << 8 | sub`, or 0).
+    #[must_use]
+    pub fn error(&self) -> (u32, u32) {
+        let emcy = u32::from(self.emcy);
+        let of = |trouble: Option<Trouble>| trouble.map_or(0, Trouble::code);
+        match self.stage {
+            Stage::Listen { trouble, .. } => (of(trouble), 0),
+            Stage::Refused { code, object } => (code, object),
+            Stage::Gone(trouble) => (trouble.code(), 0),
+            Stage::Operational { .. } => {
+                let trouble = of(self.power.trouble());
+                let drive_first = emcy != 0 && (self.in_fault() || trouble == 0);
+                (if drive_first { emcy } else { trouble }, 0)
+            }
+            Stage::Unowned { .. } | Stage::Reset { .. } | Stage::Configure { .. } | Stage::Start { .. } => {
+                (emcy, 0)
+            }
+        }
+    }
+
+    /// This cycle's RPDO, while process data flows.
+    ///
+    /// Real time: arithmetic only.
+    pub fn setpoint(&mut self, cycle: Cycle, target: Target) -> Option<CanFrame> {
+        if !self.needs_sync() {
+            self.power.watch(cycle.wish);
+            return None;
+        }
+        let heard = Heard {
+            status: self.status,
+            fresh: self.age(cycle.now, self.tpdo_at) <= self.patience.feedback.0,
+            command_near: target.near,
+        };
+        let control = if matches!(self.stage, Stage::Operational { .. }) {
+            self.power.control(cycle.now, cycle.wish, heard)
+        } else {
+            self.power.watch(cycle.wish);
+            CONTROL_OFF
+        };
+        // A command that is no number must never become one: the last good target stays.
+        let wanted = if self.power.follows_commands() { target.counts } else { self.position };
+        self.sent_target = wanted.unwrap_or(self.sent_target);
+        Some(encode_rpdo(self.plan.node, control, self.sent_target))
+    }
+
+    /// This cycle's network command and SDO request: at most one of each.
+    ///
+    /// Real time: no allocation, bounded work.
+    pub fn service(&mut self, cycle: Cycle) -> Service {
+        let torque_off = cycle.wish == DriveWish::TorqueOff && self.wished != DriveWish::TorqueOff;
+        self.wished = cycle.wish;
+        if torque_off && !self.needs_sync() {
+            // Without process data the emergency goes by SDO, before whatever was being asked.
+            self.torque_off_by_sdo();
+        }
+        if let Some((job, outcome)) = self.sdo.take() {
+            self.settle(cycle, job, outcome);
+        }
+        self.advance(cycle);
+        let nmt = self.nmt.take().map(|command| Nmt { command, node: self.plan.node });
+        Service { nmt, sdo: self.sdo.poll(cycle.now) }
+    }
+
+    /// Takes process data: statusword and position.
+    ///
+    /// Real time: arithmetic only. True when it was taken: before the mapping is ours its meaning is not known.
+    pub fn take_tpdo(&mut self, now: Nanos, status: u16, position: i32) -> bool {
+        self.heard = true;
+        match self.stage {
+            Stage::Start { .. } => {
+                self.stage = Stage::Operational { farewell: None };
+                self.heartbeat_at = now;
+                self.denials = 0;
+            }
+            Stage::Operational { .. } => {}
+            Stage::Listen { .. }
+            | Stage::Unowned { .. }
+            | Stage::Reset { .. }
+            | Stage::Configure { .. }
+            | Stage::Gone(_)
+            | Stage::Refused { .. } => return false,
+        }
+        if self.in_fault() && DriveStep::from_status(status) != Some(DriveStep::Fault) {
+            (self.emcy, self.asked_error) = (0, false);
+        }
+        (self.status, self.position, self.tpdo_at) = (status, Some(position), now);
+        true
+    }
+
+    /// Takes an SDO answer.
+    ///
+    /// Real time: no allocation.
+    pub fn take_sdo(&mut self, response: SdoResponse) {
+        self.heard = true;
+        self.sdo.accept(response);
+    }
+
+    /// Takes an emergency message.
+    ///
+    /// Real time: arithmetic only.
+    pub fn take_emcy(&mut self, emcy: Emcy) {
+        self.heard = true;
+        self.emcy = emcy.code;
+    }
+
+    /// Takes a heartbeat or boot-up.
+    ///
+    /// Real time: arithmetic only.
+    pub fn take_heartbeat(&mut self, now: Nanos, state: NmtState) {
+        self.heard = true;
+        self.heartbeat_at = now;
+        self.denials = if state == NmtState::Operational { 0 } else { self.denials.saturating_add(1) };
+        match (state, self.stage) {
+            (NmtState::BootUp, Stage::Reset { .. }) => self.stage = Stage::Configure { step: 0, since: now },
+            (NmtState::BootUp, Stage::Operational { .. }) => self.leave(now, Trouble::Restarted),
+            (NmtState::BootUp, Stage::Gone(_)) => {}
+            // It has just started: whatever was asked before is lost, and it can be asked at once.
+            (NmtState::BootUp, _) => self.listen(now, None),
+            // SDO does not work in NMT stopped; pre-operational does not touch the power stage.
+            (NmtState::Stopped, Stage::Listen { .. }) => self.nmt = Some(NmtCommand::PreOperational),
+            (_, Stage::Operational { .. }) if self.denials >= DENIALS_MAX => {
+                self.leave(now, Trouble::LeftOperational);
+            }
+            _ => {}
+        }
+    }
+
+    /// Forgets findings, resets a drive in fault, and tries a refused drive again from the start.
+    ///
+    /// Real time: no allocation.
+    pub fn clear_faults(&mut self, now: Nanos) {
+        self.power.clear(self.status);
+        if !self.in_fault() {
+            self.emcy = 0;
+        }
+        self.asked_error = false;
+        if matches!(self.stage, Stage::Refused { .. }) {
+            self.listen(now, None);
+        }
+    }
+
+    fn in_fault(&self) -> bool {
+        matches!(DriveStep::from_status(self.status), Some(DriveStep::Fault | DriveStep::FaultReaction))
+    }
+
+    fn age(&self, now: Nanos, then: Nanos) -> u64 {
+        now.0.saturating_sub(then.0)
+    }
+
+    /// Back to the start, where nothing is changed before the drive has been looked at.
+    fn listen(&mut self, now: Nanos, trouble: Option<Trouble>) {
+        self.sdo.cancel();
+        self.power = Power::new(self.patience.step);
+        self.power.watch(self.wished);
+        self.emcy = 0;
+        self.stage = Stage::Listen { since: now, next: now, trouble };
+    }
+
+    fn leave(&mut self, now: Nanos, trouble: Trouble) {
+        if self.wished == DriveWish::Disabled {
+            self.listen(now, Some(trouble));
+        } else {
+            self.sdo.cancel();
+            self.stage = Stage::Gone(trouble);
+        }
+    }
+
+    fn torque_off_by_sdo(&mut self) {
+        self.sdo.begin(SdoJob::Write(object::CONTROLWORD, SdoBytes::from_u16(0)));
+    }
+
+    fn refuse(&mut self, code: u32, job: SdoJob) {
+        self.stage = Stage::Refused { code, object: job.address().packed() };
+    }
+
+    /// What the stage does by itself, when no answer is awaited.
+    fn advance(&mut self, cycle: Cycle) {
+        let now = cycle.now;
+        match self.stage {
+            Stage::Listen { next, .. } | Stage::Unowned { next } => {
+                if self.sdo.is_idle() && now >= next {
+                    self.sdo.begin(SdoJob::Read(object::STATUSWORD));
+                }
+            }
+            Stage::Reset { since } => {
+                if self.age(now, since) >= BOOT_UP_TIMEOUT.0 {
+                    self.listen(now, Some(Trouble::NoBootUp));
+                }
+            }
+            Stage::Configure { step, .. } => {
+                if self.sdo.is_idle() {
+                    match self.steps.get(step) {
+                        Some(step) => self.sdo.begin(step.job),
+                        None => self.start(now, 1),
+                    }
+                }
+            }
+            Stage::Start { since, tries } => {
+                if self.age(now, since) >= self.patience.step.0 {
+                    if tries < START_TRIES {
+                        self.start(now, tries + 1);
+                    } else {
+                        self.stage = Stage::Refused { code: Trouble::NotOperational.code(), object: 0 };
+                    }
+                }
+            }
+            Stage::Operational { farewell } => self.supervise(cycle, farewell),
+            Stage::Gone(trouble) => {
+                if cycle.wish == DriveWish::Disabled {
+                    self.listen(now, Some(trouble));
+                }
+            }
+            Stage::Refused { .. } => {}
+        }
+    }
+
+    fn start(&mut self, now: Nanos, tries: u8) {
+        self.nmt = Some(NmtCommand::Start);
+        self.stage = Stage::Start { since: now, tries };
+    }
+
+    fn supervise(&mut self, cycle: Cycle, farewell: Option<Nanos>) {
+        let now = cycle.now;
+        if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
+            // A silent drive may still listen: it keeps its setpoints until the wish is disabled.
+            self.power.note(Trouble::HeartbeatLost);
+            if cycle.wish == DriveWish::Disabled && !self.power.follows_commands() {
+                let since = farewell.unwrap_or(now);
+                self.stage = Stage::Operational { farewell: Some(since) };
+                if self.age(now, since) >= FAREWELL.0 {
+                    self.heard = false;
+                    self.listen(now, Some(Trouble::HeartbeatLost));
+                }
+            }
+        } else if self.in_fault() && self.emcy == 0 && !self.asked_error && self.sdo.is_idle() {
+            // Its emergency message was lost, or came before we listened.
+            self.asked_error = true;
+            self.sdo.begin(SdoJob::Read(object::ERROR_CODE));
+        }
+    }
+
+    /// What an answer means for the stage.
+    fn settle(&mut self, cycle: Cycle, job: SdoJob, outcome: SdoOutcome) {
+        if job.address() == object::CONTROLWORD {
+            // The emergency's own write: the stage asks on, and sees what came of it.
+            return;
+        }
+        match self.stage {
+            Stage::Listen { .. } | Stage::Unowned { .. } => self.settle_look(cycle, job, outcome),
+            Stage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
+            Stage::Operational { .. } => {
+                if let SdoOutcome::Value(value) = outcome
+                    && let Some(Ok(code)) = value.as_unsigned(2).map(u16::try_from)
+                {
+                    self.emcy = code;
+                }
+            }
+            Stage::Reset { .. } | Stage::Start { .. } | Stage::Gone(_) | Stage::Refused { .. } => {}
+        }
+    }
+
+    fn settle_look(&mut self, cycle: Cycle, job: SdoJob, outcome: SdoOutcome) {
+        let now = cycle.now;
+        match outcome {
+            SdoOutcome::Value(value) => match value.as_unsigned(2).map(u16::try_from) {
+                Some(Ok(status)) => self.looked(cycle, status),
+                _ => self.refuse(Trouble::WrongWidth.code(), job),
+            },
+            SdoOutcome::Aborted(code) => self.refuse(code, job),
+            SdoOutcome::TimedOut => {
+                self.heard = false;
+                self.listen(now, Some(Trouble::NoAnswer));
+            }
+            SdoOutcome::Written => {}
+        }
+    }
+
+    fn looked(&mut self, cycle: Cycle, status: u16) {
+        let Cycle { now, wish, other_master } = cycle;
+        self.status = status;
+        let next = Nanos(now.0.saturating_add(LOOK_AGAIN.0));
+        if status & STATUS_ENERGISED != 0 {
+            self.stage = Stage::Unowned { next };
+            if wish == DriveWish::TorqueOff {
+                self.torque_off_by_sdo();
+            }
+            return;
+        }
+        let since = if let Stage::Listen { since, .. } = self.stage { since } else { now };
+        let listened = self.age(now, since) >= LISTEN_LEAST.0;
+        if wish == DriveWish::Disabled && listened && !other_master {
+            self.nmt = Some(NmtCommand::ResetCommunication);
+            self.stage = Stage::Reset { since: now };
+        } else {
+            let trouble = other_master.then_some(Trouble::OtherMaster);
+            self.stage = Stage::Listen { since, next, trouble };
+        }
+    }
+
+    fn settle_step(&mut self, now: Nanos, outcome: SdoOutcome, at: (usize, Nanos)) {
+        let (index, since) = at;
+        let Some(step) = self.steps.get(index).copied() else { return };
+        match outcome {
+            SdoOutcome::Written => self.next_step(now, index),
+            SdoOutcome::Aborted(ABORT_NO_OBJECT | ABORT_NO_SUBINDEX) if step.optional => {
+                self.next_step(now, index);
+            }
+            SdoOutcome::Aborted(code) => self.refuse(code, step.job),
+            SdoOutcome::TimedOut => self.refuse(ABORT_TIMEOUT, step.job),
+            SdoOutcome::Value(value) => match self.judge(now, step, since, value) {
+                Ok(true) => self.next_step(now, index),
+                Ok(false) => {}
+                Err(trouble) => self.refuse(trouble.code(), step.job),
+            },
+        }
+    }
+
+    fn next_step(&mut self, now: Nanos, index: usize) {
+        self.stage = Stage::Configure { step: index + 1, since: now };
+    }
+
+    /// Whether the value lets the plan go on; false asks again, or the stage has changed.
+    fn judge(&mut self, now: Nanos, step: Step, since: Nanos, value: SdoValue) -> Result<bool, Trouble> {
+        let Some(number) = value.as_unsigned(step.width) else { return Err(Trouble::WrongWidth) };
+        match step.check {
+            Check::Present => Ok(true),
+            Check::Profile402 if number & 0xFFFF == u32::from(object::PROFILE_402) => Ok(true),
+            Check::Profile402 => Err(Trouble::NotCia402),
+            Check::OffersCsp if number & object::SUPPORTS_CSP != 0 => Ok(true),
+            Check::OffersCsp => Err(Trouble::NoCsp),
+            Check::NotEnergised => {
+                self.status = (number & 0xFFFF) as u16;
+                if self.status & STATUS_ENERGISED == 0 {
+                    return Ok(true);
+                }
+                self.stage = Stage::Unowned { next: now };
+                Ok(false)
+            }
+            Check::BecomesCsp if number == u32::from(object::MODE_CSP.cast_unsigned()) => Ok(true),
+            Check::BecomesCsp if self.age(now, since) < self.patience.step.0 => Ok(false),
+            Check::BecomesCsp => Err(Trouble::ModeNotTaken),
+            Check::Position => {
+                self.position = Some(number.cast_signed());
+                Ok(true)
+            }
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Bring-up: from a silent node to a configured, and at wish energised, drive.
+//!
+//! State machines without I/O, advanced once a cycle by their protocol's driver.
+pub mod cia402;
+pub mod plan;
+pub mod power;
+pub mod trouble;
+
+pub use cia402::Node;
+pub use trouble::Trouble;

@@ -1,0 +1,163 @@
+//! The configuration of a CSP drive as a list of SDO steps, in the order of can-protocols section 1.5.
+use crate::codec::canopen::{
+    COB_PDO_STEP, COB_RPDO1, COB_TPDO1, MASTER_NODE, PDO_DISABLED, PDO_NO_RTR, PdoEntry,
+};
+use crate::codec::object::{self, Address};
+use crate::codec::sdo::SdoBytes;
+use crate::codec::sdo_client::SdoJob;
+
+/// Period of the heartbeats that drives send, and that this master sends.
+pub const HEARTBEAT_MS: u16 = 100;
+/// Silence after which a node, or the master, counts as lost: three missed heartbeats and some jitter.
+pub const HEARTBEAT_LOST_MS: u16 = 350;
+
+/// Reaction to a lost master: quick stop (object 0x6007).
+const ON_LOST_MASTER_QUICK_STOP: i16 = 3;
+/// Quick stop that ends de-energised (object 0x605A).
+const QUICK_STOP_THEN_OFF: i16 = 2;
+/// Quick stop that ends holding, energised: for joints that would fall.
+const QUICK_STOP_THEN_HOLD: i16 = 6;
+/// Transmission type: every SYNC.
+const EVERY_SYNC: u8 = 1;
+
+/// What a value that was read must satisfy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// Nothing: the answer proves that the object is there.
+    Present,
+    /// The low half is 402.
+    Profile402,
+    /// Bit 7 is set.
+    OffersCsp,
+    /// The drive is not energised.
+    NotEnergised,
+    /// The value is 8; asked again until it is.
+    BecomesCsp,
+    /// It is the position.
+    Position,
+}
+
+/// One step: a transfer and what its answer means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// The transfer.
+    pub job: SdoJob,
+    /// For a read: what the value must satisfy.
+    pub check: Check,
+    /// Width of the object that is read, in bytes.
+    pub width: usize,
+    /// A drive without the object is taken too.
+    pub optional: bool,
+}
+
+/// What one node is configured with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodePlan {
+    /// Node id.
+    pub node: u8,
+    /// Period of SYNC.
+    pub period_us: u32,
+    /// The same as value and power of ten (object 0x60C2).
+    pub interpolation: (u8, i8),
+    /// The joint may lose torque without harm.
+    pub limp_is_safe: bool,
+}
+
+impl NodePlan {
+    /// All steps between boot-up and NMT start.
+    #[must_use]
+    pub fn steps(&self) -> Vec<Step> {
+        let mut steps = Steps(Vec::with_capacity(64));
+        self.identify(&mut steps);
+        self.supervise(&mut steps);
+        steps.pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, &RPDO1_ENTRIES);
+        steps.pdo(object::TPDO_COMMUNICATION, COB_TPDO1, self.node, &TPDO1_ENTRIES);
+        for number in 1..4 {
+            steps.no_pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, number);
+            steps.no_pdo(object::TPDO_COMMUNICATION, COB_TPDO1, self.node, number);
+        }
+        steps.write(object::MODE, SdoBytes::from_i8(object::MODE_CSP));
+        steps.read(object::MODE_DISPLAY, 1, Check::BecomesCsp);
+        // Before the first RPDO the target must already be where the drive stands.
+        steps.read(object::POSITION_ACTUAL, 4, Check::Position);
+        steps.0
+    }
+
+    fn identify(&self, steps: &mut Steps) {
+        steps.read(object::DEVICE_TYPE, 4, Check::Profile402);
+        steps.read(object::VENDOR_ID, 4, Check::Present);
+        steps.read(object::SUPPORTED_MODES, 4, Check::OffersCsp);
+        steps.read(object::STATUSWORD, 2, Check::NotEnergised);
+    }
+
+    fn supervise(&self, steps: &mut Steps) {
+        let quick_stop = if self.limp_is_safe { QUICK_STOP_THEN_OFF } else { QUICK_STOP_THEN_HOLD };
+        let consumer = u32::from(MASTER_NODE) << 16 | u32::from(HEARTBEAT_LOST_MS);
+        steps.write(object::PRODUCER_HEARTBEAT_MS, SdoBytes::from_u16(HEARTBEAT_MS));
+        steps.write(object::CONSUMER_HEARTBEAT, SdoBytes::from_u32(consumer));
+        steps.write(object::ABORT_CONNECTION_OPTION, SdoBytes::from_i16(ON_LOST_MASTER_QUICK_STOP));
+        steps.write(object::INTERPOLATION_VALUE, SdoBytes::from_u8(self.interpolation.0));
+        steps.write(object::INTERPOLATION_EXPONENT, SdoBytes::from_i8(self.interpolation.1));
+        steps.write_optional(object::SYNC_PERIOD_US, SdoBytes::from_u32(self.period_us));
+        steps.write_optional(object::QUICK_STOP_OPTION, SdoBytes::from_i16(quick_stop));
+    }
+}
+
+const RPDO1_ENTRIES: [PdoEntry; 2] =
+    [PdoEntry::new(object::CONTROLWORD, 16), PdoEntry::new(object::TARGET_POSITION, 32)];
+const TPDO1_ENTRIES: [PdoEntry; 2] =
+    [PdoEntry::new(object::STATUSWORD, 16), PdoEntry::new(object::POSITION_ACTUAL, 32)];
+
+struct Steps(Vec<Step>);
+
+impl Steps {
+    fn read(&mut self, address: Address, width: usize, check: Check) {
+        self.0.push(Step { job: SdoJob::Read(address), check, width, optional: false });
+    }
+    fn write(&mut self, address: Address, bytes: SdoBytes) {
+        self.0.push(Step {
+            job: SdoJob::Write(address, bytes),
+            check: Check::Present,
+            width: 0,
+            optional: false,
+        });
+    }
+    fn write_optional(&mut self, address: Address, bytes: SdoBytes) {
+        self.0.push(Step {
+            job: SdoJob::Write(address, bytes),
+            check: Check::Present,
+            width: 0,
+            optional: true,
+        });
+    }
+
+    /// The prescribed order: switch the PDO off, type, empty the mapping, entries, count, switch it on.
+    fn pdo(&mut self, communication: u16, base: u16, node: u8, entries: &[PdoEntry]) {
+        let mapping = communication + (object::RPDO_MAPPING - object::RPDO_COMMUNICATION);
+        let cob_id = cob_id(communication, base, node);
+        let record = Address::new(communication, object::PDO_COB_ID);
+        self.write(record, SdoBytes::from_u32(cob_id | PDO_DISABLED));
+        self.write(Address::new(communication, object::PDO_TYPE), SdoBytes::from_u8(EVERY_SYNC));
+        self.write(Address::new(mapping, 0), SdoBytes::from_u8(0));
+        let mut count = 0;
+        for entry in entries {
+            count += 1;
+            self.write(Address::new(mapping, count), SdoBytes::from_u32(entry.encode()));
+        }
+        self.write(Address::new(mapping, 0), SdoBytes::from_u8(count));
+        self.write(record, SdoBytes::from_u32(cob_id));
+    }
+
+    /// Drives need not have this PDO at all.
+    fn no_pdo(&mut self, communication: u16, base: u16, node: u8, number: u16) {
+        let cob_id = cob_id(communication, base + number * COB_PDO_STEP, node);
+        let record = Address::new(communication + number, object::PDO_COB_ID);
+        self.write_optional(record, SdoBytes::from_u32(cob_id | PDO_DISABLED));
+    }
+}
+
+/// Remote requests are switched off for TPDOs; the bit is reserved in RPDOs.
+fn cob_id(communication: u16, base: u16, node: u8) -> u32 {
+    let cob_id = u32::from(base) + u32::from(node);
+    if communication >= object::TPDO_COMMUNICATION { cob_id | PDO_NO_RTR } else { cob_id }
+}

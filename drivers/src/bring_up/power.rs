@@ -1,0 +1,277 @@
+//! Energising and de-energising one operational drive: which controlword is right for which statusword.
+//!
+//! Everything follows from the newest statusword and the wish; the enable command is sent only to a drive whose own
+//! last word was "switched on" or "operation enabled". Enabling begins only on the change of the wish from disabled
+//! to enabled: a drive that drops out by itself is never energised again by a wish that merely stays.
+use crate::bring_up::trouble::Trouble;
+use crate::codec::cia402_words::{
+    CONTROL_ENABLE, CONTROL_FAULT_RESET, CONTROL_OFF, CONTROL_QUICK_STOP, CONTROL_SHUTDOWN,
+    CONTROL_SWITCH_ON, DriveStep, STATUS_FOLLOWS,
+};
+use crate::servo::{DriveState, DriveWish, Nanos};
+
+/// Cycles for which 0 is sent before the rising edge of fault reset, so that a latched RPDO has surely passed.
+const RESET_LOW_CYCLES: u8 = 3;
+/// Cycles in a row without "follows the target" that make a trouble.
+const NOT_FOLLOWING_MAX: u8 = 3;
+
+/// What the drive last said, and when it may be trusted.
+#[derive(Clone, Copy, Debug)]
+pub struct Heard {
+    /// Newest statusword.
+    pub status: u16,
+    /// The statusword is recent.
+    pub fresh: bool,
+    /// The command is close enough to the measured position to energise.
+    pub command_near: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Not to be energised.
+    Off,
+    /// Climbing; since when at this rung.
+    Enabling { since: Nanos, rung: u8 },
+    /// Energised, following.
+    On,
+    /// Stepping down; since when at this rung.
+    Disabling { since: Nanos, rung: u8 },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reset {
+    Idle,
+    /// Sending 0 before the edge.
+    Low(u8),
+    /// Sending the edge until the fault is gone.
+    High {
+        since: Nanos,
+    },
+}
+
+/// The power state machine of one drive.
+#[derive(Clone, Debug)]
+pub struct Power {
+    phase: Phase,
+    reset: Reset,
+    wished: DriveWish,
+    trouble: Option<Trouble>,
+    not_following: u8,
+    step_timeout: Nanos,
+}
+
+/// How far towards operation enabled a state is.
+fn rung(step: Option<DriveStep>) -> u8 {
+    match step {
+        Some(DriveStep::ReadyToSwitchOn) => 1,
+        Some(DriveStep::SwitchedOn) => 2,
+        Some(DriveStep::OperationEnabled) => 3,
+        _ => 0,
+    }
+}
+
+impl Power {
+    /// De-energised; `step_timeout` bounds each confirmation.
+    #[must_use]
+    pub const fn new(step_timeout: Nanos) -> Self {
+        Self {
+            phase: Phase::Off,
+            reset: Reset::Idle,
+            wished: DriveWish::TorqueOff,
+            trouble: None,
+            not_following: 0,
+            step_timeout,
+        }
+    }
+
+    /// What the master found, until [`Self::clear`].
+    #[must_use]
+    pub const fn trouble(&self) -> Option<Trouble> {
+        self.trouble
+    }
+
+    /// True while targets are the commands, and not the measured position.
+    #[must_use]
+    pub fn follows_commands(&self) -> bool {
+        self.phase != Phase::Off
+    }
+
+    /// Keeps up with the wish while the drive is not operational, so that an old change does not energise it later.
+    pub fn watch(&mut self, wish: DriveWish) {
+        self.wished = wish;
+    }
+
+    /// Takes a trouble found elsewhere (heartbeat); the first one stays.
+    pub fn note(&mut self, trouble: Trouble) {
+        self.trouble.get_or_insert(trouble);
+    }
+
+    /// Forgets the trouble and, when the drive is in fault, starts the reset sequence.
+    pub fn clear(&mut self, status: u16) {
+        self.trouble = None;
+        self.not_following = 0;
+        if DriveStep::from_status(status) == Some(DriveStep::Fault) {
+            self.reset = Reset::Low(RESET_LOW_CYCLES);
+        }
+    }
+
+    /// The controlword for this cycle.
+    ///
+    /// Real time: arithmetic only.
+    pub fn control(&mut self, now: Nanos, wish: DriveWish, heard: Heard) -> u16 {
+        let before = self.wished;
+        self.wished = wish;
+        let step = DriveStep::from_status(heard.status);
+        if wish == DriveWish::TorqueOff {
+            self.phase = Phase::Off;
+            if before != DriveWish::TorqueOff {
+                self.reset = Reset::Idle;
+                return CONTROL_OFF;
+            }
+        }
+        if wish == DriveWish::Enabled && before == DriveWish::Disabled {
+            self.try_enable(now, step);
+        }
+        self.advance(now, wish, step, heard);
+        match self.phase {
+            Phase::Off => self.control_off(now, wish, step),
+            Phase::Enabling { .. } | Phase::On => Self::control_up(step, heard),
+            Phase::Disabling { .. } => Self::control_down(step),
+        }
+    }
+
+    /// How the drive looks from outside.
+    #[must_use]
+    pub fn state(&self, status: u16) -> DriveState {
+        let step = DriveStep::from_status(status);
+        let faulty = matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction));
+        let trouble = self.trouble.is_some_and(|trouble| trouble != Trouble::DroppedOut);
+        match self.phase {
+            _ if faulty || trouble => DriveState::Fault,
+            Phase::Enabling { .. } => DriveState::Enabling,
+            Phase::On => DriveState::Enabled,
+            Phase::Disabling { .. } => DriveState::Disabling,
+            // A quick stop that holds is energised, though nobody asked for it.
+            Phase::Off if step == Some(DriveStep::QuickStopActive) => DriveState::Fault,
+            Phase::Off if step == Some(DriveStep::OperationEnabled) => DriveState::Disabling,
+            Phase::Off => DriveState::Disabled,
+        }
+    }
+
+    fn try_enable(&mut self, now: Nanos, step: Option<DriveStep>) {
+        let ready = matches!(
+            step,
+            Some(DriveStep::SwitchOnDisabled | DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn)
+        );
+        let untroubled = matches!(self.trouble, None | Some(Trouble::DroppedOut));
+        if self.phase == Phase::Off && self.reset == Reset::Idle && ready && untroubled {
+            self.trouble = None;
+            self.not_following = 0;
+            self.phase = Phase::Enabling { since: now, rung: rung(step) };
+        }
+    }
+
+    fn advance(&mut self, now: Nanos, wish: DriveWish, step: Option<DriveStep>, heard: Heard) {
+        if wish == DriveWish::Disabled && matches!(self.phase, Phase::Enabling { .. } | Phase::On) {
+            self.phase = Phase::Disabling { since: now, rung: rung(step) };
+        }
+        match self.phase {
+            Phase::Off => {}
+            Phase::Enabling { since, rung: reached } => self.advance_up(now, step, heard, (since, reached)),
+            Phase::On => self.advance_on(step, heard),
+            Phase::Disabling { since, rung: reached } => {
+                let at = rung(step);
+                if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
+                    // Reached, in fault, or it does not listen to the gentle way: voltage off.
+                    self.phase = Phase::Off;
+                } else if at < reached {
+                    self.phase = Phase::Disabling { since: now, rung: at };
+                }
+            }
+        }
+    }
+
+    fn advance_up(&mut self, now: Nanos, step: Option<DriveStep>, heard: Heard, at: (Nanos, u8)) {
+        let (since, reached) = at;
+        let rung = rung(step);
+        if rung < reached || matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction)) {
+            self.drop_out(step);
+        } else if step == Some(DriveStep::SwitchedOn) && heard.fresh && !heard.command_near {
+            self.note(Trouble::CommandFar);
+            self.phase = Phase::Off;
+        } else if rung == 3 && heard.status & STATUS_FOLLOWS != 0 {
+            self.phase = Phase::On;
+        } else if rung > reached {
+            self.phase = Phase::Enabling { since: now, rung };
+        } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
+            self.note(Trouble::EnableTimeout);
+            self.phase = Phase::Off;
+        }
+    }
+
+    fn advance_on(&mut self, step: Option<DriveStep>, heard: Heard) {
+        if step != Some(DriveStep::OperationEnabled) {
+            self.drop_out(step);
+        } else if heard.status & STATUS_FOLLOWS != 0 {
+            self.not_following = 0;
+        } else {
+            self.not_following = self.not_following.saturating_add(1);
+            if self.not_following >= NOT_FOLLOWING_MAX {
+                // It stays energised: letting go of a drive that still holds would be worse.
+                self.note(Trouble::NotFollowing);
+            }
+        }
+    }
+
+    fn drop_out(&mut self, step: Option<DriveStep>) {
+        self.phase = Phase::Off;
+        match step {
+            Some(DriveStep::QuickStopActive) => self.note(Trouble::QuickStopped),
+            // The drive says what it has; its emergency code tells more than we could.
+            Some(DriveStep::Fault | DriveStep::FaultReaction) => {}
+            _ => self.note(Trouble::DroppedOut),
+        }
+    }
+
+    fn control_off(&mut self, now: Nanos, wish: DriveWish, step: Option<DriveStep>) -> u16 {
+        match self.reset {
+            Reset::Low(0) => self.reset = Reset::High { since: now },
+            Reset::Low(left) => self.reset = Reset::Low(left - 1),
+            Reset::High { since } => {
+                let late = now.0.saturating_sub(since.0) >= self.step_timeout.0;
+                if late || step != Some(DriveStep::Fault) {
+                    self.reset = Reset::Idle;
+                }
+            }
+            Reset::Idle => {}
+        }
+        if matches!(self.reset, Reset::High { .. }) {
+            CONTROL_FAULT_RESET
+        } else if step == Some(DriveStep::QuickStopActive) && wish == DriveWish::Enabled {
+            // It may be holding a load: keep it in quick stop until the wish says otherwise.
+            CONTROL_QUICK_STOP
+        } else {
+            CONTROL_OFF
+        }
+    }
+
+    fn control_up(step: Option<DriveStep>, heard: Heard) -> u16 {
+        match step {
+            Some(DriveStep::SwitchOnDisabled) => CONTROL_SHUTDOWN,
+            // The step into torque needs a recent word of the drive; staying in it does not: a silent drive that
+            // still listens must be able to follow the arm to rest.
+            Some(DriveStep::SwitchedOn) if heard.fresh => CONTROL_ENABLE,
+            Some(DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn) => CONTROL_SWITCH_ON,
+            Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,
+            _ => CONTROL_OFF,
+        }
+    }
+
+    fn control_down(step: Option<DriveStep>) -> u16 {
+        match step {
+            Some(DriveStep::OperationEnabled) => CONTROL_SWITCH_ON,
+            Some(DriveStep::SwitchedOn) => CONTROL_SHUTDOWN,
+            _ => CONTROL_OFF,
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! What the master itself finds wrong with a node, beside what the node reports.
+//!
+//! [`crate::ServoStatus::error_code`] holds three kinds of codes that do not overlap: emergency codes (up to 0xFFFF),
+//! these (0x1 0000 to 0x1 FFFF), and SDO abort codes (from 0x503 0000).
+use crate::codec::words;
+
+/// A finding of the master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Trouble {
+    /// Three requests were not answered while listening.
+    NoAnswer = 0x0001_0001,
+    /// No boot-up message after the communication reset.
+    NoBootUp = 0x0001_0002,
+    /// Its heartbeat stopped.
+    HeartbeatLost = 0x0001_0003,
+    /// It restarted while it was in use.
+    Restarted = 0x0001_0004,
+    /// It left NMT operational while it was in use.
+    LeftOperational = 0x0001_0005,
+    /// It did not become operational after NMT start.
+    NotOperational = 0x0001_0006,
+    /// Object 0x1000 does not name profile 402.
+    NotCia402 = 0x0001_0007,
+    /// Object 0x6502 does not offer cyclic synchronous position.
+    NoCsp = 0x0001_0008,
+    /// Object 0x6061 did not become 8.
+    ModeNotTaken = 0x0001_0009,
+    /// A step towards operation enabled was not confirmed in time.
+    EnableTimeout = 0x0001_000A,
+    /// The command lay too far from the measured position to energise the drive.
+    CommandFar = 0x0001_000B,
+    /// It left operation enabled by itself.
+    DroppedOut = 0x0001_000C,
+    /// It stopped by quick stop by itself.
+    QuickStopped = 0x0001_000D,
+    /// It is energised but says that it does not follow the target.
+    NotFollowing = 0x0001_000E,
+    /// A value that it sent has another width than the object.
+    WrongWidth = 0x0001_000F,
+    /// Another master sends SYNC on the bus.
+    OtherMaster = 0x0001_0010,
+}
+
+impl Trouble {
+    const ALL: [Self; 16] = [
+        Self::NoAnswer,
+        Self::NoBootUp,
+        Self::HeartbeatLost,
+        Self::Restarted,
+        Self::LeftOperational,
+        Self::NotOperational,
+        Self::NotCia402,
+        Self::NoCsp,
+        Self::ModeNotTaken,
+        Self::EnableTimeout,
+        Self::CommandFar,
+        Self::DroppedOut,
+        Self::QuickStopped,
+        Self::NotFollowing,
+        Self::WrongWidth,
+        Self::OtherMaster,
+    ];
+
+    /// As [`crate::ServoStatus::error_code`].
+    #[must_use]
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// What happened and what to do.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::NoAnswer => {
+                "the drive does not answer; check its power, the wiring, the bit rate and its node id (a drive in \
+                 NMT stopped that sends no heartbeat needs a power cycle)"
+            }
+            Self::NoBootUp => "no boot-up message within 5 s of the communication reset; trying again",
+            Self::HeartbeatLost => "the drive's heartbeat stopped; check its power and the wiring",
+            Self::Restarted => "the drive restarted by itself; check its supply",
+            Self::LeftOperational => "the drive left NMT operational by itself",
+            Self::NotOperational => "the drive did not become operational after NMT start",
+            Self::NotCia402 => "the device is no CiA 402 drive (object 0x1000); check the node id",
+            Self::NoCsp => "the drive does not offer cyclic synchronous position (object 0x6502, bit 7)",
+            Self::ModeNotTaken => "the drive did not take mode 8 (object 0x6061)",
+            Self::EnableTimeout => {
+                "the drive did not confirm a step of enabling in time; check its motor supply and its enable input"
+            }
+            Self::CommandFar => "not energised: the command lies too far from the measured position",
+            Self::DroppedOut => "the drive left operation enabled by itself; check its safe torque off input",
+            Self::QuickStopped => "the drive stopped by quick stop by itself",
+            Self::NotFollowing => "the drive is energised but does not follow the target (statusword bit 12)",
+            Self::WrongWidth => "the drive sent a value of another width than the object has",
+            Self::OtherMaster => "another master sends SYNC on this bus; end it first",
+        }
+    }
+}
+
+/// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.
+#[must_use]
+pub fn explain(code: u32) -> String {
+    if let Some(trouble) = Trouble::ALL.into_iter().find(|trouble| trouble.code() == code) {
+        return trouble.sentence().to_owned();
+    }
+    match u16::try_from(code) {
+        Ok(emcy) => format!("0x{emcy:04X} {}", words::emcy(emcy)),
+        Err(_) => format!("SDO abort 0x{code:08X} {}", words::sdo_abort(code)),
+    }
+}

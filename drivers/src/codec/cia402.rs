@@ -1,0 +1,305 @@
+//! The driver of CiA 402 drives in cyclic synchronous position on one bus.
+//!
+//! One cycle on the bus: SYNC, which makes the drives apply the setpoints of the cycle before and sample their
+//! position; the new setpoints; then, one frame a node at most, configuration. So a command acts one period after it
+//! was sent, and a position is one period old when it is seen.
+use crate::bring_up::cia402::{Cycle, Node, Patience, Target};
+use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan};
+use crate::bring_up::trouble;
+use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, sync};
+use crate::codec::sdo::SdoResponse;
+use crate::frame::{CanFrame, FrameBatch};
+use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};
+use taustream_arm::settings::Protocol;
+use taustream_arm::{Servo, Settings};
+use taustream_motion::MAX_JOINTS;
+
+pub use crate::codec::cia402_words::{
+    DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo, rad_from_counts,
+};
+
+/// Silence of other masters after which the bus counts as ours.
+const OTHER_MASTER_QUIET: Nanos = Nanos(500_000_000);
+/// A longer gap between two cycles is our own stall and does not count as waiting.
+const PATIENT_STEP_PERIODS: u64 = 10;
+
+/// Why a driver cannot be made from settings.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Cia402Error {
+    /// There is no such bus.
+    #[error("bus {bus} was asked for, but the settings have {buses}")]
+    NoSuchBus {
+        /// Index asked for.
+        bus: usize,
+        /// How many there are.
+        buses: usize,
+    },
+    /// More joints than an arm may have, or a joint index beyond it.
+    #[error("joint {joint} of the servos is beyond the {MAX_JOINTS} joints that an arm may have")]
+    JointBeyond {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// A node id that no drive may have.
+    #[error(
+        "joint {joint} has node id {node_id}; drives on a CANopen bus have 1 to 126 (127 is this master): give the \
+         drive another id"
+    )]
+    NodeId {
+        /// Index of the joint.
+        joint: usize,
+        /// Its node id.
+        node_id: u8,
+    },
+    /// Two joints on one node.
+    #[error("joint {joint} has node id {node_id} like joint {other}; give one of the drives another id")]
+    NodeTwice {
+        /// Index of the joint.
+        joint: usize,
+        /// Index of the other joint.
+        other: usize,
+        /// The node id.
+        node_id: u8,
+    },
+    /// The period cannot be stated in object 0x60C2.
+    #[error(
+        "a cycle of {period_us} us cannot be told to a CiA 402 drive (object 0x60C2 takes 1 to 255 times a power of \
+         ten); choose 500, 1000, 2000 or 4000"
+    )]
+    Period {
+        /// The period.
+        period_us: u32,
+    },
+    /// A time or distance of the settings is not usable.
+    #[error("supervision.{key} = {value}: expected a positive number")]
+    Supervision {
+        /// Its key.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// One drive: its servo description, node and newest feedback.
+#[derive(Clone, Debug)]
+struct Drive {
+    servo: Servo,
+    node: Node,
+    received: Option<Nanos>,
+}
+
+/// The master of all CiA 402 drives of one bus.
+#[derive(Clone, Debug)]
+pub struct Cia402Driver {
+    drives: Vec<Drive>,
+    joints: Vec<usize>,
+    /// Node id to index of drive.
+    by_node: [Option<usize>; NODE_MAX as usize + 1],
+    near_rad: f64,
+    patient_step: Nanos,
+    /// Advances with the cycles, but not through our own stalls.
+    patient: Nanos,
+    encoded_at: Option<Nanos>,
+    heartbeat_at: Option<Nanos>,
+    other_master_at: Option<Nanos>,
+}
+
+impl Cia402Driver {
+    /// A driver for the CiA 402 servos of `settings.buses[bus]`; it may have none.
+    ///
+    /// # Errors
+    /// When the settings cannot be told to CANopen drives.
+    pub fn new(settings: &Settings, bus: usize) -> Result<Self, Cia402Error> {
+        if bus >= settings.buses.len() {
+            return Err(Cia402Error::NoSuchBus { bus, buses: settings.buses.len() });
+        }
+        let period_us = settings.cycle.period_us;
+        let interpolation = crate::codec::cia402_words::interpolation_period(period_us)
+            .ok_or(Cia402Error::Period { period_us })?;
+        let supervision = &settings.supervision;
+        let patience = Patience {
+            step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
+            feedback: nanos("feedback_age_s_max", supervision.feedback_age_s_max)?,
+        };
+        nanos("tracking_error_rad_max", supervision.tracking_error_rad_max)?;
+        let mut driver = Self {
+            drives: Vec::new(),
+            joints: Vec::new(),
+            by_node: [None; NODE_MAX as usize + 1],
+            near_rad: supervision.tracking_error_rad_max,
+            patient_step: Nanos(u64::from(period_us) * 1_000 * PATIENT_STEP_PERIODS),
+            patient: Nanos(0),
+            encoded_at: None,
+            heartbeat_at: None,
+            other_master_at: None,
+        };
+        for servo in settings.servos.iter().filter(|s| s.bus == bus && s.protocol == Protocol::Cia402) {
+            let limp_is_safe = servo.limp_is_safe;
+            let plan = NodePlan { node: servo.node_id, period_us, interpolation, limp_is_safe };
+            driver.add(servo, Node::new(plan, patience))?;
+        }
+        Ok(driver)
+    }
+
+    fn add(&mut self, servo: &Servo, node: Node) -> Result<(), Cia402Error> {
+        let (joint, node_id) = (servo.joint, servo.node_id);
+        if joint >= MAX_JOINTS || self.drives.len() >= MAX_JOINTS {
+            return Err(Cia402Error::JointBeyond { joint });
+        }
+        let slot = match self.by_node.get_mut(usize::from(node_id)) {
+            Some(slot) if node_id != 0 && node_id != MASTER_NODE => slot,
+            _ => return Err(Cia402Error::NodeId { joint, node_id }),
+        };
+        if let Some(other) = slot.and_then(|index| self.joints.get(index).copied()) {
+            return Err(Cia402Error::NodeTwice { joint, other, node_id });
+        }
+        *slot = Some(self.drives.len());
+        self.drives.push(Drive { servo: servo.clone(), node, received: None });
+        self.joints.push(joint);
+        Ok(())
+    }
+
+    fn drive_mut(&mut self, node: u8) -> Option<&mut Drive> {
+        let index = (*self.by_node.get(usize::from(node))?)?;
+        self.drives.get_mut(index)
+    }
+
+    fn tick(&mut self, now: Nanos) {
+        let passed = self.encoded_at.map_or(0, |then| now.0.saturating_sub(then.0));
+        self.patient = Nanos(self.patient.0.saturating_add(passed.min(self.patient_step.0)));
+        self.encoded_at = Some(now);
+    }
+
+    /// Drives watch for this (object 0x1016) and stop by themselves when it ends.
+    fn push_heartbeat(&mut self, now: Nanos, out: &mut FrameBatch) {
+        let due = self
+            .heartbeat_at
+            .is_none_or(|then| now.0.saturating_sub(then.0) >= u64::from(HEARTBEAT_MS) * 1_000_000);
+        if due && out.push(NmtState::Operational.encode(MASTER_NODE)) {
+            self.heartbeat_at = Some(now);
+        }
+    }
+}
+
+/// A positive time of the settings in nanoseconds.
+fn nanos(key: &'static str, value: f64) -> Result<Nanos, Cia402Error> {
+    if !value.is_finite() || value <= 0.0 {
+        return Err(Cia402Error::Supervision { key, value });
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; saturation is fine"
+    )]
+    let nanos = (value * 1e9) as u64;
+    Ok(Nanos(nanos))
+}
+
+impl ServoDriver for Cia402Driver {
+    fn encode(
+        &mut self,
+        now: Nanos,
+        wish: DriveWish,
+        commands: &[JointCommand; MAX_JOINTS],
+        out: &mut FrameBatch,
+    ) {
+        self.tick(now);
+        let patient = self.patient;
+        let other_master =
+            self.other_master_at.is_some_and(|at| patient.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0);
+        let cycle = Cycle { now: patient, wish, other_master };
+        if self.drives.iter().any(|drive| drive.node.needs_sync()) {
+            out.push(sync());
+        }
+        let near_rad = self.near_rad;
+        for drive in &mut self.drives {
+            let target = drive.target(commands, near_rad);
+            if let Some(frame) = drive.node.setpoint(cycle, target) {
+                out.push(frame);
+            }
+        }
+        for drive in &mut self.drives {
+            let service = drive.node.service(cycle);
+            if let Some(nmt) = service.nmt {
+                out.push(nmt.encode());
+            }
+            if let Some(request) = service.sdo {
+                out.push(request.encode(drive.servo.node_id));
+            }
+        }
+        self.push_heartbeat(now, out);
+    }
+
+    fn decode(&mut self, now: Nanos, frame: &CanFrame) {
+        let patient = self.patient;
+        if decode_sync(frame).is_some() {
+            self.other_master_at = Some(patient);
+        } else if let Some((node, status, position)) = decode_tpdo(frame) {
+            if let Some(drive) = self.drive_mut(node)
+                && drive.node.take_tpdo(patient, status, position)
+            {
+                drive.received = Some(now);
+            }
+        } else if let Some((node, response)) = SdoResponse::decode(frame) {
+            if let Some(drive) = self.drive_mut(node) {
+                drive.node.take_sdo(response);
+            }
+        } else if let Some((node, emcy)) = Emcy::decode(frame) {
+            if let Some(drive) = self.drive_mut(node) {
+                drive.node.take_emcy(emcy);
+            }
+        } else if let Some((node, state)) = NmtState::decode(frame)
+            && let Some(drive) = self.drive_mut(node)
+        {
+            drive.node.take_heartbeat(patient, state);
+        }
+    }
+
+    fn joints(&self) -> &[usize] {
+        &self.joints
+    }
+
+    fn status(&self, joint: usize) -> ServoStatus {
+        let Some(drive) = self.drives.iter().find(|drive| drive.servo.joint == joint) else {
+            return ServoStatus::UNKNOWN;
+        };
+        let node = &drive.node;
+        let (error_code, refused_object) = node.error();
+        ServoStatus {
+            state: node.state(),
+            // The position read while configuring is no feedback yet: nothing would tell its age.
+            position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
+            velocity_rad_s: f64::NAN,
+            received: drive.received,
+            status_word: u32::from(node.status()),
+            error_code,
+            refused_object,
+            warning: node.warns(),
+        }
+    }
+
+    fn clear_faults(&mut self) {
+        let patient = self.patient;
+        for drive in &mut self.drives {
+            drive.node.clear_faults(patient);
+        }
+    }
+
+    fn explain(&self, error_code: u32) -> String {
+        trouble::explain(error_code)
+    }
+}
+
+impl Drive {
+    fn position_rad(&self) -> f64 {
+        self.node.position().map_or(f64::NAN, |counts| rad_from_counts(&self.servo, counts))
+    }
+
+    fn target(&self, commands: &[JointCommand; MAX_JOINTS], near_rad: f64) -> Target {
+        let position_rad = commands.get(self.servo.joint).map_or(f64::NAN, |command| command.position_rad);
+        let counts = position_rad.is_finite().then(|| counts_from_rad(&self.servo, position_rad));
+        // False for a position that is not known.
+        let near = (position_rad - self.position_rad()).abs() <= near_rad;
+        Target { counts, near }
+    }
+}

@@ -1,0 +1,252 @@
+//! The client side of SDO for one node: one transfer at a time, with time-out, repetition and segmented reads.
+//!
+//! The client is advanced once a cycle and gives at most one frame a cycle. Nothing that a CSP bring-up writes is
+//! longer than four bytes, so writes are expedited; reads take whatever way the drive chooses.
+//! Source: CiA 301 section 7.2.4.
+use crate::codec::object::Address;
+use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
+use crate::codec::words::{ABORT_COMMAND, ABORT_TIMEOUT, ABORT_TOGGLE, ABORT_TOO_LONG};
+use crate::servo::Nanos;
+
+/// How long one answer may take (can-protocols 1.2).
+pub const SDO_TIMEOUT: Nanos = Nanos(500_000_000);
+/// How often a request is sent before the client gives up.
+pub const SDO_TRIES: u8 = 3;
+/// Longest value that a segmented read takes.
+pub const SDO_VALUE_MAX: usize = 64;
+
+/// What is to be done with an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SdoJob {
+    /// Read it.
+    Read(Address),
+    /// Write it.
+    Write(Address, SdoBytes),
+}
+
+impl SdoJob {
+    /// The object.
+    #[must_use]
+    pub const fn address(self) -> Address {
+        match self {
+            Self::Read(address) | Self::Write(address, _) => address,
+        }
+    }
+    fn request(self) -> SdoRequest {
+        match self {
+            Self::Read(address) => SdoRequest::Read(address),
+            Self::Write(address, bytes) => SdoRequest::Write(address, bytes),
+        }
+    }
+}
+
+/// A value that was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SdoValue {
+    bytes: [u8; SDO_VALUE_MAX],
+    len: usize,
+    sized: bool,
+}
+
+impl SdoValue {
+    const EMPTY: Self = Self { bytes: [0; SDO_VALUE_MAX], len: 0, sized: true };
+
+    /// The bytes, least significant first.
+    #[must_use]
+    pub fn as_slice(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&self.bytes)
+    }
+    /// The value of an unsigned object of `width` bytes; `None` when the drive sent another width.
+    ///
+    /// A drive that does not state the size sends four bytes, of which the first `width` count.
+    #[must_use]
+    pub fn as_unsigned(&self, width: usize) -> Option<u32> {
+        let fits = if self.sized { self.len == width } else { self.len >= width };
+        if !fits || width > 4 {
+            return None;
+        }
+        let mut number = [0; 4];
+        for (slot, byte) in number.iter_mut().zip(self.as_slice().iter().take(width)) {
+            *slot = *byte;
+        }
+        Some(u32::from_le_bytes(number))
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> bool {
+        let Some(room) = self.bytes.get_mut(self.len..self.len + bytes.len()) else { return false };
+        room.copy_from_slice(bytes);
+        self.len += bytes.len();
+        true
+    }
+}
+
+/// How a transfer ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SdoOutcome {
+    /// The object was read.
+    Value(SdoValue),
+    /// The object was written.
+    Written,
+    /// The drive, or this client, aborted; [`crate::codec::words::sdo_abort`] has the sentence.
+    Aborted(u32),
+    /// No answer to any try.
+    TimedOut,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Turn {
+    /// A frame is to be sent.
+    Ours(SdoRequest),
+    /// An answer is awaited.
+    Theirs {
+        since: Nanos,
+    },
+    /// Nothing is left to do but to tell the outcome, after this frame.
+    Closing(SdoRequest, SdoOutcome),
+    Done(SdoOutcome),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Transfer {
+    job: SdoJob,
+    turn: Turn,
+    tries: u8,
+    /// In a segmented read: the toggle of the segment that is asked for.
+    toggle: Option<bool>,
+    value: SdoValue,
+}
+
+/// The client's state for one node.
+#[derive(Clone, Debug, Default)]
+pub struct SdoClient {
+    transfer: Option<Transfer>,
+}
+
+impl SdoClient {
+    /// True when no transfer is open.
+    #[must_use]
+    pub const fn is_idle(&self) -> bool {
+        self.transfer.is_none()
+    }
+
+    /// Opens a transfer in place of any that is open: an emergency must not queue behind a read.
+    ///
+    /// Answers to the replaced one name another object and are ignored.
+    /// Real time: no allocation.
+    pub fn begin(&mut self, job: SdoJob) {
+        let turn = Turn::Ours(job.request());
+        self.transfer = Some(Transfer { job, turn, tries: 0, toggle: None, value: SdoValue::EMPTY });
+    }
+
+    /// Forgets the open transfer.
+    pub fn cancel(&mut self) {
+        self.transfer = None;
+    }
+
+    /// The frame to send in this cycle, if any.
+    ///
+    /// Real time: no allocation.
+    pub fn poll(&mut self, now: Nanos) -> Option<SdoRequest> {
+        let transfer = self.transfer.as_mut()?;
+        if let Turn::Theirs { since } = transfer.turn
+            && now.0.saturating_sub(since.0) >= SDO_TIMEOUT.0
+        {
+            transfer.late();
+        }
+        match transfer.turn {
+            Turn::Ours(request) => {
+                // Only initiating requests count as tries: a long value has many segments.
+                transfer.tries += u8::from(transfer.toggle.is_none());
+                transfer.turn = Turn::Theirs { since: now };
+                Some(request)
+            }
+            Turn::Closing(request, outcome) => {
+                transfer.turn = Turn::Done(outcome);
+                Some(request)
+            }
+            Turn::Theirs { .. } | Turn::Done(_) => None,
+        }
+    }
+
+    /// Takes an answer of the node. Answers that do not fit the open transfer change nothing.
+    ///
+    /// Real time: no allocation.
+    pub fn accept(&mut self, response: SdoResponse) {
+        if let Some(transfer) = self.transfer.as_mut()
+            && matches!(transfer.turn, Turn::Theirs { .. })
+        {
+            transfer.accept(response);
+        }
+    }
+
+    /// The outcome, once, with its job; the client is idle afterwards.
+    pub fn take(&mut self) -> Option<(SdoJob, SdoOutcome)> {
+        let Some(Transfer { job, turn: Turn::Done(outcome), .. }) = self.transfer else { return None };
+        self.transfer = None;
+        Some((job, outcome))
+    }
+}
+
+impl Transfer {
+    /// A repetition starts from the beginning: which segment was lost cannot be known.
+    fn late(&mut self) {
+        if self.tries < SDO_TRIES {
+            self.toggle = None;
+            self.value = SdoValue::EMPTY;
+            self.turn = Turn::Ours(self.job.request());
+        } else {
+            let abort = SdoRequest::Abort(self.job.address(), ABORT_TIMEOUT);
+            self.turn = Turn::Closing(abort, SdoOutcome::TimedOut);
+        }
+    }
+
+    fn accept(&mut self, response: SdoResponse) {
+        let wanted = self.job.address();
+        match (response, self.job, self.toggle) {
+            (SdoResponse::Abort(address, code), _, _) if address == wanted => {
+                self.turn = Turn::Done(SdoOutcome::Aborted(code));
+            }
+            (SdoResponse::Written(address), SdoJob::Write(..), _) if address == wanted => {
+                self.turn = Turn::Done(SdoOutcome::Written);
+            }
+            (SdoResponse::Value(address, bytes), SdoJob::Read(_), None) if address == wanted => {
+                self.value = SdoValue { sized: bytes.is_sized(), ..SdoValue::EMPTY };
+                self.value.append(bytes.as_slice());
+                self.turn = Turn::Done(SdoOutcome::Value(self.value));
+            }
+            (SdoResponse::ValueSegmented(address, size), SdoJob::Read(_), None) if address == wanted => {
+                if size.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > SDO_VALUE_MAX)) {
+                    self.give_up(ABORT_TOO_LONG);
+                } else {
+                    self.ask_segment(false);
+                }
+            }
+            (SdoResponse::Segment { toggle, bytes, last }, SdoJob::Read(_), Some(asked)) => {
+                if toggle != asked {
+                    self.give_up(ABORT_TOGGLE);
+                } else if !self.value.append(bytes.as_slice()) {
+                    self.give_up(ABORT_TOO_LONG);
+                } else if last {
+                    self.turn = Turn::Done(SdoOutcome::Value(self.value));
+                } else if bytes.as_slice().is_empty() {
+                    // An empty segment that is not the last would let a drive keep us for ever.
+                    self.give_up(ABORT_COMMAND);
+                } else {
+                    self.ask_segment(!asked);
+                }
+            }
+            // Answers to a replaced or repeated request, and to nothing we asked.
+            _ => {}
+        }
+    }
+
+    fn ask_segment(&mut self, toggle: bool) {
+        self.toggle = Some(toggle);
+        self.turn = Turn::Ours(SdoRequest::ReadSegment { toggle });
+    }
+
+    fn give_up(&mut self, code: u32) {
+        let abort = SdoRequest::Abort(self.job.address(), code);
+        self.turn = Turn::Closing(abort, SdoOutcome::Aborted(code));
+    }
+}
