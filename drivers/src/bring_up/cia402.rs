@@ -23,6 +23,8 @@ const LOOK_AGAIN: Nanos = Nanos(100_000_000);
 const LISTEN_LEAST: Nanos = Nanos(100_000_000);
 /// How long "voltage off" is sent to a lost drive before its setpoints end.
 const FAREWELL: Nanos = Nanos(100_000_000);
+/// How long a node may take from NMT start to its first TPDO.
+const START_TIMEOUT: Nanos = Nanos(500_000_000);
 const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
 /// NMT start is sent this often before the drive counts as refusing.
 const START_TRIES: u8 = 3;
@@ -372,7 +374,7 @@ impl Node {
                 }
             }
             Stage::Start { since, tries } => {
-                if self.age(now, since) >= self.patience.step.0 {
+                if self.age(now, since) >= START_TIMEOUT.0 {
                     if tries < START_TRIES {
                         self.start(now, tries + 1);
                     } else {

@@ -121,12 +121,15 @@ impl Cia402Driver {
             step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
             feedback: nanos("feedback_age_s_max", supervision.feedback_age_s_max)?,
         };
-        nanos("tracking_error_rad_max", supervision.tracking_error_rad_max)?;
+        // Energising must not start with a step: the command has to stand where the joint stands, by the stricter of
+        // the two distances that the settings call impossible.
+        let near_rad = supervision.tracking_error_rad_max.min(supervision.position_jump_rad_max);
+        nanos("tracking_error_rad_max and position_jump_rad_max", near_rad)?;
         let mut driver = Self {
             drives: Vec::new(),
             joints: Vec::new(),
             by_node: [None; NODE_MAX as usize + 1],
-            near_rad: supervision.tracking_error_rad_max,
+            near_rad,
             patient_step: Nanos(u64::from(period_us) * 1_000 * PATIENT_STEP_PERIODS),
             patient: Nanos(0),
             encoded_at: None,
