@@ -6,6 +6,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod brake;
 pub mod chain;
 pub mod duration;
@@ -13,6 +16,7 @@ pub mod limits;
 pub mod peaks;
 pub mod profile;
 mod proof;
+pub mod spline;
 pub mod stroke;
 pub mod time_scale;
 pub mod trajectory;

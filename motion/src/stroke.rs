@@ -159,8 +159,8 @@ impl Stroke {
         if t_s <= self.start_s {
             return Phi::BEFORE;
         }
-        // Rounding may lift the quotient to 1 just before the end; it cannot go beyond by more than that.
-        Phi::at(self.n, ((t_s - self.start_s) / self.duration_s).min(1.0))
+        // Rounding may lift the quotient just above 1; clamp, unlike min, hands a NaN on.
+        Phi::at(self.n, ((t_s - self.start_s) / self.duration_s).clamp(0.0, 1.0))
     }
 
     /// Checks one stroke of an arm with `joints` joints.
