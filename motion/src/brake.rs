@@ -31,7 +31,8 @@ pub struct Brake {
 
 impl Brake {
     /// The time-optimal brake inside `acceleration_rad_s2` and `jerk_rad_s3`; a start acceleration beyond the limit is
-    /// first brought back inside it. Values that are not finite or limits that are not positive give a brake of zero length.
+    /// first brought back inside it. Values that are not
+    /// finite, limits that are not positive, or a way that overflows give a brake of zero length.
     ///
     /// Real time: closed form, no loop, no allocation.
     #[must_use]
@@ -68,7 +69,9 @@ impl Brake {
             jerk_rad_s3: [back_jerk, -side * jerk, 0.0, side * jerk],
             duration_s: [back_s, down_s, level_s, up_s],
         };
-        if brake.duration_s().is_finite() { brake } else { held }
+        // Finite numbers may still overflow on the way.
+        let finite = brake.duration_s().is_finite() && brake.sweep_rad().iter().all(|x| x.is_finite());
+        if finite && brake.rest_rad().is_finite() { brake } else { held }
     }
 
     /// How long it takes.

@@ -21,7 +21,9 @@ const DEPTH_MAX: u32 = 40;
 /// Reported peaks are at most this much above the true ones, relatively ..
 const PEAK_RESOLUTION: f64 = 1e-3;
 /// .. or this part of the limit.
-const PEAK_FLOOR: f64 = 1e-3;
+const PEAK_FLOOR: f64 = 1e-6;
+/// Instants of the first look.
+const LOOKS: usize = 128;
 /// Relative rounding of a sum of up to 512 terms, each with a relative error of some 4 n epsilon.
 const ROUNDING: f64 = 2e-13;
 /// Once a violation is known, an earlier one is looked for down to this width (s).
@@ -43,9 +45,10 @@ pub(crate) fn check(
     edges.sort_unstable_by(f64::total_cmp);
     let pieces =
         || edges.windows(2).filter_map(|w| (w[1] > w[0] && w[1].is_finite()).then_some((w[0], w[1])));
-    // A first look at every piece, so that bounds are refined only near the peaks of the whole motion.
-    let looks = (128 / pieces().count().max(1)).max(1);
-    for (from_s, to_s) in pieces() {
+    // A first look at some hundred instants, so that bounds are refined only near the peaks of the whole motion.
+    let count = pieces().count().max(1);
+    let looks = LOOKS.div_ceil(count);
+    for (from_s, to_s) in pieces().step_by(count.div_ceil(LOOKS)) {
         proof.enter(from_s, to_s);
         for look in 0..looks {
             #[expect(clippy::cast_precision_loss, reason = "at most 128")]
@@ -169,10 +172,10 @@ impl<'a> Proof<'a> {
             let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else { continue };
             let s = ((t_s - stroke.start_s) / stroke.duration_s).clamp(0.0, 1.0);
             let phi = Phi::at(stroke.n, s);
-            let mut rate = 1.0;
+            let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
             for (sum, phi) in jet.iter_mut().zip([phi.value, phi.d1, phi.d2, phi.d3, fourth(stroke.n, s)]) {
-                add_scaled(sum, &stroke.delta_rad, phi * rate);
-                rate /= stroke.duration_s;
+                add_scaled(sum, &stroke.delta_rad, phi * rate_k);
+                rate_k *= rate;
             }
         }
         self.work += self.running_count.max(1);
@@ -299,6 +302,7 @@ impl<'a> Proof<'a> {
     fn worst_near(&self, first: LimitViolation) -> LimitViolation {
         let mut worst = first;
         let mut step_s = FIRST_S;
+        let side = libm::copysign(1.0, first.value - first.limit);
         for _ in 0..64 {
             let at_s = worst.at_s + step_s;
             let setpoint = self.trajectory.sample(at_s);
@@ -309,11 +313,11 @@ impl<'a> Proof<'a> {
                 Quantity::Jerk => setpoint.jerk_rad_s3,
             }[first.joint];
             let value = if first.quantity == Quantity::Position { value } else { value.abs() };
-            if (value - first.limit).abs() > (worst.value - first.limit).abs() && value.is_finite() {
+            if side * (value - worst.value) > 0.0 && value.is_finite() {
                 worst = LimitViolation { at_s, value, ..worst };
                 step_s *= 2.0;
             } else {
-                step_s *= 0.5;
+                step_s *= -0.5; // A long step may have gone over the top: look back.
             }
         }
         worst

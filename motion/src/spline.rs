@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn spline_through_figure_1_ends_with_the_published_accelerations() {
         let spline = ClampedSpline::new(&FIGURE_1).unwrap();
-        // papers.md 1.2, five digits.
+        // Five digits, as our digest of the paper has them.
         assert!((spline.sample(0.0).d2 - 0.131_79).abs() < 5e-6, "{:?}", spline.sample(0.0));
         assert!((spline.sample(400.0).d2 - 0.123_21).abs() < 5e-6, "{:?}", spline.sample(400.0));
     }

@@ -103,7 +103,7 @@ impl Phi {
         let (s2, a, b) = (s * s, m - 1.0, m - 2.0);
         let x = s2 * s2;
         let u = 1.0 - x;
-        // One power serves all four: the rest are factors of u (bench.md section 6).
+        // One power serves all four: the rest are factors of u.
         let p3 = power(u, n - 3);
         let p2 = p3 * u;
         let p1 = p2 * u;

@@ -1,5 +1,6 @@
 //! What the tests share: numbered random draws, and numerical differentiation that knows nothing of the crate.
 #![expect(dead_code, reason = "each test binary uses a part")]
+#![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Stroke, Trajectory};
 
 /// A small reproducible source of numbers (splitmix64), so that a failing seed can be run again anywhere.
@@ -64,6 +65,7 @@ pub(crate) fn slope(f: impl Fn(f64) -> f64, t: f64, h: f64) -> f64 {
 }
 
 /// Limits of the shipped UR5: 3.14 rad/s, 15 rad/s^2, 150 rad/s^3, stops at twice and four times that.
+#[expect(clippy::approx_constant, reason = "3.14 is what the robot file says")]
 pub(crate) fn ur5_limits() -> [JointLimits; MAX_JOINTS] {
     let motion = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
     let stop = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 30.0, jerk_rad_s3: 600.0 };

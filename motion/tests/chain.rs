@@ -1,0 +1,156 @@
+//! Forward kinematics against plain matrix products and against the poses of real arms.
+#![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
+mod common;
+use common::Draw;
+use core::f64::consts::{FRAC_PI_2, PI};
+use taustream_motion::MAX_JOINTS;
+use taustream_motion::chain::{Chain, ChainJoint, Pose};
+
+type Matrix = [[f64; 4]; 4];
+
+fn times(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut c = [[0.0; 4]; 4];
+    for (row, c) in c.iter_mut().enumerate() {
+        for (column, c) in c.iter_mut().enumerate() {
+            *c = (0..4).map(|k| a[row][k] * b[k][column]).sum();
+        }
+    }
+    c
+}
+
+fn turn_z(q: f64) -> Matrix {
+    let (s, c) = q.sin_cos();
+    [[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+}
+
+fn turn_x(q: f64) -> Matrix {
+    let (s, c) = q.sin_cos();
+    [[1.0, 0.0, 0.0, 0.0], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [0.0, 0.0, 0.0, 1.0]]
+}
+
+fn shift(x: f64, z: f64) -> Matrix {
+    [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]]
+}
+
+const IDENTITY: Matrix =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// a, alpha, d, theta offset.
+type Row = [f64; 4];
+
+#[rustfmt::skip]
+const UR5: [Row; 6] = [
+    [0.0, FRAC_PI_2, 0.089_159, 0.0],
+    [-0.425, 0.0, 0.0, 0.0],
+    [-0.392_25, 0.0, 0.0, 0.0],
+    [0.0, FRAC_PI_2, 0.109_15, 0.0],
+    [0.0, -FRAC_PI_2, 0.094_65, 0.0],
+    [0.0, 0.0, 0.0823, 0.0],
+];
+
+/// The AgileX Piper's modified rows (vendor SDK 0.6.2, arms with the 2-degree offset).
+fn piper() -> [Row; 6] {
+    let deg = PI / 180.0;
+    [
+        [0.0, 0.0, 0.123, 0.0],
+        [0.0, -90.0 * deg, 0.0, -172.22 * deg],
+        [0.285_03, 0.0, 0.0, -102.78 * deg],
+        [-0.021_98, 90.0 * deg, 0.250_75, 0.0],
+        [0.0, -90.0 * deg, 0.0, 0.0],
+        [0.0, 90.0 * deg, 0.091, 0.0],
+    ]
+}
+
+fn standard(rows: &[Row]) -> Chain {
+    let joints: Vec<_> =
+        rows.iter().map(|[a, alpha, d, o]| ChainJoint::from_dh(*a, *alpha, *d, *o)).collect();
+    Chain::new(&joints).unwrap()
+}
+
+fn modified(rows: &[Row]) -> Chain {
+    let joints: Vec<_> =
+        rows.iter().map(|[a, alpha, d, o]| ChainJoint::from_mdh(*a, *alpha, *d, *o)).collect();
+    Chain::new(&joints).unwrap()
+}
+
+fn gap(pose: &Pose, matrix: &Matrix) -> f64 {
+    let ours = pose.to_homogeneous();
+    (0..16).map(|i| (ours[(i / 4, i % 4)] - matrix[i / 4][i % 4]).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn chain_at_ten_thousand_poses_agrees_with_plain_matrix_products() {
+    for seed in 0..10_000 {
+        let mut draw = Draw::from_seed(seed);
+        let rows = if seed % 2 == 0 {
+            UR5.to_vec()
+        } else {
+            let count = draw.whole(1, 8) as usize;
+            (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| draw.within(-span, span))).collect()
+        };
+        let position_rad = draw.joints(rows.len(), PI);
+        let (by_dh, by_mdh) = (standard(&rows).frames(&position_rad), modified(&rows).frames(&position_rad));
+        let (mut dh, mut mdh) = (IDENTITY, IDENTITY);
+        assert!(gap(&by_dh[0], &IDENTITY) == 0.0 && gap(&by_mdh[0], &IDENTITY) == 0.0);
+        for joint in 0..MAX_JOINTS {
+            if let Some([a, alpha, d, offset]) = rows.get(joint) {
+                let turn = turn_z(position_rad[joint] + offset);
+                dh = times(&times(&times(&dh, &turn), &shift(*a, *d)), &turn_x(*alpha));
+                mdh = times(
+                    &times(&times(&times(&mdh, &turn_x(*alpha)), &shift(*a, 0.0)), &turn),
+                    &shift(0.0, *d),
+                );
+            }
+            // Frames of joints that do not exist repeat the tip.
+            let gaps = [gap(&by_dh[joint + 1], &dh), gap(&by_mdh[joint + 1], &mdh)];
+            assert!(gaps[0] < 1e-12 && gaps[1] < 1e-12, "seed {seed}, joint {joint}: {gaps:?}");
+        }
+    }
+}
+
+/// Poses that follow from the sums of the link lengths alone.
+#[test]
+fn ur5_at_known_poses_stands_where_its_lengths_say() {
+    let chain = standard(&UR5);
+    let tip = |q: [f64; 6]| {
+        let mut position_rad = [0.0; MAX_JOINTS];
+        position_rad[..6].copy_from_slice(&q);
+        chain.frames(&position_rad)[6].translation.vector
+    };
+    for (q, expected) in [
+        // Stretched along -x.
+        ([0.0; 6], [-0.425 - 0.392_25, -0.109_15 - 0.0823, 0.089_159 - 0.094_65]),
+        // Straight up.
+        (
+            [0.0, -FRAC_PI_2, 0.0, -FRAC_PI_2, 0.0, 0.0],
+            [0.0, -0.109_15 - 0.0823, 0.089_159 + 0.425 + 0.392_25 + 0.094_65],
+        ),
+        // Stretched along -y: the first joint turned a quarter.
+        ([FRAC_PI_2, 0.0, 0.0, 0.0, 0.0, 0.0], [0.109_15 + 0.0823, -0.425 - 0.392_25, 0.089_159 - 0.094_65]),
+    ] {
+        let at = tip(q);
+        let gap = (0..3).map(|i| (at[i] - expected[i]).abs()).fold(0.0, f64::max);
+        assert!(gap < 1e-12, "{q:?}: {at:?} instead of {expected:?}");
+    }
+}
+
+#[test]
+fn piper_with_all_joints_at_zero_is_where_the_vendor_puts_it() {
+    let flange = modified(&piper()).frames(&[0.0; MAX_JOINTS])[6];
+    let at = flange.translation.vector * 1000.0;
+    assert!((at.x - 56.1).abs() < 0.1 && at.y.abs() < 1e-9 && (at.z - 213.3).abs() < 0.1, "{at:?}");
+    let z = flange.rotation * nalgebra::Vector3::z();
+    let pitch_deg = z.x.atan2(z.z).to_degrees();
+    assert!((pitch_deg - 85.0).abs() < 0.01, "{pitch_deg}");
+    // Read as standard rows the same numbers put the flange somewhere else: the check can fail.
+    let wrong = standard(&piper()).frames(&[0.0; MAX_JOINTS])[6].translation.vector * 1000.0;
+    assert!((wrong.x - 56.1).abs() > 10.0 || (wrong.z - 213.3).abs() > 10.0, "{wrong:?}");
+}
+
+#[test]
+fn chain_of_no_joints_or_of_nine_is_refused() {
+    let joint = ChainJoint::from_dh(0.0, 0.0, 0.1, 0.0);
+    assert!(Chain::new(&[]).is_none());
+    assert!(Chain::new(&[joint; MAX_JOINTS + 1]).is_none());
+    assert_eq!(Chain::new(&[joint; MAX_JOINTS]).map(|chain| chain.joints()), Some(MAX_JOINTS));
+}
