@@ -221,4 +221,22 @@ mod tests {
         };
         assert_eq!((error.line, error.why), (2, "cut off in the middle"));
     }
+
+    proptest::proptest! {
+        /// Goal: no log, however broken, panics; one flipped character never passes for the same frame.
+        #[test]
+        fn candump_log_of_any_kind_is_read_or_refused(
+            garbage in "(\\PC|[()#.R 0-9a-f\n]){0,80}",
+            at in 0_usize..43,
+            with in proptest::char::range(' ', '~'),
+        ) {
+            let _ = parse(&garbage);
+            let line = "(1700000000.000250) vcan0 201#0F00E8030000\n";
+            let mut doctored = line.to_owned();
+            doctored.replace_range(at..=at, &with.to_string());
+            let same = |log: &str| parse(log) == parse(line);
+            let is_equal = doctored.eq_ignore_ascii_case(line);
+            proptest::prop_assert!(!same(&doctored) || is_equal, "{doctored:?} was read as {line:?}");
+        }
+    }
 }

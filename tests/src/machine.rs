@@ -16,6 +16,7 @@ use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -64,8 +65,8 @@ pub enum MachineError {
         /// The operating system's word.
         source: Error,
     },
-    /// The caller asked to stop.
-    #[error("the vcan machine was stopped")]
+    /// The caller asked to stop, or nobody reads the output any more.
+    #[error("the vcan machine was stopped before its command had ended")]
     Stopped,
     /// The guest ended without a status.
     #[error("the vcan machine gave no status (linux.uml: {status}); the end of its log:\n{log}")]
@@ -180,8 +181,10 @@ impl Machine {
         // The guest's consoles travel as stdin and stdout of the launching shell: see `launcher`.
         let mut guest =
             Guest::start(self.launcher(scratch.path()).stdin(out_writer).stdout(err_writer).stderr(log))?;
-        let copies = [copy(out_reader, stdout), copy(err_reader, stderr)];
-        let in_time = guest.wait(BOOT_AND_HALT + Duration::from_secs(self.limit_s.into()), stop);
+        let unheard = Arc::new(AtomicBool::new(false));
+        let copies = [copy(out_reader, stdout, &unheard), copy(err_reader, stderr, &unheard)];
+        let limit = BOOT_AND_HALT + Duration::from_secs(self.limit_s.into());
+        let in_time = guest.wait(limit, &[stop, &unheard]);
         // The consoles end when the last process of the guest has.
         let status = guest.end();
         for copy in copies {
@@ -363,10 +366,10 @@ impl Guest {
     }
 
     /// Waits until its kernel has ended; false when it took too long.
-    fn wait(&self, limit: Duration, stop: &AtomicBool) -> Result<bool, MachineError> {
+    fn wait(&self, limit: Duration, stops: &[&AtomicBool]) -> Result<bool, MachineError> {
         let deadline = Instant::now() + limit;
         while !self.has_ended() {
-            if stop.load(Ordering::Relaxed) {
+            if stops.iter().any(|stop| stop.load(Ordering::Relaxed)) {
                 return Err(MachineError::Stopped);
             }
             if Instant::now() > deadline {
@@ -419,15 +422,21 @@ impl Drop for Guest {
     }
 }
 
-/// Copies a console to a writer until it ends. A writer that fails (a closed pipe) does not stop the guest: it would wait
-/// for ever on a console that nobody empties.
-fn copy(mut from: PipeReader, mut to: impl Write + Send + 'static) -> JoinHandle<()> {
+/// Copies a console to a writer until it ends. When the writer fails (`| head`), nobody hears the guest any more, so it is
+/// stopped; until then the console is still emptied, for the guest would wait on a full one.
+fn copy(
+    mut from: PipeReader,
+    mut to: impl Write + Send + 'static,
+    unheard: &Arc<AtomicBool>,
+) -> JoinHandle<()> {
+    let unheard = Arc::clone(unheard);
     std::thread::spawn(move || {
         let mut buffer = [0; 1 << 14];
-        let mut takes = true;
         while let Ok(count) = from.read(&mut buffer) {
             let Some(bytes) = buffer.get(..count).filter(|bytes| !bytes.is_empty()) else { break };
-            takes = takes && to.write_all(bytes).and_then(|()| to.flush()).is_ok();
+            if !unheard.load(Ordering::Relaxed) && to.write_all(bytes).and_then(|()| to.flush()).is_err() {
+                unheard.store(true, Ordering::Relaxed);
+            }
         }
     })
 }

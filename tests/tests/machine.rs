@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 /// A machine with its scratch directories in a folder of this test, so that what stays behind is seen.
@@ -111,6 +111,17 @@ fn machine_command_out_of_time_ends_with_124() {
     let lab = Lab::new("time");
     let output = lab.run(&["--limit-s", "2"], "echo begun; sleep 1000");
     assert_eq!((output.status.code(), text(&output.stdout)), (Some(124), "begun\n".into()));
+}
+
+/// Goal: a machine whose output nobody reads any more ends early, by itself.
+#[test]
+fn machine_whose_reader_has_gone_ends() {
+    let lab = Lab::new("unread");
+    let words = ["bash".as_ref(), "-c".as_ref(), "while echo more; do sleep 0.1; done".as_ref()];
+    let mut machine = lab.command(&["--limit-s", "100"], &words).stdout(Stdio::piped()).spawn().unwrap();
+    drop(machine.stdout.take());
+    assert_eq!(machine.wait().unwrap().code(), Some(125));
+    lab.assert_clean();
 }
 
 /// Goal: a process left behind by the command does not keep the machine, and the command's status stands.

@@ -24,7 +24,7 @@ pub enum LinkFault {
     #[error("interface is down; bring it up: ip link set IFACE up")]
     Down,
     /// ENXIO, ENODEV, or the peer of a local link has gone: the interface does not exist any more.
-    #[error("interface has gone")]
+    #[error("the interface, or the other end of a local link, has gone")]
     Gone,
     /// Another error of the operating system.
     #[error("operating system error {0}")]
@@ -42,14 +42,14 @@ pub struct Sent {
 
 /// A CAN bus as the cycle sees it. Never waits, never allocates after it was opened.
 pub trait CanLink: Send {
-    /// Hands the frames over in order, in as few system calls as possible.
+    /// Hands the frames over in order: up to [`crate::frame::BATCH_MAX`] in one system call.
     ///
-    /// Real time: one system call, never waits.
+    /// Real time: one system call, up to three more after a partial batch or a stale error; never waits.
     fn send(&mut self, frames: &[CanFrame]) -> Sent;
 
     /// Replaces the batch by what has arrived, oldest first, at most its capacity. Error frames come too.
     ///
-    /// Real time: one system call, never waits.
+    /// Real time: one system call, up to two more while an interface is down; never waits.
     fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault>;
 
     /// What it is, for messages: "socketcan vcan0" or "local link vcan0".

@@ -137,6 +137,11 @@ pub(crate) fn largest_batch_takes_one_call_each_way(bench: &dyn Bench) {
     assert_eq!((sent.count, sent.fault), (0, None));
     assert_eq!(servos.receive(&mut batch), None);
     assert!(batch.frames().is_empty());
+    // More than a cycle may send is not taken whole, for the number of system calls is bounded; and that is said.
+    let flood: Vec<CanFrame> = (0..300).map(numbered).collect();
+    let sent = master.send(&flood);
+    assert!((64..300).contains(&sent.count) && sent.fault.is_some(), "{sent:?}");
+    assert_eq!(receive_all(servos.as_mut(), sent.count), &flood[..sent.count]);
 }
 
 /// Goal: an end hears nothing when nothing was sent, and never itself.
