@@ -10,9 +10,9 @@ use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 /// Which convention a Denavit-Hartenberg row follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RowKind {
-    /// `dh`: a_i, alpha_i, behind the joint.
+    /// `dh`: a and alpha of this frame, behind the joint.
     Standard,
-    /// `mdh`: a_{i-1}, alpha_{i-1}, in front of the joint (Craig).
+    /// `mdh`: a and alpha of the last frame, in front of the joint (Craig).
     Modified,
 }
 
@@ -222,9 +222,9 @@ fn read_contacts(top: &mut Table<'_>, joints: usize) -> Vec<(usize, usize)> {
 fn pair_of(item: &Node, joints: usize) -> Option<(usize, usize)> {
     let Value::List(names) = &item.value else { return None };
     let [first, second] = names.as_slice() else { return None };
-    let index = |node: &Node| match &node.value {
-        Value::Text(name) => (0..=joints).find(|link| link_name(*link) == *name),
-        _ => None,
+    let index = |node: &Node| {
+        let Value::Text(name) = &node.value else { return None };
+        (0..=joints).find(|link| link_name(*link) == *name)
     };
     let (first, second) = (index(first)?, index(second)?);
     (first != second).then_some((first.min(second), first.max(second)))

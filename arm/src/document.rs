@@ -11,8 +11,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
-/// Longest text file that is read.
-pub(crate) const TEXT_BYTES_MAX: u64 = 4 << 20;
+/// Longest text file that is read; the largest trajectory takes a fifth of it.
+pub(crate) const TEXT_BYTES_MAX: u64 = 1 << 20;
 
 /// Longest piece of a hostile file that is repeated in a fault, in characters.
 const SHOWN_CHARS_MAX: usize = 60;
@@ -73,9 +73,10 @@ pub(crate) fn shown(text: &str) -> String {
 fn list_shown(nodes: &[Node]) -> String {
     let mut items: Vec<String> = Vec::new();
     for node in nodes.iter().take(MAX_ITEMS_SHOWN) {
-        items.push(match &node.value {
-            Value::List(inner) => format!("a list of {}", inner.len()),
-            _ => node.to_string(),
+        items.push(if let Value::List(inner) = &node.value {
+            format!("a list of {}", inner.len())
+        } else {
+            node.to_string()
         });
     }
     let rest = nodes.len().saturating_sub(MAX_ITEMS_SHOWN);
@@ -91,9 +92,9 @@ const MAX_ITEMS_SHOWN: usize = 8;
 /// Reads a regular file of at most `bytes_max` bytes. `what` says what the file should have been.
 pub(crate) fn read_file(file: &Path, bytes_max: u64, what: &str) -> Result<Vec<u8>, Faults> {
     let fault = |value: &str, expected: &str| Faults(vec![Fault::new(file, "", value, expected)]);
-    let refused = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => fault("no such file", what),
-        _ => fault(&format!("cannot be read ({e})"), what),
+    let refused = |e: std::io::Error| {
+        let missing = e.kind() == std::io::ErrorKind::NotFound;
+        fault(&if missing { "no such file".to_owned() } else { format!("cannot be read ({e})") }, what)
     };
     // A device or a pipe could block or never end, so it is turned away before it is opened.
     let facts = std::fs::metadata(file).map_err(refused)?;
@@ -196,7 +197,9 @@ pub(crate) fn parse_json(file: &Path, text: &str) -> Result<Node, Faults> {
             let key = trail.keys.borrow().concat();
             let key = key.trim_start_matches('.');
             let expected = format!("JSON with finite numbers ({e})");
-            let fault = Fault::new(file, key, &token_at(text, e.line(), e.column()), &expected);
+            let value =
+                if e.is_eof() { "ends too early".to_owned() } else { token_at(text, e.line(), e.column()) };
+            let fault = Fault::new(file, key, &value, &expected);
             Err(Faults(vec![Fault { line: Some(e.line()), ..fault }]))
         }
     }

@@ -73,3 +73,28 @@ fn find_in(directories: &[&Path], kind: Kind, name_or_path: &str) -> Result<Path
     };
     Err(Faults(vec![Fault::new(path, "", "no such file", &expected)]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn name_is_found_in_its_folder_and_path_is_taken_as_it_is() {
+        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+        let nowhere = Path::new("/nonexistent");
+        let found = find_in(&[nowhere, &config], Kind::Robot, "ur5").unwrap();
+        assert_eq!(found, config.join("robots/ur5.toml"));
+        assert_eq!(find_in(&[], Kind::Scene, &found.display().to_string()).unwrap(), found);
+    }
+
+    #[test]
+    fn unknown_name_is_refused_with_every_place_looked_at() {
+        let places = [Path::new("/a"), Path::new("/b")];
+        let said = find_in(&places, Kind::Settings, "ur7").unwrap_err().to_string();
+        assert!(said.contains("/a/settings/ur7.toml, /b/settings/ur7.toml"), "{said}");
+        for path in ["x/ur7", "ur7.toml", ""] {
+            let said = find_in(&places, Kind::Settings, path).unwrap_err().to_string();
+            assert!(said.contains("no such file") && !said.contains("/a/"), "{said}");
+        }
+    }
+}

@@ -37,9 +37,13 @@ pub(crate) fn load(file: &Path, scale: f64) -> Result<Mesh, Refusal> {
         return Err(refusal(file, "is neither .stl nor .obj", "a mesh file named .stl or .obj"));
     }
     let bytes = read_file(file, MESH_BYTES_MAX, "a mesh file").map_err(|faults| first_of(file, &faults))?;
-    let (corners, triangles) = if ending == "stl" { read_stl(bytes) } else { read_obj(&bytes) }
-        .map_err(|(value, expected)| refusal(file, &value, &expected))?;
-    check(corners, triangles, scale).map_err(|(value, expected)| refusal(file, &value, &expected))
+    parse(&ending, bytes, scale).map_err(|(value, expected)| refusal(file, &value, &expected))
+}
+
+/// Reads and checks the bytes of a mesh file with the given ending.
+fn parse(ending: &str, bytes: Vec<u8>, scale: f64) -> Result<Mesh, Refusal> {
+    let (corners, triangles) = if ending == "stl" { read_stl(bytes)? } else { read_obj(&bytes)? };
+    check(corners, triangles, scale)
 }
 
 fn refusal(file: &Path, value: &str, expected: &str) -> Refusal {
@@ -78,8 +82,14 @@ fn read_stl(mut bytes: Vec<u8>) -> Result<Soup, Refusal> {
 }
 
 fn read_obj(bytes: &[u8]) -> Result<Soup, Refusal> {
-    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
-    // Materials are other files; none is opened.
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..tobj::LoadOptions::default()
+    };
+    // Faces of more corners become fans, which cover at least the face, also a hollow one. Materials are other files;
+    // none is opened.
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
         .map_err(|e| ("is not OBJ".to_owned(), format!("OBJ faces ({e})")))?;
@@ -129,4 +139,110 @@ fn check_triangle(vertices_m: &[Point3<f64>], triangle: [usize; 3]) -> Option<[u
     let area_m2 = 0.5 * (pb - pa).cross(&(pc - pa)).norm();
     let index = |corner: usize| u32::try_from(corner).ok();
     if area_m2 >= AREA_M2_MIN { Some([index(a)?, index(b)?, index(c)?]) } else { None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::{any, prop, proptest};
+
+    const OBJ: &str = "o roof\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 1\n\
+                       f 1 2 3 4\nl 1 2\nf 1/1/1 2 5\nf -3 -2 -1\n";
+    const STL: &str = "solid roof\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\n\
+                       endfacet\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\n\
+                       endfacet\nendsolid roof\n";
+
+    /// Two triangles of the unit square. The header begins with `solid`, as some programs write it.
+    fn binary_stl() -> Vec<u8> {
+        let mut bytes = b"solid made by a program".to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(2_u32.to_le_bytes());
+        for corners in [
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]],
+            [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        ] {
+            bytes.extend([0; 12]);
+            bytes.extend(corners.as_flattened().iter().flat_map(|c: &f32| c.to_le_bytes()));
+            bytes.extend([0; 2]);
+        }
+        bytes
+    }
+
+    fn area_m2(mesh: &Mesh) -> f64 {
+        let corner = |i: u32| mesh.vertices_m[usize::try_from(i).unwrap()];
+        let area =
+            |[a, b, c]: &[u32; 3]| 0.5 * (corner(*b) - corner(*a)).cross(&(corner(*c) - corner(*a))).norm();
+        mesh.triangles.iter().map(area).sum()
+    }
+
+    #[test]
+    fn mesh_of_each_format_has_its_triangles_and_scale() {
+        for (ending, bytes) in [("stl", binary_stl()), ("stl", STL.into()), ("obj", OBJ.into())] {
+            let mesh = parse(ending, bytes, 0.5).unwrap();
+            let expected = if ending == "obj" { (5, 4) } else { (4, 2) };
+            assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), expected);
+            let square_m2 = if ending == "obj" { 0.25 + 2.0 * 0.25 * 0.5 * 1.25_f64.sqrt() } else { 0.25 };
+            assert!((area_m2(&mesh) - square_m2).abs() < 1e-12, "{}", area_m2(&mesh));
+        }
+    }
+
+    #[test]
+    fn bad_mesh_is_refused_with_words_that_help() {
+        let binary = binary_stl();
+        let mut cut = binary.clone();
+        cut.truncate(120);
+        let mut infinite = binary.clone();
+        infinite[96..100].copy_from_slice(&f32::INFINITY.to_le_bytes());
+        let mut huge = binary.clone();
+        huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+        let mut empty = binary[..84].to_vec();
+        empty[80..84].fill(0);
+        let cases: [(&str, Vec<u8>, f64, &str); 14] = [
+            ("stl", Vec::new(), 1.0, "is 0 bytes long"),
+            ("stl", cut, 1.0, "is not STL"),
+            ("stl", huge, 1.0, "is not STL"),
+            ("stl", infinite, 1.0, "finite coordinates"),
+            ("stl", empty, 1.0, "has no triangles"),
+            ("stl", binary, 1000.0, "millimetres want scale"),
+            ("stl", STL.replace("vertex 1 0 0", "vertex 1 1 0").into(), 1.0, "degenerate triangle, number 0"),
+            ("stl", STL.replace("vertex 1 0 0", "vertex 1 nan 0").into(), 1.0, "is not STL"),
+            ("stl", "solid x\nendsolid x\n".into(), 1.0, "has no triangles"),
+            ("obj", Vec::new(), 1.0, "has no triangles"),
+            ("obj", OBJ.replace("f 1 2 3 4", "f 1 2 9").into(), 1.0, "is not OBJ"),
+            ("obj", OBJ.replace("f 1 2 3 4", "f 1 2 0").into(), 1.0, "is not OBJ"),
+            ("obj", OBJ.replace("v 1 0 0", "v nan 0 0").into(), 1.0, "finite coordinates"),
+            ("obj", OBJ.replace("f 1 2 3 4", "f 1 2 2").into(), 1.0, "degenerate triangle"),
+        ];
+        for (i, (ending, bytes, scale, words)) in cases.into_iter().enumerate() {
+            let (value, expected) = parse(ending, bytes, scale).expect_err("a bad mesh");
+            assert!(
+                format!("{value}: expected {expected}").contains(words),
+                "case {i}: {value}: expected {expected}"
+            );
+        }
+    }
+
+    proptest! {
+        #![proptest_config(proptest::test_runner::Config { cases: 2000, failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn mutated_mesh_never_panics_and_never_passes_unsound(
+            which in 0..3_usize,
+            edits in prop::collection::vec((any::<usize>(), 0..12_usize, prop::collection::vec(any::<u8>(), 0..12)), 1..5),
+        ) {
+            let (ending, mut bytes) = [("stl", binary_stl()), ("stl", STL.into()), ("obj", OBJ.into())][which].clone();
+            for (at, cut, put) in edits {
+                // A character of the format's own alphabet reaches deeper than a random byte.
+                let put = put.into_iter().map(|b| if b % 2 == 0 { b"0123456789-/ \nvfe.solx"[usize::from(b) % 22] } else { b });
+                let at = at % (bytes.len() + 1);
+                let end = (at + cut).min(bytes.len());
+                bytes.splice(at..end, put);
+            }
+            if let Ok(mesh) = parse(ending, bytes, 1.0) {
+                let corners = u32::try_from(mesh.vertices_m.len()).unwrap();
+                assert!(!mesh.triangles.is_empty() && mesh.triangles.iter().flatten().all(|corner| *corner < corners));
+                assert!(mesh.vertices_m.iter().flat_map(|v| v.iter()).all(|c| c.abs() <= REACH_M_MAX));
+            }
+        }
+    }
 }

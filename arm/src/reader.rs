@@ -157,13 +157,11 @@ impl<'b> Table<'b> {
         Self::from_node(book, String::new(), node)
     }
     fn from_node(book: &'b Book, path: String, node: Node) -> Option<Self> {
-        match node.value {
-            Value::Table(entries) => Some(Self { book, path, line: node.line, entries, asked: Vec::new() }),
-            _ => {
-                book.add(node.line, &path, &node.to_string(), "a table");
-                None
-            }
+        if let Value::Table(entries) = node.value {
+            return Some(Self { book, path, line: node.line, entries, asked: Vec::new() });
         }
+        book.add(node.line, &path, &node.to_string(), "a table");
+        None
     }
     pub(crate) fn book(&self) -> &'b Book {
         self.book
@@ -258,59 +256,57 @@ impl<'b> Table<'b> {
         {
             return Some(integer);
         }
-        let expected = format!("an integer from {low} to {high}");
-        self.book.add(node.line, &self.path_of(key), &node.to_string(), &expected);
-        None
+        self.refuse(key, node, &format!("an integer from {low} to {high}"))
     }
     pub(crate) fn flag(&mut self, key: &'static str) -> Option<bool> {
         let node = self.need(key, "true or false")?;
         if let Value::Flag(flag) = node.value {
             return Some(flag);
         }
-        self.book.add(node.line, &self.path_of(key), &node.to_string(), "true or false");
-        None
+        self.refuse(key, &node, "true or false")
     }
     pub(crate) fn text(&mut self, key: &'static str, expected: &str) -> Option<String> {
         let node = self.need(key, expected)?;
-        self.text_of(key, node, expected)
+        self.text_of(key, &node, expected)
     }
     /// The text, or none when the key is absent; `None` also after a fault.
     pub(crate) fn text_if_there(&mut self, key: &'static str, expected: &str) -> Option<String> {
         let node = self.take(key)?;
-        self.text_of(key, node, expected)
+        self.text_of(key, &node, expected)
     }
-    fn text_of(&self, key: &str, node: Node, expected: &str) -> Option<String> {
-        match node.value {
-            Value::Text(text) if !text.is_empty() => Some(text),
-            _ => {
-                self.book.add(node.line, &self.path_of(key), &node.to_string(), expected);
-                None
-            }
+    fn text_of(&self, key: &str, node: &Node, expected: &str) -> Option<String> {
+        if let Value::Text(text) = &node.value
+            && !text.is_empty()
+        {
+            return Some(text.clone());
         }
+        self.refuse(key, node, expected)
+    }
+    fn refuse<T>(&self, key: &str, node: &Node, expected: &str) -> Option<T> {
+        self.book.add(node.line, &self.path_of(key), &node.to_string(), expected);
+        None
     }
     /// A name: it goes into messages, file names and tables, so it is a plain word.
     pub(crate) fn name(&mut self, key: &'static str) -> Option<String> {
         let node = self.need(key, NAME_WORDS)?;
-        self.name_of(key, node)
+        self.name_of(key, &node)
     }
     /// The name, or the default when the key is absent; `None` only after a fault.
     pub(crate) fn name_or(&mut self, key: &'static str, default: String) -> Option<String> {
         match self.take(key) {
             None => Some(default),
-            Some(node) => self.name_of(key, node),
+            Some(node) => self.name_of(key, &node),
         }
     }
-    fn name_of(&self, key: &str, node: Node) -> Option<String> {
+    fn name_of(&self, key: &str, node: &Node) -> Option<String> {
         let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-' || b == b'.';
-        match node.value {
-            Value::Text(name) if (1..=NAME_BYTES_MAX).contains(&name.len()) && name.bytes().all(plain) => {
-                Some(name)
-            }
-            _ => {
-                self.book.add(node.line, &self.path_of(key), &node.to_string(), NAME_WORDS);
-                None
-            }
+        if let Value::Text(name) = &node.value
+            && (1..=NAME_BYTES_MAX).contains(&name.len())
+            && name.bytes().all(plain)
+        {
+            return Some(name.clone());
         }
+        self.refuse(key, node, NAME_WORDS)
     }
     /// A table inside this one; its absence is a fault.
     pub(crate) fn table(&mut self, key: &'static str, expected: &str) -> Option<Table<'b>> {

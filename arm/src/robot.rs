@@ -182,3 +182,87 @@ impl LinkShape {
         Some(([end(-half_m), end(half_m)], radius_m))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taustream_motion::JointArray;
+
+    fn robot(kind: &str, seed: u32) -> Robot {
+        let mut text = String::from("name = \"r\"\n");
+        for i in 0..6 {
+            let (x, y) =
+                (f64::from((seed + 7 * i) % 11) * 0.05 - 0.25, f64::from((seed * 3 + i) % 7) * 0.06 - 0.18);
+            let alpha_rad = f64::from((seed + i) % 9) * 0.7 - 2.8;
+            let _ = write!(
+                text,
+                "[[joint]]\nname = \"j{i}\"\nlink_radius_m = 0.05\nposition_rad = [-3, 3]\n\
+                 {kind} = {{ a_m = {x}, alpha_rad = {alpha_rad}, d_m = {y}, theta_offset_rad = 0.3 }}\n\
+                 motion = {{ velocity_rad_s = 1, acceleration_rad_s2 = 2, jerk_rad_s3 = 3 }}\n"
+            );
+        }
+        Robot::from_toml(Path::new("r.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    /// Goal: a capsule must lie where the arm is, in every pose and both conventions: its ends are the origins of
+    /// two neighbouring frames, and it is fixed in the frame of the link that it is counted to.
+    #[test]
+    fn link_capsule_in_any_pose_spans_the_origins_of_neighbouring_frames() {
+        for seed in 0..40 {
+            for kind in ["dh", "mdh"] {
+                let robot = robot(kind, seed);
+                let mut pose: JointArray = [0.0; MAX_JOINTS];
+                (0..6).for_each(|i| pose[i] = (f64::from(seed) * 1.3 + i as f64).sin() * 3.0);
+                let frames = robot.chain.frames(&pose);
+                assert!(robot.shapes.len() >= 4, "seed {seed}: nearly every row has a length");
+                for (i, shape) in robot.shapes.iter().enumerate() {
+                    let row = if kind == "dh" { shape.link } else { shape.link + 1 };
+                    let (ends, _) = shape.segment().unwrap();
+                    let ends = ends.map(|end| frames[shape.frame] * end);
+                    let mut wanted =
+                        [row, row - 1].map(|frame| Point3::from(frames[frame].translation.vector));
+                    if (ends[0] - wanted[0]).norm() > (ends[0] - wanted[1]).norm() {
+                        wanted.reverse();
+                    }
+                    let gap_m = (ends[0] - wanted[0]).norm().max((ends[1] - wanted[1]).norm());
+                    assert!(gap_m < 1e-12, "seed {seed}, {kind}, shape {i}: {gap_m:e} m off");
+                    assert_eq!(shape.frame, shape.link);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stop_limits_when_absent_are_twice_and_four_times_the_motion_limits() {
+        let limits = robot("dh", 1).limits();
+        assert_eq!(limits[5].stop.acceleration_rad_s2.to_bits(), 4.0_f64.to_bits());
+        assert_eq!(limits[5].stop.jerk_rad_s3.to_bits(), 12.0_f64.to_bits());
+        assert_eq!(limits[5].stop.velocity_rad_s.to_bits(), 1.0_f64.to_bits());
+        assert_eq!(limits[6], JointLimits::default(), "unused slots are zero");
+    }
+
+    #[test]
+    fn row_without_length_becomes_a_ball_and_without_radius_nothing() {
+        let text = "name = \"r\"\n[[joint]]\nname = \"a\"\nlink_radius_m = 0.1\nposition_rad = [-1, 1]\n\
+                    dh = { a_m = 0, alpha_rad = 1, d_m = 0, theta_offset_rad = 0 }\n\
+                    motion = { velocity_rad_s = 1, acceleration_rad_s2 = 2, jerk_rad_s3 = 3 }\n";
+        let file = Path::new("r.toml");
+        let ball = Robot::from_toml(file, text).unwrap();
+        assert_eq!(ball.shapes[0].shape, Shape::Sphere { radius_m: 0.1 });
+        let bare = Robot::from_toml(file, &text.replace("0.1", "0.0")).unwrap();
+        assert!(bare.shapes.is_empty() && bare.allowed_by_rule == [(0, 1)]);
+    }
+
+    #[test]
+    fn allowed_contacts_of_the_file_hold_in_both_orders() {
+        let text =
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml"));
+        let text = format!("allowed_contacts = [[\"link6\", \"link3\"]]\n{}", text.unwrap());
+        let robot = Robot::from_toml(Path::new("r.toml"), &text).unwrap();
+        assert_eq!(robot.allowed_by_file, [(3, 6)]);
+        assert!(
+            robot.may_touch(3, 6) && robot.may_touch(6, 3) && !robot.may_touch(2, 6) && robot.may_touch(4, 4)
+        );
+        assert_eq!(robot.digest_hex().len(), 64);
+    }
+}

@@ -173,3 +173,77 @@ fn check_names(book: &Book, obstacles: &[(String, Obstacle)]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn scene(text: &str) -> Scene {
+        Scene::from_toml(Path::new("s.toml"), text).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    #[test]
+    fn empty_file_is_an_empty_world_with_the_default_margin() {
+        let world = scene("");
+        assert!(world.obstacles.is_empty());
+        assert_eq!(world.margin_m.to_bits(), MARGIN_M_DEFAULT.to_bits());
+        assert_eq!(scene("margin_m = 0").margin_m.to_bits(), 0.0_f64.to_bits());
+    }
+
+    #[test]
+    fn obstacle_without_a_name_is_called_by_its_place() {
+        let ball = "[[sphere]]\ncenter_m = [1, 2, 3]\nradius_m = 0.5\n";
+        let world =
+            scene(&format!("{ball}{ball}[[box]]\nname = \"b\"\ncenter_m = [0, 0, 0]\nsize_m = [1, 2, 3]"));
+        let names: Vec<&str> = world.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+        assert_eq!(names, ["sphere[0]", "sphere[1]", "b"]);
+        assert_eq!(world.obstacles[0].pose.translation.vector, Vector3::new(1.0, 2.0, 3.0));
+        assert_eq!(world.obstacles[2].shape, Shape::Box { size_m: [1.0, 2.0, 3.0] });
+    }
+
+    /// Roll, then pitch, then yaw about fixed axes: written out as three matrices, not as a library call.
+    #[test]
+    fn rpy_turns_as_urdf_says() {
+        let (roll, pitch, yaw) = (0.3_f64, -0.7_f64, 1.1_f64);
+        let text = format!(
+            "[[capsule]]\ncenter_m = [0, 0, 0]\nradius_m = 1\nlength_m = 2\nrpy_rad = [{roll}, {pitch}, {yaw}]"
+        );
+        let turned = scene(&text).obstacles[0].pose.rotation.to_rotation_matrix();
+        let x =
+            nalgebra::Matrix3::new(1.0, 0.0, 0.0, 0.0, roll.cos(), -roll.sin(), 0.0, roll.sin(), roll.cos());
+        let y = nalgebra::Matrix3::new(
+            pitch.cos(),
+            0.0,
+            pitch.sin(),
+            0.0,
+            1.0,
+            0.0,
+            -pitch.sin(),
+            0.0,
+            pitch.cos(),
+        );
+        let z = nalgebra::Matrix3::new(yaw.cos(), -yaw.sin(), 0.0, yaw.sin(), yaw.cos(), 0.0, 0.0, 0.0, 1.0);
+        assert!((turned.matrix() - z * y * x).norm() < 1e-14);
+    }
+
+    #[test]
+    fn mesh_beside_the_scene_file_is_read_and_scaled() {
+        let directory = std::env::temp_dir().join(format!("taustream-arm-scene-{}", std::process::id()));
+        std::fs::create_dir_all(directory.join("parts")).unwrap();
+        std::fs::write(directory.join("parts/tile.obj"), "v 0 0 0\nv 1000 0 0\nv 0 1000 0\nf 1 2 3\n")
+            .unwrap();
+        let text =
+            "[[mesh]]\nfile = \"parts/tile.obj\"\nscale = 0.001\ncenter_m = [0, 0, 1]\nrpy_rad = [0, 0, 1]\n";
+        std::fs::write(directory.join("s.toml"), text).unwrap();
+        let world = Scene::load(&directory.join("s.toml"));
+        let faults = Scene::from_toml(&directory.join("s.toml"), &text.replace("0.001", "1.0"));
+        std::fs::remove_dir_all(&directory).unwrap();
+        let Shape::Mesh { vertices_m, triangles } = &world.unwrap().obstacles[0].shape else {
+            panic!("no mesh")
+        };
+        assert_eq!((vertices_m.len(), triangles.len()), (3, 1));
+        assert!((vertices_m[1] - Point3::new(1.0, 0.0, 0.0)).norm() < 1e-12);
+        assert!(faults.unwrap_err().to_string().contains("mesh[0].file"));
+    }
+}

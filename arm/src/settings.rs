@@ -70,7 +70,7 @@ pub struct Cycle {
     pub stall_resume_ms: u32,
     /// Gap after which the drives' own watchdog has tripped.
     pub drive_watchdog_ms: u32,
-    /// SCHED_FIFO priority.
+    /// `SCHED_FIFO` priority.
     pub priority: u8,
     /// CPU that the real-time thread is bound to; none: not bound.
     pub cpu: Option<usize>,

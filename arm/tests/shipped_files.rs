@@ -7,8 +7,8 @@ fn config() -> PathBuf {
 }
 
 fn files_of(folder: &str) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(config().join(folder)).expect("config/ is part of the repository");
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("readable").path()).collect();
+    let entries = std::fs::read_dir(config().join(folder)).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     files.sort();
     files
 }
