@@ -1,0 +1,239 @@
+//! What one cycle has found out: every stage writes down what happened, `supervise` alone draws conclusions.
+use crate::phases::Event;
+use crate::tick::Tick;
+use taustream_drivers::{LinkFault, ServoStatus};
+use taustream_messages::{Command, FaultReason, Phase};
+use taustream_motion::limits::Quantity;
+use taustream_motion::time_scale::Scale;
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// Most buses of one arm.
+pub const BUSES_MAX: usize = 8;
+/// Most commands taken in one cycle; more wait for the next.
+pub const COMMANDS_MAX: usize = 4;
+/// Most changes of phase in one cycle: a few commands and an event of each kind.
+pub const TRANSITIONS_MAX: usize = 12;
+
+/// A command with the number under which it is answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    /// Ties the answer to the question.
+    pub sequence: u64,
+    /// What is asked.
+    pub command: Command,
+}
+
+/// The real-time thread's final word on a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// The trajectory.
+    pub trajectory_id: u64,
+    /// Its generation.
+    pub generation: u64,
+    /// What became of it.
+    pub decision: Decision,
+}
+
+/// Accepted, or why not: the reasons that only the moment can tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Decision {
+    /// It runs from the cycle `tick` on.
+    Accepted {
+        /// Cycle number.
+        tick: u64,
+    },
+    /// Not newer than `newest`.
+    Stale {
+        /// Newest generation accepted.
+        newest: u64,
+    },
+    /// The commanded pose is not its base.
+    NotAtBase {
+        /// Zero-based joint.
+        joint: usize,
+        /// Distance.
+        by_rad: f64,
+    },
+    /// The phase takes no trajectory.
+    NotReady {
+        /// The phase.
+        phase: Phase,
+    },
+}
+
+/// Why the guard refused a setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trip {
+    /// Zero-based joint.
+    pub joint: usize,
+    /// What is wrong.
+    pub kind: TripKind,
+    /// The offending number.
+    pub value: f64,
+    /// The limit that it broke.
+    pub limit: f64,
+}
+
+/// What the guard looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TripKind {
+    /// NaN or infinite.
+    NotFinite,
+    /// Outside a limit.
+    Limit(Quantity),
+    /// The sample's derivatives do not belong to its positions.
+    Inconsistent(Quantity),
+    /// Too fast to stop before the position limit.
+    CannotStop,
+}
+
+/// How far a brake off the path has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Braking {
+    /// No brake.
+    #[default]
+    No,
+    /// On its way to rest.
+    Running,
+    /// At rest.
+    Rested,
+}
+
+/// What the kernel says about a bus in an error frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusTrouble {
+    /// The controller has left the bus.
+    BusOff,
+    /// The controller may only listen.
+    ErrorPassive,
+    /// The controller came back by itself: queued setpoints may be old.
+    Restarted,
+}
+
+/// One bus in one cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusFacts {
+    /// Frames that the drivers wanted sent.
+    pub wanted: u32,
+    /// Frames that the link took.
+    pub sent: u32,
+    /// Why not all, or why nothing could be received.
+    pub fault: Option<LinkFault>,
+    /// Frames received.
+    pub received: u32,
+    /// What an error frame said.
+    pub trouble: Option<BusTrouble>,
+    /// Cycles in a row in which not everything was taken.
+    pub lost_in_a_row: u32,
+    /// SYNCs handed over since start.
+    pub syncs: u64,
+}
+
+/// Why the arm stopped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cause {
+    /// The kind.
+    pub reason: FaultReason,
+    /// Zero-based joint, where one is to blame.
+    pub joint: Option<usize>,
+    /// The number that belongs to the reason.
+    pub value: f64,
+    /// The limit that it broke; 0 where there is none.
+    pub limit: f64,
+}
+
+/// One change of phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transition {
+    /// In which cycle.
+    pub tick: u64,
+    /// The phase before.
+    pub from: Phase,
+    /// The phase after.
+    pub to: Phase,
+    /// What happened.
+    pub event: Event,
+    /// The fault behind it.
+    pub cause: Option<Cause>,
+}
+
+/// Everything that one cycle has found out.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// The cycle.
+    pub tick: Tick,
+    /// Commands taken in this cycle.
+    pub commands: [Option<Asked>; COMMANDS_MAX],
+    /// What became of the trajectory that was offered.
+    pub verdict: Option<Verdict>,
+    /// The drives are wished energised: the setpoint is meant for metal.
+    pub live: bool,
+    /// Id of the trajectory that made the setpoint; 0 when the arm holds or brakes.
+    pub trajectory_id: u64,
+    /// Its trajectory time.
+    pub trajectory_s: f64,
+    /// The time scale at the setpoint.
+    pub scale: Scale,
+    /// Time since the last setpoint that left.
+    pub gap_s: f64,
+    /// That time is beyond what the drives bridge: the trajectory stands still.
+    pub frozen: bool,
+    /// The setpoint is the trajectory's end.
+    pub end_reached: bool,
+    /// sigma is 0 and stays so.
+    pub at_rest: bool,
+    /// Another change of speed can be taken.
+    pub can_ramp: bool,
+    /// Why the guard refused the setpoint, in the cycle in which it did.
+    pub trip: Option<Trip>,
+    /// The brake that a trip began.
+    pub braking: Braking,
+    /// Lowest and highest angle of the brake, one pair a joint.
+    pub sweep_rad: [[f64; 2]; MAX_JOINTS],
+    /// The buses.
+    pub buses: [BusFacts; BUSES_MAX],
+    /// The drives, after receiving.
+    pub servos: [ServoStatus; MAX_JOINTS],
+    /// Pose of the last setpoint that left.
+    pub commanded_rad: JointArray,
+}
+
+impl Facts {
+    /// A cycle of which nothing is known yet.
+    #[must_use]
+    pub fn begin(tick: Tick) -> Self {
+        Self {
+            tick,
+            commands: [None; COMMANDS_MAX],
+            verdict: None,
+            live: false,
+            trajectory_id: 0,
+            trajectory_s: 0.0,
+            scale: Scale::default(),
+            gap_s: 0.0,
+            frozen: false,
+            end_reached: false,
+            at_rest: false,
+            can_ramp: false,
+            trip: None,
+            braking: Braking::No,
+            sweep_rad: [[0.0; 2]; MAX_JOINTS],
+            buses: [BusFacts::default(); BUSES_MAX],
+            servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
+            commanded_rad: [0.0; MAX_JOINTS],
+        }
+    }
+
+    /// Cycles in a row that the worst bus has lost.
+    #[must_use]
+    pub fn lost_in_a_row(&self) -> u32 {
+        self.buses.iter().map(|b| b.lost_in_a_row).max().unwrap_or(0)
+    }
+
+    /// True when at least one frame left, or none was wanted.
+    #[must_use]
+    pub fn setpoints_left(&self) -> bool {
+        let wanted: u32 = self.buses.iter().map(|b| b.wanted).sum();
+        wanted == 0 || self.buses.iter().any(|b| b.sent > 0)
+    }
+}

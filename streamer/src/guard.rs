@@ -1,0 +1,329 @@
+//! The last gate before metal: what it lets pass is finite, inside the position and stop limits against the
+//! commands before it, and slow enough to stop before the position limit.
+//!
+//! Differences are divided differences over the commands that left, on their true times. Each of them is an average
+//! of the derivative over the time it spans (its Peano kernel is positive and of unit mass), so a motion inside
+//! its limits cannot exceed them by discretisation, skipped cycles included; what is left is rounding, for which
+//! [`SLACK`] is plenty. Hence the guard never trips in a verified motion.
+//!
+//! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
+use crate::facts::{Braking, Facts, Trip, TripKind};
+use crate::track::Wanted;
+use taustream_drivers::JointCommand;
+use taustream_motion::brake::{Brake, JointState};
+use taustream_motion::limits::Quantity;
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
+
+/// Relative excess over a limit that is taken for rounding.
+const SLACK: f64 = 1e-3;
+/// Excess of a position over its limit that is taken for rounding, rad.
+const POSITION_SLACK_RAD: f64 = 1e-6;
+/// Excess of a velocity, acceleration or jerk that is taken for rounding, in their SI units.
+const RATE_SLACK: f64 = 1e-3;
+/// Commands that the third difference needs besides the new one.
+const PAST: usize = 3;
+
+/// A command that has passed the guard. Only [`Guard`] makes one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuardedCommand {
+    setpoint: Setpoint,
+    joints: [JointCommand; MAX_JOINTS],
+}
+
+impl GuardedCommand {
+    fn new(setpoint: Setpoint) -> Self {
+        let mut joints = [JointCommand::default(); MAX_JOINTS];
+        let rates = setpoint.velocity_rad_s.iter().zip(&setpoint.acceleration_rad_s2);
+        for (joint, (position, (velocity, acceleration))) in
+            joints.iter_mut().zip(setpoint.position_rad.iter().zip(rates))
+        {
+            *joint = JointCommand {
+                position_rad: *position,
+                velocity_rad_s: *velocity,
+                acceleration_rad_s2: *acceleration,
+            };
+        }
+        Self { setpoint, joints }
+    }
+    /// As drivers take it.
+    #[must_use]
+    pub fn joints(&self) -> &[JointCommand; MAX_JOINTS] {
+        &self.joints
+    }
+    /// Position and derivatives.
+    #[must_use]
+    pub fn setpoint(&self) -> &Setpoint {
+        &self.setpoint
+    }
+}
+
+/// One joint's last commands, newest first, with the time to the one after each.
+#[derive(Clone, Copy, Debug, Default)]
+struct Past {
+    position_rad: [f64; PAST],
+    step_s: [f64; PAST],
+}
+
+/// A joint's derivatives as the commands themselves show them.
+#[derive(Clone, Copy, Debug)]
+struct Differences {
+    velocity_rad_s: f64,
+    acceleration_rad_s2: f64,
+    jerk_rad_s3: f64,
+    /// Time that the second difference spans.
+    span_s: f64,
+}
+
+impl Past {
+    fn at_rest(position_rad: f64, period_s: f64) -> Self {
+        Self { position_rad: [position_rad; PAST], step_s: [period_s; PAST] }
+    }
+
+    fn differences(&self, position_rad: f64, step_s: f64) -> Differences {
+        let [q1, q2, q3] = self.position_rad;
+        let [h2, h3, _] = self.step_s;
+        let h1 = step_s;
+        let (v1, v2, v3) = ((position_rad - q1) / h1, (q1 - q2) / h2, (q2 - q3) / h3);
+        let (a1, a2) = (2.0 * (v1 - v2) / (h1 + h2), 2.0 * (v2 - v3) / (h2 + h3));
+        Differences {
+            velocity_rad_s: v1,
+            acceleration_rad_s2: a1,
+            jerk_rad_s3: 3.0 * (a1 - a2) / (h1 + h2 + h3),
+            span_s: h1 + h2,
+        }
+    }
+
+    fn push(&mut self, position_rad: f64, step_s: f64) {
+        let [q1, q2, _] = self.position_rad;
+        let [h1, h2, _] = self.step_s;
+        *self = Self { position_rad: [position_rad, q1, q2], step_s: [step_s, h1, h2] };
+    }
+}
+
+/// A brake that runs.
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    brakes: [Brake; MAX_JOINTS],
+    /// Time since the last good state, at the last command that left.
+    sent_s: f64,
+}
+
+/// The guard, with its memory of the commands that left.
+#[derive(Debug)]
+pub struct Guard {
+    limits: [JointLimits; MAX_JOINTS],
+    joints: usize,
+    period_s: f64,
+    past: [Past; MAX_JOINTS],
+    good: Setpoint,
+    next: Setpoint,
+    next_step_s: f64,
+    restarted: bool,
+    brake: Option<Running>,
+}
+
+impl Guard {
+    /// A guard that remembers the zero pose at rest.
+    #[must_use]
+    pub fn new(limits: [JointLimits; MAX_JOINTS], joints: usize, period_us: u32) -> Self {
+        let period_s = f64::from(period_us.max(1)) * 1e-6;
+        Self {
+            limits,
+            joints,
+            period_s,
+            past: [Past::at_rest(0.0, period_s); MAX_JOINTS],
+            good: Setpoint::default(),
+            next: Setpoint::default(),
+            next_step_s: period_s,
+            restarted: false,
+            brake: None,
+        }
+    }
+
+    /// Lets a setpoint pass, or replaces it by a braking command and says why.
+    ///
+    /// Real time: closed forms, no allocation.
+    pub fn limit(&mut self, wanted: &Wanted, facts: &mut Facts) -> GuardedCommand {
+        #[expect(clippy::cast_precision_loss, reason = "periods between two commands")]
+        let step_s = wanted.periods as f64 * self.period_s;
+        self.next_step_s = step_s;
+        self.restarted = wanted.restart;
+        if wanted.restart && self.brake.is_none() {
+            self.remember_at_rest(&wanted.setpoint.position_rad);
+        }
+        if wanted.live && self.brake.is_none() {
+            if let Some(trip) = self.find_trip(wanted, step_s) {
+                facts.trip = Some(trip);
+                self.brake = Some(self.begin_brake());
+            }
+        }
+        self.next = match self.brake {
+            None => wanted.setpoint,
+            Some(running) => self.braking_command(&running, step_s, facts),
+        };
+        GuardedCommand::new(self.next)
+    }
+
+    /// Notes that the command has left.
+    ///
+    /// Real time: a copy.
+    pub fn commit(&mut self, facts: &Facts) {
+        if !facts.setpoints_left() {
+            return;
+        }
+        for (past, position_rad) in self.past.iter_mut().zip(self.next.position_rad) {
+            if self.restarted {
+                *past = Past::at_rest(position_rad, self.period_s);
+            } else {
+                past.push(position_rad, self.next_step_s);
+            }
+        }
+        self.good = self.next;
+        if let Some(running) = &mut self.brake {
+            running.sent_s += self.next_step_s;
+        }
+    }
+
+    /// Forgets a brake that has ended; the last command is the pose at rest.
+    ///
+    /// Real time: a copy.
+    pub fn release(&mut self) {
+        self.brake = None;
+        let pose_rad = self.good.position_rad;
+        self.remember_at_rest(&pose_rad);
+    }
+
+    fn remember_at_rest(&mut self, position_rad: &JointArray) {
+        // A pose that is not finite is no memory; the check of the setpoint itself will refuse it.
+        for ((past, good), position) in
+            self.past.iter_mut().zip(&mut self.good.position_rad).zip(position_rad)
+        {
+            if position.is_finite() {
+                *past = Past::at_rest(*position, self.period_s);
+                *good = *position;
+            }
+        }
+        self.good = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
+    }
+
+    fn find_trip(&self, wanted: &Wanted, step_s: f64) -> Option<Trip> {
+        let w = &wanted.setpoint;
+        let values = w.position_rad.iter().zip(&w.velocity_rad_s).zip(&w.acceleration_rad_s2);
+        let states = values.map(|((position, velocity), acceleration)| JointState {
+            position_rad: *position,
+            velocity_rad_s: *velocity,
+            acceleration_rad_s2: *acceleration,
+        });
+        let joints = states.zip(&self.past).zip(&self.limits).take(self.joints);
+        joints.enumerate().find_map(|(joint, ((state, past), limits))| {
+            let (kind, value, limit) = refuse(&state, past, limits, step_s)?;
+            Some(Trip { joint, kind, value, limit })
+        })
+    }
+
+    fn begin_brake(&self) -> Running {
+        let mut brakes = [Brake::default(); MAX_JOINTS];
+        let g = &self.good;
+        let values = g.position_rad.iter().zip(&g.velocity_rad_s).zip(&g.acceleration_rad_s2);
+        for ((brake, ((position, velocity), acceleration)), limits) in
+            brakes.iter_mut().zip(values).zip(&self.limits)
+        {
+            let start = JointState {
+                position_rad: *position,
+                velocity_rad_s: *velocity,
+                acceleration_rad_s2: *acceleration,
+            };
+            *brake = Brake::from_state(start, limits.stop.acceleration_rad_s2, limits.stop.jerk_rad_s3);
+        }
+        Running { brakes, sent_s: 0.0 }
+    }
+
+    fn braking_command(&self, running: &Running, step_s: f64, facts: &mut Facts) -> Setpoint {
+        // Behind a stall the drives stand still at the last command: the brake is over there.
+        if facts.frozen {
+            facts.braking = Braking::Rested;
+            return Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
+        }
+        let now_s = running.sent_s + step_s;
+        let mut setpoint = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
+        let mut rested = true;
+        for (joint, brake) in running.brakes.iter().enumerate().take(self.joints) {
+            let (state, jerk_rad_s3) = brake.sample(now_s);
+            rested &= now_s >= brake.duration_s();
+            setpoint.position_rad[joint] = state.position_rad;
+            setpoint.velocity_rad_s[joint] = state.velocity_rad_s;
+            setpoint.acceleration_rad_s2[joint] = state.acceleration_rad_s2;
+            setpoint.jerk_rad_s3[joint] = jerk_rad_s3;
+            facts.sweep_rad[joint] = brake.sweep_rad();
+        }
+        facts.braking = if rested { Braking::Rested } else { Braking::Running };
+        facts.trajectory_id = 0;
+        setpoint
+    }
+}
+
+type Refusal = (TripKind, f64, f64);
+
+/// The first thing that is wrong with one joint's setpoint.
+fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) -> Option<Refusal> {
+    let (q, v, a) = (state.position_rad, state.velocity_rad_s, state.acceleration_rad_s2);
+    if let Some(value) = [q, v, a].into_iter().find(|x| !x.is_finite()) {
+        return Some((TripKind::NotFinite, value, 0.0));
+    }
+    let [lowest, highest] = limits.position_rad;
+    // A joint that rests outside its range (it was moved there by a brake, say) may stay; it may not move there.
+    let moved = (q - past.position_rad[0]).abs() > 0.0;
+    if moved && q < lowest - POSITION_SLACK_RAD {
+        return Some((TripKind::Limit(Quantity::Position), q, lowest));
+    }
+    if moved && q > highest + POSITION_SLACK_RAD {
+        return Some((TripKind::Limit(Quantity::Position), q, highest));
+    }
+    let seen = past.differences(q, step_s);
+    let stop = &limits.stop;
+    let beyond = |value: f64, limit: f64| value.abs() > limit * (1.0 + SLACK) + RATE_SLACK;
+    for (quantity, value, limit) in [
+        (Quantity::Velocity, seen.velocity_rad_s, stop.velocity_rad_s),
+        (Quantity::Acceleration, seen.acceleration_rad_s2, stop.acceleration_rad_s2),
+        (Quantity::Jerk, seen.jerk_rad_s3, stop.jerk_rad_s3),
+    ] {
+        if beyond(value, limit) {
+            return Some((TripKind::Limit(quantity), value, limit));
+        }
+    }
+    // The state from which a brake would start must be the one that the commands show.
+    let lag_rad_s = stop.acceleration_rad_s2 * step_s;
+    if beyond(v - seen.velocity_rad_s, lag_rad_s) {
+        return Some((TripKind::Inconsistent(Quantity::Velocity), v, seen.velocity_rad_s));
+    }
+    let lag_rad_s2 = stop.jerk_rad_s3 * seen.span_s;
+    if beyond(a - seen.acceleration_rad_s2, lag_rad_s2) {
+        return Some((TripKind::Inconsistent(Quantity::Acceleration), a, seen.acceleration_rad_s2));
+    }
+    let up = q + reach_rad(v, a, stop.acceleration_rad_s2, stop.jerk_rad_s3);
+    if moved && up > highest + POSITION_SLACK_RAD {
+        return Some((TripKind::CannotStop, up, highest));
+    }
+    let down = q - reach_rad(-v, -a, stop.acceleration_rad_s2, stop.jerk_rad_s3);
+    (moved && down < lowest - POSITION_SLACK_RAD).then_some((TripKind::CannotStop, down, lowest))
+}
+
+/// How far a joint still goes in the positive direction under the hardest braking: jerk -j down to acceleration
+/// -a_max, then constant. No motion inside the limits turns round earlier, so no verified motion fails this check
+/// (a brake that ends at rest swings out a little farther when the joint was about to turn round).
+fn reach_rad(v: f64, a: f64, a_max: f64, j: f64) -> f64 {
+    let square = a * a + 2.0 * j * v;
+    if square <= 0.0 || j <= 0.0 || a_max <= 0.0 {
+        return 0.0;
+    }
+    let after = |t: f64| v * t + a * t * t / 2.0 - j * t * t * t / 6.0;
+    let root = square.sqrt();
+    let distance = if root <= a_max {
+        after(((a + root) / j).max(0.0))
+    } else {
+        let t = ((a + a_max) / j).max(0.0);
+        let v_then = v + a * t - j * t * t / 2.0;
+        after(t) + v_then * v_then / (2.0 * a_max)
+    };
+    distance.max(0.0)
+}

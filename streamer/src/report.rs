@@ -1,0 +1,299 @@
+//! What the cycle tells the other threads: a report at the set rate, timings and records every cycle, notes on events.
+//!
+//! Everything is a plain value pushed into a bounded queue. A full queue drops the newest value and counts it: the
+//! cycle never waits for a reader.
+use crate::facts::{Facts, TRANSITIONS_MAX, Transition, Trip};
+use crate::facts::{BUSES_MAX, Decision};
+use crate::guard::GuardedCommand;
+use crate::supervise::{Orders, Supervisor};
+use crate::track::Track;
+use crossbeam_queue::ArrayQueue;
+use std::sync::Arc;
+use taustream_drivers::DriveState;
+use taustream_messages::{LAYOUT_VERSION, Phase, Report, RobotDigest};
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// Reports that may wait for the service thread.
+const REPORTS: usize = 16;
+/// Timings that may wait: a second at 1 kHz, and more.
+const TIMINGS: usize = 4096;
+/// Notes that may wait.
+const NOTES: usize = 256;
+/// Records that may wait for the cycle log: 16 s at 1 kHz.
+const RECORDS: usize = 16_384;
+
+/// How one cycle kept its time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timing {
+    /// Wake-up after the deadline, ns.
+    pub lateness_ns: u64,
+    /// Time in the cycle before, ns.
+    pub cycle_ns: u64,
+}
+
+/// Something that people should read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Note {
+    /// The phase changed.
+    Transition(Transition),
+    /// The guard refused a setpoint; the joints brake over these ranges.
+    Trip {
+        /// Why.
+        trip: Trip,
+        /// Lowest and highest angle a joint, rad.
+        sweep_rad: [[f64; 2]; MAX_JOINTS],
+    },
+    /// No setpoint left for longer than the drives bridge.
+    Stall {
+        /// How long, s.
+        gap_s: f64,
+    },
+}
+
+/// One cycle that sent setpoints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CycleRecord {
+    /// Cycle number.
+    pub tick: u64,
+    /// CLOCK_MONOTONIC of the wake-up, ns.
+    pub time_ns: u64,
+    /// SYNCs handed to each bus so far, this cycle's included.
+    pub syncs: [u64; BUSES_MAX],
+    /// The phase after the cycle.
+    pub phase: Phase,
+    /// The trajectory that made the setpoint; 0 when the arm holds or brakes.
+    pub trajectory_id: u64,
+    /// Its trajectory time, s.
+    pub s: f64,
+    /// The time scale.
+    pub sigma: f64,
+    /// What was encoded, rad.
+    pub position_rad: JointArray,
+    /// Frames taken by each bus.
+    pub sent: [u32; BUSES_MAX],
+    /// Frames refused by each bus.
+    pub lost: [u32; BUSES_MAX],
+}
+
+/// One line of the cycle log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Record {
+    /// A trajectory runs from this cycle on.
+    Accepted {
+        /// Cycle number.
+        tick: u64,
+        /// The trajectory.
+        trajectory_id: u64,
+    },
+    /// The phase changed.
+    Transition(Transition),
+    /// A cycle sent setpoints.
+    Cycle(CycleRecord),
+    /// This many records found the queue full.
+    Lost(u64),
+}
+
+/// The reading ends of the queues.
+#[derive(Clone, Debug)]
+pub struct Readers {
+    /// Reports without sequence numbers and histograms.
+    pub reports: Arc<ArrayQueue<Report>>,
+    /// One entry a cycle.
+    pub timings: Arc<ArrayQueue<Timing>>,
+    /// Events.
+    pub notes: Arc<ArrayQueue<Note>>,
+    /// The cycle log's lines; nothing is pushed unless a log is kept.
+    pub records: Arc<ArrayQueue<Record>>,
+}
+
+/// The cycle's end: counts since start, and the queues.
+#[derive(Debug)]
+pub struct Reporter {
+    queues: Readers,
+    recording: bool,
+    every_ticks: u64,
+    next_tick: u64,
+    period_ns: u64,
+    frozen_before: bool,
+    records_lost: u64,
+    last_running: Running,
+    counts: Report,
+}
+
+/// The trajectory that runs or ran last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Running {
+    id: u64,
+    s: f64,
+    duration_s: f64,
+}
+
+impl Reporter {
+    /// A reporter for an arm; `rate_hz` reports a second, and records for a cycle log if `recording`.
+    #[must_use]
+    pub fn new(digest: RobotDigest, joints: usize, cycle: &taustream_arm::settings::Cycle, recording: bool) -> Self {
+        let period_ns = u64::from(cycle.period_us.max(1)) * 1_000;
+        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of a period")]
+        let ticks = (1e9 / (cycle.report_rate_hz * period_ns as f64)).round().clamp(1.0, 1e9);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 1e9")]
+        let every_ticks = ticks as u64;
+        let counts = Report {
+            layout_version: LAYOUT_VERSION,
+            joint_count: u32::try_from(joints).unwrap_or(u32::MAX),
+            robot_digest: digest,
+            ..Report::default()
+        };
+        let queues = Readers {
+            reports: Arc::new(ArrayQueue::new(REPORTS)),
+            timings: Arc::new(ArrayQueue::new(TIMINGS)),
+            notes: Arc::new(ArrayQueue::new(NOTES)),
+            records: Arc::new(ArrayQueue::new(if recording { RECORDS } else { 1 })),
+        };
+        Self {
+            queues,
+            recording,
+            every_ticks,
+            next_tick: 0,
+            period_ns,
+            frozen_before: false,
+            records_lost: 0,
+            last_running: Running::default(),
+            counts,
+        }
+    }
+
+    /// The reading ends.
+    #[must_use]
+    pub fn readers(&self) -> Readers {
+        self.queues.clone()
+    }
+
+    /// Counts this cycle and tells what is due.
+    ///
+    /// Real time: copies into queues; never waits, never allocates.
+    pub fn write(&mut self, facts: &Facts, command: &GuardedCommand, track: &Track, judged: (&Supervisor, &Orders)) {
+        let (supervisor, orders) = judged;
+        self.count(facts);
+        if let Some(running) = track.running() {
+            let duration_s = running.trajectory.duration_s();
+            self.last_running = Running { id: running.trajectory_id, s: facts.trajectory_s, duration_s };
+        }
+        let timing =
+            Timing { lateness_ns: facts.tick.lateness_ns(), cycle_ns: facts.tick.last_cycle_ns };
+        drop(self.queues.timings.push(timing));
+        self.write_notes(facts, &orders.transitions);
+        if self.recording {
+            self.write_records(facts, command, supervisor.phase(), &orders.transitions);
+        }
+        let changed = orders.transitions[0].is_some() || facts.verdict.is_some();
+        if changed || facts.tick.number >= self.next_tick {
+            self.next_tick = facts.tick.number + self.every_ticks;
+            drop(self.queues.reports.push(self.report(facts, command, track, supervisor)));
+        }
+    }
+
+    fn count(&mut self, facts: &Facts) {
+        let c = &mut self.counts;
+        c.cycles += 1;
+        c.cycles_skipped += facts.tick.skipped;
+        c.cycles_late += u64::from(facts.tick.lateness_ns() > self.period_ns / 2);
+        c.guard_trips += u64::from(facts.trip.is_some());
+        c.stalls += u64::from(facts.frozen && !self.frozen_before);
+        for bus in &facts.buses {
+            c.frames_sent += u64::from(bus.sent);
+            c.frames_lost += u64::from(bus.wanted - bus.sent.min(bus.wanted));
+            c.frames_received += u64::from(bus.received);
+        }
+    }
+
+    fn write_notes(&mut self, facts: &Facts, transitions: &[Option<Transition>; TRANSITIONS_MAX]) {
+        if let Some(trip) = facts.trip {
+            drop(self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad }));
+        }
+        if facts.frozen && !self.frozen_before {
+            drop(self.queues.notes.push(Note::Stall { gap_s: facts.gap_s }));
+        }
+        self.frozen_before = facts.frozen;
+        for transition in transitions.iter().flatten() {
+            drop(self.queues.notes.push(Note::Transition(*transition)));
+        }
+    }
+
+    fn write_records(
+        &mut self,
+        facts: &Facts,
+        command: &GuardedCommand,
+        phase: Phase,
+        transitions: &[Option<Transition>; TRANSITIONS_MAX],
+    ) {
+        if let Some(verdict) = facts.verdict {
+            if let Decision::Accepted { tick } = verdict.decision {
+                self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id });
+            }
+        }
+        for transition in transitions.iter().flatten() {
+            self.record(Record::Transition(*transition));
+        }
+        if facts.live {
+            self.record(Record::Cycle(CycleRecord {
+                tick: facts.tick.number,
+                time_ns: facts.tick.woke.0,
+                syncs: facts.buses.map(|b| b.syncs),
+                phase,
+                trajectory_id: facts.trajectory_id,
+                s: if facts.trajectory_id == 0 { 0.0 } else { facts.trajectory_s },
+                sigma: facts.scale.sigma,
+                position_rad: command.setpoint().position_rad,
+                sent: facts.buses.map(|b| b.sent),
+                lost: facts.buses.map(|b| b.wanted - b.sent.min(b.wanted)),
+            }));
+        }
+    }
+
+    fn record(&mut self, record: Record) {
+        if self.records_lost > 0 && self.queues.records.push(Record::Lost(self.records_lost)).is_ok() {
+            self.records_lost = 0;
+        }
+        if self.records_lost > 0 || self.queues.records.push(record).is_err() {
+            self.records_lost += 1;
+        }
+    }
+
+    fn report(&self, facts: &Facts, command: &GuardedCommand, track: &Track, supervisor: &Supervisor) -> Report {
+        let cause = supervisor.cause();
+        let setpoint = command.setpoint();
+        let (tracking_error_rad, tracking_error_rad_max) = supervisor.watch().tracking_rad();
+        let joints = self.counts.joints();
+        let mut r = self.counts;
+        (r.tick, r.time_ns, r.phase) = (facts.tick.number, facts.tick.woke.0, supervisor.phase().code());
+        r.fault_reason = cause.map_or(0, |c| c.reason.code());
+        r.fault_joint = cause.and_then(|c| u32::try_from(c.joint?).ok()).unwrap_or(u32::MAX);
+        (r.fault_value, r.fault_limit) = cause.map_or((0.0, 0.0), |c| (c.value, c.limit));
+        r.energised = u32::from(facts.servos.iter().take(joints).any(|s| is_energised(s.state)));
+        r.generation = track.newest_generation();
+        let run = self.last_running;
+        (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
+        r.end_rad = track.running().map_or(facts.commanded_rad, |t| t.trajectory.end_rad());
+        (r.sigma, r.speed_percent) = (facts.scale.sigma, supervisor.speed() * 100.0);
+        r.command_rad = facts.commanded_rad;
+        r.command_velocity_rad_s = setpoint.velocity_rad_s;
+        r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
+        r.command_jerk_rad_s3 = setpoint.jerk_rad_s3;
+        (r.tracking_error_rad, r.tracking_error_rad_max) = (tracking_error_rad, tracking_error_rad_max);
+        for (joint, servo) in facts.servos.iter().enumerate().take(joints) {
+            r.measured_rad[joint] = servo.position_rad;
+            r.measured_velocity_rad_s[joint] = servo.velocity_rad_s;
+            r.feedback_age_s[joint] = supervisor.watch().age_s(facts, joint);
+            r.drive_status[joint] = servo.status_word;
+            r.drive_error[joint] = servo.error_code;
+        }
+        r
+    }
+}
+
+fn is_energised(state: DriveState) -> bool {
+    matches!(
+        state,
+        DriveState::Enabled | DriveState::Enabling | DriveState::Disabling | DriveState::EnergisedUnowned
+    )
+}

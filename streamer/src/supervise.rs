@@ -1,0 +1,636 @@
+//! The supervisor: turns one cycle's facts into events, and events into the next phase by the table of `phases`.
+//!
+//! It is the only owner of the phase. What it decides steers the next cycle: what the drives are wished to be, how the
+//! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
+//! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
+use crate::facts::{Asked, Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition};
+use crate::intake::Leave;
+use crate::phases::{self, Event};
+use crate::track::ScaleOrder;
+use crate::watch::{REST_RAD_S, Watch};
+use crate::words::{Answer, Why};
+use taustream_arm::settings::{Cycle, Supervision};
+use taustream_drivers::{DriveState, DriveWish, Nanos, ServoStatus};
+use taustream_messages::{Command, FaultReason, Phase};
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
+
+/// How long the drives may take to come to rest after a stall before the arm stays paused, s.
+const STALL_REST_S: f64 = 1.0;
+/// How long leaving orderly may take: the longest ramp, the drives' time-out and a margin, s.
+const LEAVE_S_MAX: f64 = 10.0;
+/// How long torque off is repeated before leaving at once, s.
+const LEAVE_AT_ONCE_S: f64 = 0.05;
+
+/// What one cycle's judgement asks of the other stages.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Orders {
+    /// How the speed along the path changes.
+    pub speed: Option<ScaleOrder>,
+    /// The trajectory is dropped and the last pose held.
+    pub drop_trajectory: bool,
+    /// This pose becomes the commanded one.
+    pub pose_rad: Option<JointArray>,
+    /// Drives are asked to forget their faults.
+    pub clear_faults: bool,
+    /// The changes of phase, in order.
+    pub transitions: [Option<Transition>; TRANSITIONS_MAX],
+    /// The cycle ends after this one; true: orderly.
+    pub leave: Option<bool>,
+}
+
+/// The arm's phase and everything that decides it.
+#[derive(Debug)]
+pub struct Supervisor {
+    rules: Supervision,
+    limits: [JointLimits; MAX_JOINTS],
+    joints: usize,
+    stall_resume_s: f64,
+    watchdog_s: f64,
+    watch: Watch,
+    phase: Phase,
+    since: Nanos,
+    cause: Option<Cause>,
+    /// In fault: the drives hold instead of being off.
+    holds: bool,
+    torque_off: bool,
+    speed: f64,
+    /// A stall froze the motion; it goes on when the drives rest.
+    stalled_since: Option<Nanos>,
+    resetting_since: Option<Nanos>,
+    leaving: Leave,
+    leaving_since: Nanos,
+}
+
+impl Supervisor {
+    /// A supervisor of an arm of which nothing is known.
+    #[must_use]
+    pub fn new(
+        limits: [JointLimits; MAX_JOINTS],
+        joints: usize,
+        cycle: &Cycle,
+        rules: &Supervision,
+    ) -> Self {
+        Self {
+            rules: *rules,
+            limits,
+            joints,
+            stall_resume_s: f64::from(cycle.stall_resume_ms) * 1e-3,
+            watchdog_s: f64::from(cycle.drive_watchdog_ms) * 1e-3,
+            watch: Watch::new(*rules, &limits, joints, cycle.period_us),
+            phase: Phase::Configuring,
+            since: Nanos(0),
+            cause: None,
+            holds: false,
+            torque_off: false,
+            speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
+            stalled_since: None,
+            resetting_since: None,
+            leaving: Leave::No,
+            leaving_since: Nanos(0),
+        }
+    }
+
+    /// The phase.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+    /// The fault, if there is one.
+    #[must_use]
+    pub fn cause(&self) -> Option<Cause> {
+        self.cause
+    }
+    /// The speed override, 0 to 1.
+    #[must_use]
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+    /// What is known of the feedback.
+    #[must_use]
+    pub fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// What the drives should be.
+    #[must_use]
+    pub fn wish(&self) -> DriveWish {
+        if self.torque_off {
+            return DriveWish::TorqueOff;
+        }
+        match self.phase {
+            Phase::Configuring | Phase::Disabled | Phase::Disabling => DriveWish::Disabled,
+            Phase::Fault if !self.holds => DriveWish::Disabled,
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping
+            | Phase::FastStopping
+            | Phase::Braking
+            | Phase::Fault
+            | Phase::Locked => DriveWish::Enabled,
+        }
+    }
+
+    /// Judges one cycle: its facts first, then its commands, then leaving. `answers` takes the commands' answers.
+    ///
+    /// Real time: bounded work, no allocation.
+    pub fn judge(
+        &mut self,
+        facts: &Facts,
+        leave: Leave,
+        answers: &mut [Option<Answer>; crate::facts::COMMANDS_MAX],
+    ) -> Orders {
+        let mut orders = Orders::default();
+        self.watch.observe(facts);
+        self.judge_motion(facts, &mut orders);
+        self.judge_stall(facts, &mut orders);
+        self.judge_drives(facts, &mut orders);
+        for (asked, answer) in facts.commands.iter().zip(answers.iter_mut()) {
+            *answer = asked.map(|asked| self.command(asked, facts, &mut orders));
+        }
+        self.judge_leaving(leave, facts, &mut orders);
+        self.follow_measured(facts, &mut orders);
+        orders
+    }
+
+    /// Applies an event to the table, and what every entry into a phase brings with it.
+    fn step(&mut self, event: Event, facts: &Facts, orders: &mut Orders) -> bool {
+        let Some(to) = phases::next(self.phase, event) else { return false };
+        let transition =
+            Transition { tick: facts.tick.number, from: self.phase, to, event, cause: self.cause };
+        if let Some(slot) = orders.transitions.iter_mut().find(|slot| slot.is_none()) {
+            *slot = Some(transition);
+        }
+        (self.phase, self.since) = (to, facts.tick.woke);
+        match to {
+            Phase::Holding | Phase::Fault | Phase::Disabling | Phase::Locked => {
+                orders.drop_trajectory = true;
+            }
+            Phase::Stopping | Phase::FastStopping | Phase::Pausing => {
+                orders.speed = Some(ScaleOrder::Stop);
+                self.stalled_since = None;
+            }
+            Phase::Configuring
+            | Phase::Disabled
+            | Phase::Enabling
+            | Phase::Moving
+            | Phase::Paused
+            | Phase::Braking => {}
+        }
+        true
+    }
+
+    fn raise(&mut self, event: Event, cause: Cause, facts: &Facts, orders: &mut Orders) {
+        // Drives that were on their way to energised go back; drives that carry the arm hold.
+        let holds = self.wish() == DriveWish::Enabled && self.phase != Phase::Enabling;
+        let before = self.cause.replace(cause);
+        if phases::next(self.phase, event).is_none() {
+            self.cause = before;
+            return;
+        }
+        self.holds = holds && event != Event::HardFault;
+        self.step(event, facts, orders);
+    }
+
+    fn judge_motion(&mut self, facts: &Facts, orders: &mut Orders) {
+        if let Some(verdict) = facts.verdict {
+            if matches!(verdict.decision, Decision::Accepted { .. }) {
+                self.stalled_since = None;
+                self.step(Event::Accepted, facts, orders);
+            }
+        }
+        if let Some(trip) = facts.trip {
+            let joint = Some(trip.joint);
+            let cause = Cause { reason: FaultReason::Guard, joint, value: trip.value, limit: trip.limit };
+            // In a fast stop the first cause stays the one to report.
+            let cause = if self.phase == Phase::FastStopping { self.cause.unwrap_or(cause) } else { cause };
+            self.raise(Event::GuardTrip, cause, facts, orders);
+        }
+        match self.phase {
+            Phase::Braking if facts.braking == Braking::Rested => {
+                self.step(Event::AtRest, facts, orders);
+            }
+            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping => {
+                let event = if facts.end_reached { Event::EndReached } else { Event::AtRest };
+                if facts.end_reached || facts.at_rest {
+                    self.step(event, facts, orders);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Gaps beyond what the drives bridge (design section 4).
+    fn judge_stall(&mut self, facts: &Facts, orders: &mut Orders) {
+        let energised = self.wish() == DriveWish::Enabled && self.phase != Phase::Fault;
+        if energised && facts.gap_s > self.watchdog_s {
+            let cause =
+                Cause { reason: FaultReason::Stall, joint: None, value: facts.gap_s, limit: self.watchdog_s };
+            self.raise(Event::StopFault, cause, facts, orders);
+        }
+        if self.phase != Phase::Moving {
+            return;
+        }
+        if facts.frozen {
+            self.stalled_since = Some(facts.tick.woke);
+            if facts.gap_s > self.stall_resume_s {
+                self.stalled_since = None;
+                self.step(Event::StalledLong, facts, orders);
+            }
+            return;
+        }
+        let Some(since) = self.stalled_since else { return };
+        if self.watch.is_at_rest() && facts.can_ramp {
+            self.stalled_since = None;
+            orders.speed = Some(ScaleOrder::Wish(self.speed));
+        } else if facts.tick.woke.since_s(since) > STALL_REST_S {
+            self.stalled_since = None;
+            self.step(Event::StalledLong, facts, orders);
+        }
+    }
+
+    fn judge_drives(&mut self, facts: &Facts, orders: &mut Orders) {
+        match self.phase {
+            Phase::Configuring | Phase::Disabled => self.judge_bring_up(facts, orders),
+            Phase::Disabling => {
+                if self.all(facts, |s| s.state == DriveState::Disabled) {
+                    self.step(Event::DrivesDisabled, facts, orders);
+                } else if let Some(cause) = self.overdue(facts, |s| s.state == DriveState::Disabled) {
+                    self.raise(Event::HardFault, cause, facts, orders);
+                }
+            }
+            Phase::Fault => self.judge_fault(facts, orders),
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping
+            | Phase::Locked => {
+                let enabling = self.phase == Phase::Enabling;
+                let enabled = |s: &ServoStatus| s.state == DriveState::Enabled;
+                if let Some(cause) = self.watch.find_cause(facts, enabling) {
+                    self.raise(Event::StopFault, cause, facts, orders);
+                } else if enabling && self.all(facts, enabled) {
+                    self.step(Event::DrivesEnabled, facts, orders);
+                } else if let Some(cause) = self.overdue(facts, enabled).filter(|_| enabling) {
+                    self.raise(Event::StopFault, cause, facts, orders);
+                }
+            }
+            // The arm is on its way to rest already; nothing that drives say changes how.
+            Phase::FastStopping | Phase::Braking => {}
+        }
+    }
+
+    fn judge_bring_up(&mut self, facts: &Facts, orders: &mut Orders) {
+        let bad = self.servos(facts).find_map(|(joint, servo)| {
+            let code = f64::from(servo.error_code);
+            let (reason, value) = match servo.state {
+                DriveState::Refused => (FaultReason::ConfigurationRefused, code),
+                DriveState::EnergisedUnowned => (FaultReason::NotTrusted, 0.0),
+                DriveState::Fault => (FaultReason::DriveFault, code),
+                DriveState::Absent
+                | DriveState::Configuring
+                | DriveState::Disabled
+                | DriveState::Enabling
+                | DriveState::Enabled
+                | DriveState::Disabling => return None,
+            };
+            Some(Cause { reason, joint: Some(joint), value, limit: 0.0 })
+        });
+        if let Some(cause) = bad {
+            self.raise(Event::HardFault, cause, facts, orders);
+        } else if self.all(facts, |s| s.state == DriveState::Disabled) {
+            self.step(Event::DrivesReady, facts, orders);
+        } else {
+            self.step(Event::DrivesLost, facts, orders);
+        }
+    }
+
+    fn judge_fault(&mut self, facts: &Facts, orders: &mut Orders) {
+        // Drives that have all dropped out do not come back by themselves.
+        if self.holds && self.energised(facts).is_none() {
+            self.holds = false;
+        }
+        let Some(since) = self.resetting_since else { return };
+        let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
+        if self.servos(facts).any(|(_, s)| faulty(s)) {
+            if facts.tick.woke.since_s(since) > self.rules.drive_timeout_s {
+                self.resetting_since = None;
+            }
+        } else {
+            self.clear(Event::ClearedOff, facts, orders);
+        }
+    }
+
+    fn clear(&mut self, event: Event, facts: &Facts, orders: &mut Orders) {
+        self.resetting_since = None;
+        (self.cause, self.torque_off, self.holds) = (None, false, false);
+        self.step(event, facts, orders);
+    }
+
+    /// While nothing is energised, the commanded pose is the measured one, so that enabling moves nothing.
+    fn follow_measured(&mut self, facts: &Facts, orders: &mut Orders) {
+        if self.wish() == DriveWish::Enabled || orders.pose_rad.is_some() {
+            return;
+        }
+        let mut pose_rad = facts.commanded_rad;
+        for (joint, servo) in self.servos(facts) {
+            if servo.position_rad.is_finite() {
+                pose_rad[joint] = servo.position_rad;
+            }
+        }
+        orders.pose_rad = Some(pose_rad);
+    }
+
+    fn judge_leaving(&mut self, leave: Leave, facts: &Facts, orders: &mut Orders) {
+        if leave > self.leaving {
+            (self.leaving, self.leaving_since) = (leave, facts.tick.woke);
+        }
+        let time_s = facts.tick.woke.since_s(self.leaving_since);
+        match self.leaving {
+            Leave::No => {}
+            Leave::AtOnce => {
+                self.switch_off(facts, orders);
+                if time_s > LEAVE_AT_ONCE_S {
+                    orders.leave = Some(false);
+                }
+            }
+            Leave::Orderly => {
+                match self.phase {
+                    Phase::Moving | Phase::Pausing | Phase::Paused => {
+                        self.step(Event::StopAsked, facts, orders);
+                    }
+                    Phase::Holding | Phase::Locked | Phase::Enabling => {
+                        self.step(Event::DisableAsked, facts, orders);
+                    }
+                    Phase::Fault => self.holds = false,
+                    Phase::Configuring
+                    | Phase::Disabled
+                    | Phase::Stopping
+                    | Phase::FastStopping
+                    | Phase::Braking
+                    | Phase::Disabling => {}
+                }
+                let off = matches!(self.phase, Phase::Configuring | Phase::Disabled | Phase::Fault);
+                if off && self.energised(facts).is_none() {
+                    orders.leave = Some(true);
+                } else if time_s > LEAVE_S_MAX {
+                    orders.leave = Some(false);
+                }
+            }
+        }
+    }
+
+    fn switch_off(&mut self, facts: &Facts, orders: &mut Orders) {
+        self.torque_off = true;
+        self.holds = false;
+        self.resetting_since = None;
+        let asked = Cause { reason: FaultReason::TorqueOff, joint: None, value: 0.0, limit: 0.0 };
+        // A fault that stopped the arm before stays the one to report.
+        let cause = self.cause.unwrap_or(asked);
+        self.raise(Event::HardFault, cause, facts, orders);
+    }
+
+    fn command(&mut self, asked: Asked, facts: &Facts, orders: &mut Orders) -> Answer {
+        let result = match asked.command {
+            Command::Enable | Command::Resume if self.leaving != Leave::No => Err(Why::Leaving),
+            Command::Enable => self.enable(facts, orders),
+            Command::Disable => self.disable(facts, orders),
+            Command::Pause => self.pause(facts, orders),
+            Command::Resume => self.resume(facts, orders),
+            Command::Stop => self.stop(facts, orders),
+            Command::FastStop => self.fast_stop(facts, orders),
+            Command::TorqueOff => {
+                self.switch_off(facts, orders);
+                Ok(Why::TorqueOff)
+            }
+            Command::Speed { percent } => self.set_speed(percent, facts, orders),
+            Command::ClearFault => self.clear_fault(facts, orders),
+        };
+        let (accepted, why) = match result {
+            Ok(why) => (true, why),
+            Err(why) => (false, why),
+        };
+        Answer { sequence: asked.sequence, accepted, phase: self.phase, why }
+    }
+
+    fn enable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Locked => {
+                self.step(Event::EnableAsked, facts, orders);
+                Ok(Why::Unlocked)
+            }
+            Phase::Disabled => {
+                let pose_rad = self.trusted_pose(facts)?;
+                self.watch.restart(&pose_rad);
+                orders.pose_rad = Some(pose_rad);
+                self.step(Event::EnableAsked, facts, orders);
+                Ok(Why::Enabling)
+            }
+            Phase::Configuring => Err(self.first_not(facts, DriveState::Disabled).unwrap_or(Why::Wait)),
+            Phase::Fault | Phase::FastStopping | Phase::Braking => Err(Why::ClearFirst),
+            Phase::Disabling => Err(Why::Wait),
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping => Ok(Why::Already),
+        }
+    }
+
+    /// The measured pose, if every joint answers, rests, and stands inside its range.
+    fn trusted_pose(&self, facts: &Facts) -> Result<JointArray, Why> {
+        let mut pose_rad = [0.0; MAX_JOINTS];
+        for (joint, servo) in self.servos(facts) {
+            let age_s = self.watch.age_s(facts, joint);
+            if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
+                return Err(Why::NoFeedback { joint, age_s });
+            }
+            if servo.warning {
+                return Err(Why::Warns { joint, status_word: servo.status_word });
+            }
+            let range_rad = self.limits[joint].position_rad;
+            let position_rad = servo.position_rad;
+            if !(range_rad[0]..=range_rad[1]).contains(&position_rad) {
+                return Err(Why::OutOfRange { joint, position_rad, range_rad });
+            }
+            pose_rad[joint] = position_rad;
+        }
+        let (joint, speed_rad_s) = self.watch.fastest();
+        if speed_rad_s > REST_RAD_S {
+            return Err(Why::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
+        }
+        Ok(pose_rad)
+    }
+
+    fn disable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Fault if self.holds => {
+                self.holds = false;
+                Ok(Why::Disabling)
+            }
+            Phase::Configuring | Phase::Disabled | Phase::Disabling | Phase::Fault => Ok(Why::Already),
+            Phase::Enabling | Phase::Holding | Phase::Paused | Phase::Locked => {
+                self.step(Event::DisableAsked, facts, orders);
+                Ok(Why::Disabling)
+            }
+            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking => {
+                Err(Why::StopFirst)
+            }
+        }
+    }
+
+    fn pause(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Moving => {
+                self.step(Event::PauseAsked, facts, orders);
+                Ok(Why::Pausing)
+            }
+            Phase::Pausing | Phase::Paused => Ok(Why::Already),
+            _ => Err(Why::NothingMoves),
+        }
+    }
+
+    fn resume(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Pausing | Phase::Paused if !facts.can_ramp => Err(Why::TooManyRamps),
+            Phase::Pausing | Phase::Paused => {
+                orders.speed = Some(ScaleOrder::Wish(self.speed));
+                self.step(Event::ResumeAsked, facts, orders);
+                Ok(Why::Resuming)
+            }
+            Phase::Moving => Ok(Why::Already),
+            Phase::Fault => Err(Why::ClearFirst),
+            _ => Err(Why::NothingToResume),
+        }
+    }
+
+    fn stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Moving | Phase::Pausing | Phase::Paused => {
+                self.step(Event::StopAsked, facts, orders);
+                Ok(Why::Stopping)
+            }
+            Phase::Stopping | Phase::FastStopping | Phase::Braking => Ok(Why::Already),
+            _ => Ok(Why::NothingMoves),
+        }
+    }
+
+    fn fast_stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::FastStopping | Phase::Braking | Phase::Fault => Ok(Why::Already),
+            Phase::Configuring | Phase::Disabled | Phase::Disabling => Ok(Why::NothingMoves),
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping
+            | Phase::Locked => {
+                let cause = Cause { reason: FaultReason::Operator, joint: None, value: 0.0, limit: 0.0 };
+                self.raise(Event::StopFault, cause, facts, orders);
+                Ok(Why::FastStopping)
+            }
+        }
+    }
+
+    fn set_speed(&mut self, percent: f64, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        let moving = self.phase == Phase::Moving;
+        if moving && self.stalled_since.is_none() {
+            if !facts.can_ramp {
+                return Err(Why::TooManyRamps);
+            }
+            orders.speed = Some(ScaleOrder::Wish((percent / 100.0).clamp(0.0, 1.0)));
+        }
+        self.speed = (percent / 100.0).clamp(0.0, 1.0);
+        Ok(Why::SpeedSet { percent, moving })
+    }
+
+    fn clear_fault(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Fault => {}
+            Phase::FastStopping | Phase::Braking => return Err(Why::Wait),
+            _ => return Err(Why::NoFault),
+        }
+        if self.watch.bus_cause(facts).is_some() {
+            return Err(Why::BusFails { lost_in_a_row: facts.lost_in_a_row() });
+        }
+        if self.holds {
+            self.may_hold_on(facts)?;
+            self.clear(Event::ClearedHolding, facts, orders);
+            return Ok(Why::ClearedHolding);
+        }
+        if let Some((joint, state)) = self.energised(facts) {
+            let unowned = state == DriveState::EnergisedUnowned;
+            return Err(if unowned { Why::Unowned { joint } } else { Why::StillEnergised { joint } });
+        }
+        orders.clear_faults = true;
+        let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
+        if self.servos(facts).any(|(_, s)| faulty(s)) {
+            self.resetting_since = Some(facts.tick.woke);
+            return Ok(Why::Resetting);
+        }
+        self.clear(Event::ClearedOff, facts, orders);
+        Ok(Why::ClearedOff)
+    }
+
+    /// A fault is forgotten while drives hold only if every one of them does, and nothing is left to complain about.
+    fn may_hold_on(&self, facts: &Facts) -> Result<(), Why> {
+        for (joint, servo) in self.servos(facts) {
+            if servo.state != DriveState::Enabled {
+                return Err(Why::PartlyEnergised { joint, state: servo.state });
+            }
+            if servo.warning {
+                return Err(Why::Warns { joint, status_word: servo.status_word });
+            }
+            if let Some(cause) = self.watch.feedback_cause(facts, joint) {
+                return Err(if cause.reason == FaultReason::FeedbackLate {
+                    Why::NoFeedback { joint, age_s: cause.value }
+                } else {
+                    Why::Tracking { joint, error_rad: cause.value, limit_rad: cause.limit }
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn servos<'a>(&self, facts: &'a Facts) -> impl Iterator<Item = (usize, &'a ServoStatus)> + use<'a> {
+        facts.servos.iter().enumerate().take(self.joints)
+    }
+
+    fn all(&self, facts: &Facts, test: impl Fn(&ServoStatus) -> bool) -> bool {
+        self.servos(facts).all(|(_, servo)| test(servo))
+    }
+
+    fn first_not(&self, facts: &Facts, state: DriveState) -> Option<Why> {
+        let mut others = self.servos(facts).filter(|(_, s)| s.state != state);
+        others.next().map(|(joint, s)| Why::NotConfigured { joint, state: s.state })
+    }
+
+    /// The first drive that carries torque.
+    fn energised(&self, facts: &Facts) -> Option<(usize, DriveState)> {
+        let on = |s: &ServoStatus| {
+            matches!(
+                s.state,
+                DriveState::Enabled
+                    | DriveState::Enabling
+                    | DriveState::Disabling
+                    | DriveState::EnergisedUnowned
+            )
+        };
+        self.servos(facts).find(|(_, s)| on(s)).map(|(joint, s)| (joint, s.state))
+    }
+
+    fn overdue(&self, facts: &Facts, done: impl Fn(&ServoStatus) -> bool) -> Option<Cause> {
+        let limit = self.rules.drive_timeout_s;
+        if facts.tick.woke.since_s(self.since) <= limit {
+            return None;
+        }
+        let joint = self.servos(facts).find(|(_, s)| !done(s)).map(|(joint, _)| joint);
+        Some(Cause { reason: FaultReason::BringUp, joint, value: limit, limit })
+    }
+}

@@ -1,0 +1,258 @@
+//! Where the arm should be: the trajectory that runs, its time, and the scale at which that time passes.
+//!
+//! Everything is counted from the last setpoint that left. A cycle that was skipped, or whose frames were
+//! refused, therefore costs nothing but a longer step, up to the gap that the drives bridge. Beyond it the drives
+//! have stopped by themselves: trajectory time stays where the last setpoint was, and sigma starts from 0.
+use crate::facts::{Decision, Facts, Verdict};
+use crate::intake::Boxed;
+use taustream_arm::settings::{Cycle, Supervision};
+use taustream_messages::Phase;
+use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
+use taustream_motion::trajectory::Cursor;
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
+
+/// Settled scales are started over after this many periods, so that their time axis stays short and exact.
+const AXIS_PERIODS_MAX: u64 = 60_000;
+
+/// What the guard is asked to let pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// The setpoint, its derivatives by real time.
+    pub setpoint: Setpoint,
+    /// Periods since the last setpoint that left.
+    pub periods: u64,
+    /// The drives stand still at this pose: earlier commands do not count.
+    pub restart: bool,
+    /// The drives follow what is commanded.
+    pub live: bool,
+}
+
+/// How the speed along the path changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ScaleOrder {
+    /// sigma to 0; never refused.
+    Stop,
+    /// sigma to this value.
+    Wish(f64),
+}
+
+/// A point of the track; `sent` is the last that left, `next` the one being sent.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mark {
+    tick: u64,
+    s: f64,
+    /// Periods on the scale's time axis.
+    axis: u64,
+    position_rad: JointArray,
+}
+
+/// The trajectory that runs, or the pose that is held.
+#[derive(Debug)]
+pub struct Track {
+    joints: usize,
+    period_s: f64,
+    tolerated_periods: u64,
+    base_tolerance_rad: f64,
+    ramp_s: f64,
+    scale: TimeScale,
+    running: Option<Boxed>,
+    cursor: Cursor,
+    starting: bool,
+    restart: bool,
+    newest_generation: u64,
+    sent: Mark,
+    next: Mark,
+}
+
+impl Track {
+    /// A track that holds the zero pose until [`Self::set_pose`].
+    #[must_use]
+    pub fn new(
+        limits: &[JointLimits; MAX_JOINTS],
+        joints: usize,
+        cycle: &Cycle,
+        supervision: &Supervision,
+    ) -> Self {
+        let ramp_s = ramp_duration_s(limits, joints);
+        Self {
+            joints,
+            period_s: f64::from(cycle.period_us) * 1e-6,
+            tolerated_periods: u64::from(cycle.tolerated_gap_periods).max(1),
+            base_tolerance_rad: supervision.base_tolerance_rad,
+            ramp_s,
+            scale: TimeScale::settled(0.0, ramp_s),
+            running: None,
+            cursor: Cursor::default(),
+            starting: false,
+            restart: true,
+            newest_generation: 0,
+            sent: Mark::default(),
+            next: Mark::default(),
+        }
+    }
+
+    /// Takes an offered trajectory over, or says why not. Returns the box that is not needed.
+    ///
+    /// The decisions here are those that only this moment can tell; everything else was checked before.
+    ///
+    /// Real time: no allocation, nothing is freed.
+    pub fn splice(
+        &mut self,
+        offer: Option<Boxed>,
+        phase: Phase,
+        sigma: f64,
+        facts: &mut Facts,
+    ) -> Option<Boxed> {
+        let offer = offer?;
+        let decision = self.decide(&offer, phase, facts.tick.number);
+        facts.verdict =
+            Some(Verdict { trajectory_id: offer.trajectory_id, generation: offer.generation, decision });
+        if !matches!(decision, Decision::Accepted { .. }) {
+            return Some(offer);
+        }
+        self.newest_generation = offer.generation;
+        self.cursor = Cursor::at_start(&offer.trajectory);
+        self.scale = TimeScale::settled(sigma, self.ramp_s);
+        (self.sent.s, self.sent.axis) = (0.0, 0);
+        (self.starting, self.restart) = (true, true);
+        self.running.replace(offer)
+    }
+
+    fn decide(&self, offer: &Boxed, phase: Phase, tick: u64) -> Decision {
+        if offer.generation <= self.newest_generation {
+            return Decision::Stale { newest: self.newest_generation };
+        }
+        if phase != Phase::Holding {
+            return Decision::NotReady { phase };
+        }
+        let base = offer.trajectory.base_rad().iter().zip(&self.sent.position_rad);
+        for (joint, (base_rad, held_rad)) in base.enumerate().take(self.joints) {
+            let by_rad = (base_rad - held_rad).abs();
+            // The difference reaches the drives as a step: the tolerance is below what an encoder sees.
+            if by_rad.is_nan() || by_rad > self.base_tolerance_rad {
+                return Decision::NotAtBase { joint, by_rad };
+            }
+        }
+        Decision::Accepted { tick }
+    }
+
+    /// The setpoint of this tick.
+    ///
+    /// Real time: touches only the strokes that run.
+    pub fn sample(&mut self, live: bool, facts: &mut Facts) -> Wanted {
+        let tick = facts.tick.number;
+        let periods = tick.saturating_sub(self.sent.tick).max(1);
+        self.shorten_axis();
+        facts.gap_s = self.seconds(periods);
+        facts.live = live;
+        self.next = Mark { tick, ..self.sent };
+        let mut setpoint = Setpoint { position_rad: self.sent.position_rad, ..Setpoint::default() };
+        let mut restart = self.restart;
+        if let Some(running) = &self.running {
+            facts.trajectory_id = running.trajectory_id;
+            if periods > self.tolerated_periods && !self.starting {
+                self.scale = TimeScale::settled(0.0, self.ramp_s);
+                (self.sent.axis, self.next.axis) = (0, 0);
+                (facts.frozen, restart) = (true, true);
+            } else {
+                let step = if self.starting { 0 } else { periods };
+                self.next.axis = self.sent.axis + step;
+                let (from_s, to_s) = (self.seconds(self.sent.axis), self.seconds(self.next.axis));
+                let end_s = running.trajectory.duration_s();
+                self.next.s = (self.sent.s + self.advance_s(from_s, to_s, step)).min(end_s);
+                facts.scale = self.scale.sample(to_s);
+                facts.end_reached = self.next.s >= end_s;
+                setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), facts.scale);
+                self.next.position_rad = setpoint.position_rad;
+            }
+            let now_s = self.seconds(self.next.axis);
+            facts.at_rest = self.scale.wished() <= 0.0 && self.scale.is_settled(now_s);
+        }
+        facts.trajectory_s = self.next.s;
+        Wanted { setpoint, periods, restart, live }
+    }
+
+    /// Notes what left: `position_rad` is what the guard let pass.
+    ///
+    /// Real time: a copy.
+    pub fn commit(&mut self, position_rad: &JointArray, facts: &mut Facts) {
+        if facts.setpoints_left() {
+            self.sent = Mark { position_rad: *position_rad, ..self.next };
+            (self.starting, self.restart) = (false, false);
+        }
+        facts.commanded_rad = self.sent.position_rad;
+        let mut trial = self.scale;
+        facts.can_ramp = trial.wish(1.0, self.seconds(self.sent.axis)).is_ok();
+    }
+
+    /// Changes the speed along the path from the last setpoint on.
+    ///
+    /// Real time: no allocation.
+    pub fn change_speed(&mut self, order: ScaleOrder) {
+        let now_s = self.seconds(self.sent.axis);
+        match order {
+            ScaleOrder::Stop => self.scale.stop(now_s),
+            // `Facts::can_ramp` was asked first; a wish that is refused changes nothing.
+            ScaleOrder::Wish(sigma) => drop(self.scale.wish(sigma, now_s)),
+        }
+    }
+
+    /// Forgets the trajectory and holds the last pose that left. Returns the box.
+    ///
+    /// Real time: nothing is freed.
+    pub fn drop_trajectory(&mut self) -> Option<Boxed> {
+        (self.starting, self.restart) = (false, true);
+        self.sent.s = 0.0;
+        self.scale = TimeScale::settled(0.0, self.ramp_s);
+        self.sent.axis = 0;
+        self.running.take()
+    }
+
+    /// Makes a pose the commanded one: only while drives are de-energised, or as they are being energised.
+    ///
+    /// Real time: a copy.
+    pub fn set_pose(&mut self, position_rad: &JointArray) {
+        self.sent.position_rad = *position_rad;
+        self.restart = true;
+    }
+
+    /// The trajectory that runs.
+    #[must_use]
+    pub fn running(&self) -> Option<&Boxed> {
+        self.running.as_ref()
+    }
+
+    /// The newest generation accepted.
+    #[must_use]
+    pub fn newest_generation(&self) -> u64 {
+        self.newest_generation
+    }
+
+    /// The scale at the last setpoint that left.
+    #[must_use]
+    pub fn scale(&self) -> Scale {
+        self.scale.sample(self.seconds(self.sent.axis))
+    }
+
+    /// A settled scale advances by a product: no rounding of long times enters.
+    fn advance_s(&self, from_s: f64, to_s: f64, periods: u64) -> f64 {
+        if self.scale.is_settled(from_s) {
+            self.scale.wished() * self.seconds(periods)
+        } else {
+            self.scale.advance_s(from_s, to_s)
+        }
+    }
+
+    fn shorten_axis(&mut self) {
+        if self.sent.axis > AXIS_PERIODS_MAX && self.scale.is_settled(self.seconds(self.sent.axis)) {
+            self.scale = TimeScale::settled(self.scale.wished(), self.ramp_s);
+            self.sent.axis = 0;
+        }
+    }
+
+    fn seconds(&self, periods: u64) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "2^53 periods are longer than any machine lives")]
+        let count = periods as f64;
+        count * self.period_s
+    }
+}

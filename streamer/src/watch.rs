@@ -1,0 +1,220 @@
+//! Supervision of what the drives answer: state, age of feedback, jumps, tracking error, rest.
+//!
+//! A setpoint of cycle N is sent behind SYNC N, taken over at SYNC N+1 and interpolated up to SYNC N+2; the position
+//! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
+//! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay.
+use crate::facts::{Cause, Facts};
+use taustream_arm::settings::Supervision;
+use taustream_drivers::{DriveState, Nanos};
+use taustream_messages::FaultReason;
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
+
+/// Cycles from a command to the measured position that answers it.
+pub const TRANSPORT_CYCLES: usize = 2;
+/// Cycles over which speed is measured to tell rest: long enough for coarse encoders.
+const REST_CYCLES: usize = 32;
+/// Speed below which a joint rests.
+pub const REST_RAD_S: f64 = 0.05;
+
+/// One joint's answers.
+#[derive(Clone, Copy, Debug)]
+struct Answers {
+    received: Option<Nanos>,
+    position_rad: f64,
+    jump_rad: f64,
+    jump_limit_rad: f64,
+    tracking_rad: f64,
+    tracking_rad_max: f64,
+    past_rad: [f64; REST_CYCLES],
+    past_at: [Nanos; REST_CYCLES],
+}
+
+impl Answers {
+    const NONE: Self = Self {
+        received: None,
+        position_rad: f64::NAN,
+        jump_rad: 0.0,
+        jump_limit_rad: f64::INFINITY,
+        tracking_rad: 0.0,
+        tracking_rad_max: 0.0,
+        past_rad: [f64::NAN; REST_CYCLES],
+        past_at: [Nanos(0); REST_CYCLES],
+    };
+}
+
+/// What the drives of all joints have answered lately.
+#[derive(Debug)]
+pub struct Watch {
+    rules: Supervision,
+    joints: usize,
+    velocity_rad_s_max: JointArray,
+    period_s: f64,
+    commands_rad: [JointArray; TRANSPORT_CYCLES + 1],
+    answers: [Answers; MAX_JOINTS],
+    slot: usize,
+}
+
+impl Watch {
+    /// Nothing heard yet.
+    #[must_use]
+    pub fn new(
+        rules: Supervision,
+        limits: &[JointLimits; MAX_JOINTS],
+        joints: usize,
+        period_us: u32,
+    ) -> Self {
+        Self {
+            rules,
+            joints,
+            velocity_rad_s_max: limits.map(|l| l.stop.velocity_rad_s),
+            period_s: f64::from(period_us) * 1e-6,
+            commands_rad: [[0.0; MAX_JOINTS]; TRANSPORT_CYCLES + 1],
+            answers: [Answers::NONE; MAX_JOINTS],
+            slot: 0,
+        }
+    }
+
+    /// Takes in what this cycle has sent and received.
+    ///
+    /// Real time: no allocation.
+    pub fn observe(&mut self, facts: &Facts) {
+        if facts.setpoints_left() {
+            self.commands_rad.rotate_right(1);
+            self.commands_rad[0] = facts.commanded_rad;
+        }
+        self.slot = (self.slot + 1) % REST_CYCLES;
+        let command_rad = self.commands_rad[TRANSPORT_CYCLES];
+        let joints = self.answers.iter_mut().zip(&facts.servos).zip(&command_rad);
+        for (((answer, servo), command_rad), speed_max) in
+            joints.zip(&self.velocity_rad_s_max).take(self.joints)
+        {
+            answer.past_rad[self.slot] = servo.position_rad;
+            answer.past_at[self.slot] = facts.tick.woke;
+            let Some(received) = servo.received else { continue };
+            if answer.received == Some(received) {
+                continue;
+            }
+            if let Some(before) = answer.received {
+                // A joint may move on while answers are missing; more than that is a jump.
+                let missed_s = (received.since_s(before) - self.period_s).max(0.0);
+                answer.jump_rad = (servo.position_rad - answer.position_rad).abs();
+                answer.jump_limit_rad = self.rules.position_jump_rad_max + missed_s * speed_max;
+            }
+            (answer.received, answer.position_rad) = (Some(received), servo.position_rad);
+            answer.tracking_rad = (servo.position_rad - command_rad).abs();
+            answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
+        }
+    }
+
+    /// Begins anew at a pose that has become the commanded one.
+    ///
+    /// Real time: copies.
+    pub fn restart(&mut self, pose_rad: &JointArray) {
+        self.commands_rad = [*pose_rad; TRANSPORT_CYCLES + 1];
+        for answer in &mut self.answers {
+            (answer.jump_rad, answer.tracking_rad, answer.tracking_rad_max) = (0.0, 0.0, 0.0);
+        }
+    }
+
+    /// The first reason to stop energised drives: whole bus first, then joint by joint. `enabling` lets drives be
+    /// on their way.
+    ///
+    /// Real time: no allocation.
+    #[must_use]
+    pub fn find_cause(&self, facts: &Facts, enabling: bool) -> Option<Cause> {
+        self.bus_cause(facts).or_else(|| {
+            (0..self.joints).find_map(|joint| {
+                drive_cause(facts, joint, enabling).or_else(|| self.feedback_cause(facts, joint))
+            })
+        })
+    }
+
+    /// A bus that does not carry setpoints any more.
+    #[must_use]
+    pub fn bus_cause(&self, facts: &Facts) -> Option<Cause> {
+        let lost = facts.lost_in_a_row();
+        let trouble = facts.buses.iter().any(|b| b.trouble.is_some());
+        (trouble || lost >= self.rules.lost_cycles_max.max(1)).then_some(Cause {
+            reason: FaultReason::BusFault,
+            joint: None,
+            value: f64::from(lost),
+            limit: f64::from(self.rules.lost_cycles_max),
+        })
+    }
+
+    /// Feedback of one joint that is late, jumps, or is far from its command.
+    #[must_use]
+    pub fn feedback_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
+        let answer = self.answers.get(joint)?;
+        let rules = &self.rules;
+        let age_s = self.age_s(facts, joint);
+        let checks = [
+            (FaultReason::FeedbackLate, age_s, rules.feedback_age_s_max),
+            (FaultReason::PositionJump, answer.jump_rad, answer.jump_limit_rad),
+            (FaultReason::TrackingError, answer.tracking_rad, rules.tracking_error_rad_max),
+        ];
+        // A value that is not a number is beyond every limit.
+        let found = checks.into_iter().find(|(_, value, limit)| value.is_nan() || value > limit);
+        found.map(|(reason, value, limit)| Cause { reason, joint: Some(joint), value, limit })
+    }
+
+    /// Age of a joint's newest feedback, s; infinite before the first.
+    #[must_use]
+    pub fn age_s(&self, facts: &Facts, joint: usize) -> f64 {
+        let received = self.answers.get(joint).and_then(|a| a.received);
+        received.map_or(f64::INFINITY, |at| facts.tick.woke.since_s(at))
+    }
+
+    /// The fastest joint and its speed over the last cycles, rad/s; infinite while too little was heard.
+    #[must_use]
+    pub fn fastest(&self) -> (usize, f64) {
+        let oldest = (self.slot + 1) % REST_CYCLES;
+        let mut worst = (0, 0.0);
+        for (joint, answer) in self.answers.iter().enumerate().take(self.joints) {
+            let time_s = answer.past_at[self.slot].since_s(answer.past_at[oldest]);
+            let moved_rad = (answer.past_rad[self.slot] - answer.past_rad[oldest]).abs();
+            let speed = if time_s > 0.0 { moved_rad / time_s } else { f64::INFINITY };
+            let speed = if speed.is_nan() { f64::INFINITY } else { speed };
+            if speed > worst.1 {
+                worst = (joint, speed);
+            }
+        }
+        worst
+    }
+
+    /// True when every joint rests.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.fastest().1 <= REST_RAD_S
+    }
+
+    /// Tracking error of every joint now, and the largest since the last restart, rad.
+    #[must_use]
+    pub fn tracking_rad(&self) -> (JointArray, JointArray) {
+        (self.answers.map(|a| a.tracking_rad), self.answers.map(|a| a.tracking_rad_max))
+    }
+}
+
+/// A drive that is not where it should be, or that warns.
+fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
+    let servo = facts.servos.get(joint)?;
+    let fault = Cause {
+        reason: FaultReason::DriveFault,
+        joint: Some(joint),
+        value: f64::from(servo.error_code),
+        limit: 0.0,
+    };
+    let dropped =
+        Cause { reason: FaultReason::DriveDropped, value: f64::from(servo.status_word), ..fault };
+    match servo.state {
+        DriveState::Fault => Some(fault),
+        // A warning is the drive's last word before it drops out: the arm stops while it still can.
+        DriveState::Enabled => servo.warning.then_some(fault),
+        DriveState::Disabled | DriveState::Enabling => (!enabling).then_some(dropped),
+        DriveState::Absent
+        | DriveState::Configuring
+        | DriveState::EnergisedUnowned
+        | DriveState::Disabling
+        | DriveState::Refused => Some(dropped),
+    }
+}
