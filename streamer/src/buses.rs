@@ -60,6 +60,13 @@ impl Buses {
         if buses.len() > BUSES_MAX { Err(TooManyBuses(buses.len())) } else { Ok(Self(buses)) }
     }
 
+    /// What the links are, for people.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let links: Vec<String> = self.0.iter().map(|b| b.link.describe()).collect();
+        links.join(", ")
+    }
+
     /// Writes every bus's frames.
     ///
     /// Real time: no allocation.

@@ -146,14 +146,10 @@ impl Desk {
         self.0.asked.push(asked).is_ok()
     }
 
-    /// Asks the cycle to end; a stronger wish replaces a weaker one.
-    pub fn ask_to_leave(&self, leave: Leave) {
-        let wish = match leave {
-            Leave::No => 0,
-            Leave::Orderly => 1,
-            Leave::AtOnce => 2,
-        };
-        self.0.leave.fetch_max(wish, Ordering::Relaxed);
+    /// A handle by which another thread asks the cycle to end.
+    #[must_use]
+    pub fn leaver(&self) -> Leaver {
+        Leaver(Arc::clone(&self.0))
     }
 
     /// The next answer to a command.
@@ -166,5 +162,21 @@ impl Desk {
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.0.verdicts.pop()
+    }
+}
+
+/// Asks the cycle to end.
+#[derive(Clone, Debug)]
+pub struct Leaver(Arc<Queues>);
+
+impl Leaver {
+    /// Asks; a stronger wish replaces a weaker one.
+    pub fn ask(&self, leave: Leave) {
+        let wish = match leave {
+            Leave::No => 0,
+            Leave::Orderly => 1,
+            Leave::AtOnce => 2,
+        };
+        self.0.leave.fetch_max(wish, Ordering::Relaxed);
     }
 }

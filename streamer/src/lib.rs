@@ -8,12 +8,13 @@
 //! This is not a safety function: its stops are best effort by software over a bus.
 #![deny(unsafe_code)]
 
-pub mod bench;
 pub mod buses;
+pub mod check;
 pub mod cycle;
 pub mod facts;
 pub mod guard;
 pub mod intake;
+pub mod log;
 pub mod phases;
 pub mod recorder;
 pub mod report;

@@ -1,2 +1,205 @@
-//! Placeholder.
-fn main() {}
+//! `taustream-streamer`: drives one arm.
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Parser;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread;
+use taustream_arm::Settings;
+use taustream_drivers::codec::cia402::Cia402Driver;
+use taustream_drivers::link::{self, LinkChoice, LinkRole};
+use taustream_messages::service::runtime_directory;
+use taustream_streamer::buses::{Bus, Buses};
+use taustream_streamer::cycle::{Core, Next};
+use taustream_streamer::intake::{self, Desk, Leave, Leaver};
+use taustream_streamer::recorder::{Candidate, Recorder};
+use taustream_streamer::report::Readers;
+use taustream_streamer::rt;
+use taustream_streamer::service::Service;
+use tracing::warn;
+
+/// Drives one arm: takes trajectories over shared memory, sends a setpoint to every joint a thousand times a second.
+///
+/// This is not a safety function. A machine needs its own hard-wired emergency stop and safe torque off.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Example: taustream-streamer --settings config/settings/vcan6.toml\n\n\
+    SIGTERM or SIGINT: stop on the path, hold, de-energise, end. A second one: torque off and end.\n\
+    Log lines go to stderr; RUST_LOG=debug shows more."
+)]
+struct Arguments {
+    /// Settings of the arm's controller: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    settings: PathBuf,
+    /// What carries frames.
+    #[arg(long, value_enum, default_value_t)]
+    link: LinkChoice,
+    /// Start without real-time rights. For trials: setpoints will be late.
+    #[arg(long)]
+    allow_non_realtime: bool,
+    /// Write every cycle to this file, one JSON object a line.
+    #[arg(long, value_name = "FILE")]
+    cycle_log: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+    let settings = match Settings::load(&arguments.settings) {
+        Ok(settings) => settings,
+        Err(faults) => {
+            tracing::error!("settings:\n{faults}");
+            return ExitCode::from(2);
+        }
+    };
+    match run(&arguments, settings) {
+        Ok(Next::Ended) => ExitCode::SUCCESS,
+        Ok(_) => {
+            tracing::error!("ended before the drives were seen to be de-energised");
+            ExitCode::FAILURE
+        }
+        Err(e) => {
+            tracing::error!("{e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
+    let buses = open_buses(&settings, arguments.link)?;
+    let described = buses.describe();
+    let (queues, desk) = intake::pair();
+    let leaver = desk.leaver();
+    let recording = arguments.cycle_log.is_some();
+    let core = Core::new(&settings, buses, queues, recording);
+    let readers = core.readers();
+
+    lock_memory(arguments.allow_non_realtime)?;
+    let (candidates, logged) = channel();
+    let recorder = match &arguments.cycle_log {
+        None => None,
+        Some(path) => {
+            let started = Recorder::start(path, &settings, Arc::clone(&readers.records), logged);
+            Some(started.with_context(|| format!("cycle log {}", path.display()))?)
+        }
+    };
+    let settings = Arc::new(settings);
+    let stop = Arc::new(AtomicBool::new(false));
+    let candidates = recording.then_some(candidates);
+    let service = start_service(&settings, desk, readers, candidates, Arc::clone(&stop))?;
+    forward_signals(leaver)?;
+
+    let outcome = run_real_time(core, &settings, arguments.allow_non_realtime, &described);
+    stop.store(true, Ordering::Release);
+    if service.join().is_err() {
+        tracing::error!("the service thread has panicked");
+    }
+    if let Some(Err(e)) = recorder.map(Recorder::finish) {
+        tracing::error!("cycle log: {e}");
+    }
+    outcome
+}
+
+fn open_buses(settings: &Settings, choice: LinkChoice) -> Result<Buses> {
+    let runtime = runtime_directory()?;
+    let mut buses = Vec::new();
+    for (index, bus) in settings.buses.iter().enumerate() {
+        let link = link::open(bus, choice, LinkRole::Master, &runtime)?;
+        let driver = Cia402Driver::new(settings, index)?;
+        buses.push(Bus::new(link, Box::new(driver)));
+    }
+    Ok(Buses::new(buses)?)
+}
+
+fn lock_memory(allowed_without: bool) -> Result<()> {
+    match rt::lock_memory() {
+        Ok(()) => Ok(()),
+        Err(e) if allowed_without => {
+            warn!("going on without locked memory: {e}");
+            Ok(())
+        }
+        Err(e) => Err(e.into()),
+    }
+}
+
+fn start_service(
+    settings: &Arc<Settings>,
+    desk: Desk,
+    readers: Readers,
+    candidates: Option<Sender<Candidate>>,
+    stop: Arc<AtomicBool>,
+) -> Result<thread::JoinHandle<()>> {
+    let (opened, result) = channel();
+    let settings = Arc::clone(settings);
+    let work = move || match Service::open(&settings, desk, readers, candidates) {
+        Ok(mut service) => {
+            let _ = opened.send(Ok(()));
+            service.serve(&stop);
+        }
+        Err(e) => {
+            let _ = opened.send(Err(e));
+        }
+    };
+    let thread = thread::Builder::new().name("service".into()).stack_size(2 << 20).spawn(work)?;
+    result.recv().context("the service thread has ended")??;
+    Ok(thread)
+}
+
+fn forward_signals(leaver: Leaver) -> Result<()> {
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let work = move || {
+        for (count, _) in signals.forever().enumerate() {
+            leaver.ask(if count == 0 { Leave::Orderly } else { Leave::AtOnce });
+        }
+    };
+    thread::Builder::new().name("signals".into()).stack_size(256 << 10).spawn(work)?;
+    Ok(())
+}
+
+fn run_real_time(
+    mut core: Core,
+    settings: &Settings,
+    allowed_without: bool,
+    described: &str,
+) -> Result<Next> {
+    let cycle = settings.cycle;
+    let (entered, result) = channel();
+    let (go, may_go) = channel::<()>();
+    let work = move || {
+        let _ = entered.send(rt::enter(cycle.priority, cycle.cpu));
+        // Without a word from `main` the rights were missing, and nothing runs.
+        may_go.recv().ok().map(|()| rt::run(&mut core, cycle.period_us))
+    };
+    let thread = thread::Builder::new().name("cycle".into()).stack_size(2 << 20).spawn(work)?;
+    if let Err(missing) = result.recv().context("the real-time thread has ended")? {
+        for error in &missing {
+            warn!("{error}");
+        }
+        if !allowed_without {
+            let list: Vec<String> = missing.iter().map(ToString::to_string).collect();
+            bail!("not started: {}", list.join("; "));
+        }
+        warn!("running without real-time rights, as told: setpoints will be late");
+    } else if let Some(warning) = rt::throttling_warning() {
+        warn!("{warning}");
+    }
+    let (joints, period_us) = (settings.robot.joints.len(), cycle.period_us);
+    let name = &settings.name;
+    writeln!(
+        std::io::stdout(),
+        "taustream-streamer ready: arm {name}, {joints} joints, {described}, {period_us} us"
+    )?;
+    std::io::stdout().flush()?;
+    go.send(()).context("the real-time thread has ended")?;
+    let next = thread.join().map_err(|_| {
+        anyhow!("the real-time thread has panicked; the drives react by their own watchdogs, and the arm is in their hands")
+    })?;
+    next.context("the real-time thread was not started")
+}

@@ -2,8 +2,8 @@
 //!
 //! Everything is a plain value pushed into a bounded queue. A full queue drops the newest value and counts it: the
 //! cycle never waits for a reader.
-use crate::facts::{Facts, TRANSITIONS_MAX, Transition, Trip};
 use crate::facts::{BUSES_MAX, Decision};
+use crate::facts::{Facts, TRANSITIONS_MAX, Transition, Trip};
 use crate::guard::GuardedCommand;
 use crate::supervise::{Orders, Supervisor};
 use crate::track::Track;
@@ -131,7 +131,12 @@ struct Running {
 impl Reporter {
     /// A reporter for an arm; `rate_hz` reports a second, and records for a cycle log if `recording`.
     #[must_use]
-    pub fn new(digest: RobotDigest, joints: usize, cycle: &taustream_arm::settings::Cycle, recording: bool) -> Self {
+    pub fn new(
+        digest: RobotDigest,
+        joints: usize,
+        cycle: &taustream_arm::settings::Cycle,
+        recording: bool,
+    ) -> Self {
         let period_ns = u64::from(cycle.period_us.max(1)) * 1_000;
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of a period")]
         let ticks = (1e9 / (cycle.report_rate_hz * period_ns as f64)).round().clamp(1.0, 1e9);
@@ -171,16 +176,21 @@ impl Reporter {
     /// Counts this cycle and tells what is due.
     ///
     /// Real time: copies into queues; never waits, never allocates.
-    pub fn write(&mut self, facts: &Facts, command: &GuardedCommand, track: &Track, judged: (&Supervisor, &Orders)) {
+    pub fn write(
+        &mut self,
+        facts: &Facts,
+        command: &GuardedCommand,
+        track: &Track,
+        judged: (&Supervisor, &Orders),
+    ) {
         let (supervisor, orders) = judged;
         self.count(facts);
         if let Some(running) = track.running() {
             let duration_s = running.trajectory.duration_s();
             self.last_running = Running { id: running.trajectory_id, s: facts.trajectory_s, duration_s };
         }
-        let timing =
-            Timing { lateness_ns: facts.tick.lateness_ns(), cycle_ns: facts.tick.last_cycle_ns };
-        drop(self.queues.timings.push(timing));
+        let timing = Timing { lateness_ns: facts.tick.lateness_ns(), cycle_ns: facts.tick.last_cycle_ns };
+        let _ = self.queues.timings.push(timing);
         self.write_notes(facts, &orders.transitions);
         if self.recording {
             self.write_records(facts, command, supervisor.phase(), &orders.transitions);
@@ -188,7 +198,7 @@ impl Reporter {
         let changed = orders.transitions[0].is_some() || facts.verdict.is_some();
         if changed || facts.tick.number >= self.next_tick {
             self.next_tick = facts.tick.number + self.every_ticks;
-            drop(self.queues.reports.push(self.report(facts, command, track, supervisor)));
+            let _ = self.queues.reports.push(self.report(facts, command, track, supervisor));
         }
     }
 
@@ -208,14 +218,14 @@ impl Reporter {
 
     fn write_notes(&mut self, facts: &Facts, transitions: &[Option<Transition>; TRANSITIONS_MAX]) {
         if let Some(trip) = facts.trip {
-            drop(self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad }));
+            let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad });
         }
         if facts.frozen && !self.frozen_before {
-            drop(self.queues.notes.push(Note::Stall { gap_s: facts.gap_s }));
+            let _ = self.queues.notes.push(Note::Stall { gap_s: facts.gap_s });
         }
         self.frozen_before = facts.frozen;
         for transition in transitions.iter().flatten() {
-            drop(self.queues.notes.push(Note::Transition(*transition)));
+            let _ = self.queues.notes.push(Note::Transition(*transition));
         }
     }
 
@@ -259,7 +269,13 @@ impl Reporter {
         }
     }
 
-    fn report(&self, facts: &Facts, command: &GuardedCommand, track: &Track, supervisor: &Supervisor) -> Report {
+    fn report(
+        &self,
+        facts: &Facts,
+        command: &GuardedCommand,
+        track: &Track,
+        supervisor: &Supervisor,
+    ) -> Report {
         let cause = supervisor.cause();
         let setpoint = command.setpoint();
         let (tracking_error_rad, tracking_error_rad_max) = supervisor.watch().tracking_rad();

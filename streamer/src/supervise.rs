@@ -64,12 +64,7 @@ pub struct Supervisor {
 impl Supervisor {
     /// A supervisor of an arm of which nothing is known.
     #[must_use]
-    pub fn new(
-        limits: [JointLimits; MAX_JOINTS],
-        joints: usize,
-        cycle: &Cycle,
-        rules: &Supervision,
-    ) -> Self {
+    pub fn new(limits: [JointLimits; MAX_JOINTS], joints: usize, cycle: &Cycle, rules: &Supervision) -> Self {
         Self {
             rules: *rules,
             limits,

@@ -193,7 +193,9 @@ impl Track {
         match order {
             ScaleOrder::Stop => self.scale.stop(now_s),
             // `Facts::can_ramp` was asked first; a wish that is refused changes nothing.
-            ScaleOrder::Wish(sigma) => drop(self.scale.wish(sigma, now_s)),
+            ScaleOrder::Wish(sigma) => {
+                let _ = self.scale.wish(sigma, now_s);
+            }
         }
     }
 

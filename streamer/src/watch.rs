@@ -204,8 +204,7 @@ fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
         value: f64::from(servo.error_code),
         limit: 0.0,
     };
-    let dropped =
-        Cause { reason: FaultReason::DriveDropped, value: f64::from(servo.status_word), ..fault };
+    let dropped = Cause { reason: FaultReason::DriveDropped, value: f64::from(servo.status_word), ..fault };
     match servo.state {
         DriveState::Fault => Some(fault),
         // A warning is the drive's last word before it drops out: the arm stops while it still can.

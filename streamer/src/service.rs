@@ -1,0 +1,330 @@
+//! The service thread: owner of every shared-memory port (they cannot move between threads).
+//!
+//! It copies trajectories out and has them checked on a thread of their own, so that a long check never delays a
+//! `stop`; it hands commands to the cycle and returns the cycle's answers; it publishes reports and receipts, keeps
+//! the histograms and writes the log. It may wait and allocate: the cycle does not notice.
+#![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
+use crate::check::{Checked, Checker};
+use crate::facts::{Asked, Decision, Verdict};
+use crate::intake::{COMMANDS_PENDING_MAX, Desk};
+use crate::log;
+use crate::recorder::Candidate;
+use crate::report::{Note, Readers};
+use crate::rt;
+use hdrhistogram::Histogram;
+use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::prelude::ipc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::Duration;
+use taustream_arm::{Settings, TrajectoryFile};
+use taustream_drivers::Nanos;
+use taustream_messages::service::{
+    CommandServer, ReceiptPublisher, ReportPublisher, ServiceError, TrajectorySubscriber, Wire,
+};
+use taustream_messages::{Command, CommandReply, CommandRequest, Outcome, Phase, Receipt, Rejection, Report};
+use tracing::{error, info, warn};
+
+/// How often ports and queues are looked at: the latency of a command, and no burden for a small machine.
+const INTERVAL: Duration = Duration::from_millis(2);
+/// How long the cycle may take to answer; it answers in one period unless it is dead.
+const ANSWER_S_MAX: f64 = 1.0;
+/// Longest time that the histograms tell apart, ns.
+const LONGEST_NS: u64 = 10_000_000_000;
+
+type Question = ActiveRequest<ipc::Service, CommandRequest, (), CommandReply, ()>;
+
+/// A command that waits for the cycle's answer.
+struct Pending {
+    sequence: u64,
+    since: Nanos,
+    question: Question,
+}
+
+/// Everything that the service thread owns.
+pub struct Service {
+    desk: Desk,
+    readers: Readers,
+    names: Vec<String>,
+    robot: String,
+    digest_hex: String,
+    checker: Checker,
+    candidates: Option<Sender<Candidate>>,
+    trajectories: TrajectorySubscriber,
+    receipts: ReceiptPublisher,
+    reports: ReportPublisher,
+    commands: CommandServer,
+    pending: Vec<Pending>,
+    next_sequence: u64,
+    lateness: Histogram<u64>,
+    lateness_window: Histogram<u64>,
+    cycle: Histogram<u64>,
+    phase: Phase,
+    report_sequence: u64,
+    newest_generation: u64,
+    accepted: u64,
+    rejected: u64,
+}
+
+/// Why the service thread cannot serve.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Shared memory refuses.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// Histograms or threads cannot be made.
+    #[error("cannot start the service thread: {0}")]
+    System(String),
+}
+
+impl Service {
+    /// Opens every port of the arm. Call it on the thread that will serve.
+    ///
+    /// # Errors
+    /// When shared memory refuses, for instance because a streamer serves this arm already.
+    pub fn open(
+        settings: &Settings,
+        desk: Desk,
+        readers: Readers,
+        candidates: Option<Sender<Candidate>>,
+    ) -> Result<Self, StartError> {
+        let wire = Wire::join(&settings.name, "taustream-streamer")?;
+        // The one that can be had only once comes first: a second streamer ends here.
+        let commands = wire.command_server()?;
+        let histogram =
+            || Histogram::new_with_bounds(1, LONGEST_NS, 3).map_err(|e| StartError::System(e.to_string()));
+        Ok(Self {
+            desk,
+            readers,
+            names: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
+            robot: settings.robot.name.clone(),
+            digest_hex: settings.robot.digest_hex(),
+            checker: Checker::start(&settings.robot).map_err(|e| StartError::System(e.to_string()))?,
+            candidates,
+            trajectories: wire.trajectory_subscriber()?,
+            receipts: wire.receipt_publisher()?,
+            reports: wire.report_publisher()?,
+            commands,
+            pending: Vec::with_capacity(COMMANDS_PENDING_MAX),
+            next_sequence: 1,
+            lateness: histogram()?,
+            lateness_window: histogram()?,
+            cycle: histogram()?,
+            phase: Phase::Configuring,
+            report_sequence: 0,
+            newest_generation: 0,
+            accepted: 0,
+            rejected: 0,
+        })
+    }
+
+    /// Serves until `stop`; then tells what is left to tell.
+    pub fn serve(&mut self, stop: &AtomicBool) {
+        loop {
+            // Read first: what the cycle pushed before the wish is still published.
+            let last = stop.load(Ordering::Acquire);
+            self.take_commands();
+            self.take_trajectories();
+            self.return_answers();
+            self.return_checked();
+            self.return_verdicts();
+            self.take_timings();
+            self.publish_reports();
+            self.write_notes();
+            if last {
+                return;
+            }
+            thread::sleep(INTERVAL);
+        }
+    }
+
+    fn take_commands(&mut self) {
+        while self.pending.len() < COMMANDS_PENDING_MAX {
+            let question = match self.commands.receive() {
+                Ok(Some(question)) => question,
+                Ok(None) => return,
+                Err(e) => return error!("cannot take a command: {e:?}"),
+            };
+            let command = match Command::try_from(question.payload()) {
+                Ok(command) => command,
+                Err(e) => {
+                    reply(&question, CommandReply::refused(self.phase, &e.to_string()));
+                    continue;
+                }
+            };
+            info!(?command, "asked");
+            let sequence = self.next_sequence;
+            self.next_sequence += 1;
+            if self.desk.ask(Asked { sequence, command }) {
+                self.pending.push(Pending { sequence, since: rt::now(), question });
+            } else {
+                let text = "too many commands at once; ask again";
+                reply(&question, CommandReply::refused(self.phase, text));
+            }
+        }
+    }
+
+    fn return_answers(&mut self) {
+        while let Some(answer) = self.desk.answer() {
+            let text = answer.why.sentence(|joint| self.joint_name(joint));
+            let found = self.pending.iter().position(|p| p.sequence == answer.sequence);
+            let Some(pending) = found.map(|at| self.pending.swap_remove(at)) else { continue };
+            let message = if answer.accepted { CommandReply::accepted } else { CommandReply::refused };
+            info!(accepted = answer.accepted, phase = answer.phase.word(), "answered: {text}");
+            reply(&pending.question, message(answer.phase, &text));
+        }
+        let now = rt::now();
+        let phase = self.phase;
+        self.pending.retain(|pending| {
+            let alive = now.since_s(pending.since) <= ANSWER_S_MAX;
+            if !alive {
+                let text = "the real-time thread does not answer; restart the streamer";
+                reply(&pending.question, CommandReply::refused(phase, text));
+            }
+            alive
+        });
+    }
+
+    fn take_trajectories(&mut self) {
+        loop {
+            let sample = match self.trajectories.receive() {
+                Ok(Some(sample)) => sample,
+                Ok(None) => return,
+                Err(e) => return error!("cannot take a trajectory: {e:?}"),
+            };
+            // Copied out before anything of it is read: the sender may still be writing.
+            let copy = Box::new(*sample.payload());
+            let (id, generation) = (copy.claimed_id(), copy.claimed_generation());
+            if !self.checker.check(copy) {
+                self.receipt(id, generation, &Outcome::Rejected(Rejection::Busy));
+            }
+        }
+    }
+
+    fn return_checked(&mut self) {
+        while let Some(Checked { id, generation, result }) = self.checker.checked() {
+            let newest = self.newest_generation;
+            let result = result.and_then(|checked| match (generation > newest, self.desk.empty_box()) {
+                (false, unused) => {
+                    unused.into_iter().for_each(|b| self.desk.put_back(b));
+                    Err(Rejection::StaleGeneration { got: generation, newest })
+                }
+                (true, None) => Err(Rejection::Busy),
+                (true, Some(empty)) => Ok((checked, empty)),
+            });
+            match result {
+                Ok((checked, mut empty)) => {
+                    self.send_candidate(&checked);
+                    *empty = *checked;
+                    self.desk.offer(empty);
+                }
+                Err(rejection) => self.receipt(id, generation, &Outcome::Rejected(rejection)),
+            }
+        }
+    }
+
+    fn send_candidate(&mut self, checked: &taustream_messages::CheckedTrajectory) {
+        let Some(candidates) = &self.candidates else { return };
+        let file = TrajectoryFile {
+            robot: self.robot.clone(),
+            digest: Some(self.digest_hex.clone()),
+            trajectory: checked.trajectory.clone(),
+        };
+        let (trajectory_id, generation) = (checked.trajectory_id, checked.generation);
+        if candidates.send(Candidate { trajectory_id, generation, file }).is_err() {
+            warn!("the cycle log has ended; see the message of its thread");
+            self.candidates = None;
+        }
+    }
+
+    fn return_verdicts(&mut self) {
+        while let Some(Verdict { trajectory_id, generation, decision }) = self.desk.verdict() {
+            let outcome = match decision {
+                Decision::Accepted { tick } => {
+                    self.newest_generation = generation;
+                    Outcome::Accepted { from_s: 0.0, tick }
+                }
+                Decision::Stale { newest } => {
+                    Outcome::Rejected(Rejection::StaleGeneration { got: generation, newest })
+                }
+                Decision::NotAtBase { joint, by_rad } => {
+                    let joint = u32::try_from(joint).unwrap_or(u32::MAX);
+                    Outcome::Rejected(Rejection::NotAtBase { joint, by_rad })
+                }
+                Decision::NotReady { phase } => Outcome::Rejected(Rejection::NotReady { phase: Some(phase) }),
+            };
+            self.receipt(trajectory_id, generation, &outcome);
+        }
+    }
+
+    fn receipt(&mut self, id: u64, generation: u64, outcome: &Outcome) {
+        match outcome {
+            Outcome::Accepted { tick, .. } => {
+                self.accepted += 1;
+                info!(id, generation, tick, "trajectory accepted");
+            }
+            Outcome::Rejected(rejection) => {
+                self.rejected += 1;
+                warn!(id, generation, "trajectory rejected: {rejection}");
+            }
+        }
+        if let Err(e) = self.receipts.send_copy(Receipt::new(id, generation, outcome)) {
+            error!("cannot publish a receipt: {e:?}");
+        }
+    }
+
+    fn take_timings(&mut self) {
+        while let Some(timing) = self.readers.timings.pop() {
+            self.lateness.saturating_record(timing.lateness_ns);
+            self.lateness_window.saturating_record(timing.lateness_ns);
+            if timing.cycle_ns > 0 {
+                self.cycle.saturating_record(timing.cycle_ns);
+            }
+        }
+    }
+
+    fn publish_reports(&mut self) {
+        while let Some(report) = self.readers.reports.pop() {
+            self.phase = Phase::from_code(report.phase).unwrap_or(self.phase);
+            let report = Report {
+                sequence: self.report_sequence,
+                accepted: self.accepted,
+                rejected: self.rejected,
+                lateness_ns_p50: self.lateness_window.value_at_quantile(0.5),
+                lateness_ns_p99: self.lateness.value_at_quantile(0.99),
+                lateness_ns_p999: self.lateness.value_at_quantile(0.999),
+                lateness_ns_max: self.lateness.max(),
+                cycle_ns_p99: self.cycle.value_at_quantile(0.99),
+                cycle_ns_max: self.cycle.max(),
+                ..report
+            };
+            self.report_sequence += 1;
+            self.lateness_window.reset();
+            if let Err(e) = self.reports.send_copy(report) {
+                error!("cannot publish a report: {e:?}");
+            }
+        }
+    }
+
+    fn write_notes(&mut self) {
+        while let Some(note) = self.readers.notes.pop() {
+            if let Note::Transition(transition) = note {
+                self.phase = transition.to;
+            }
+            log::note(&note, |joint| self.joint_name(joint));
+        }
+    }
+
+    fn joint_name(&self, joint: usize) -> String {
+        let name = self.names.get(joint).map_or("?", String::as_str);
+        format!("{} ({name})", joint + 1)
+    }
+}
+
+fn reply(question: &Question, message: CommandReply) {
+    if let Err(e) = question.send_copy(message) {
+        // The asker has gone; that is its own affair.
+        info!("an answer found nobody: {e:?}");
+    }
+}
