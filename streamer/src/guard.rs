@@ -151,11 +151,12 @@ impl Guard {
         if wanted.restart && self.brake.is_none() {
             self.remember_at_rest(&wanted.setpoint.position_rad);
         }
-        if wanted.live && self.brake.is_none() {
-            if let Some(trip) = self.find_trip(wanted, step_s) {
-                facts.trip = Some(trip);
-                self.brake = Some(self.begin_brake());
-            }
+        if wanted.live
+            && self.brake.is_none()
+            && let Some(trip) = self.find_trip(wanted, step_s)
+        {
+            facts.trip = Some(trip);
+            self.brake = Some(self.begin_brake());
         }
         self.next = match self.brake {
             None => wanted.setpoint,
@@ -309,7 +310,7 @@ fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) ->
 }
 
 /// How far a joint still goes in the positive direction under the hardest braking: jerk -j down to acceleration
-/// -a_max, then constant. No motion inside the limits turns round earlier, so no verified motion fails this check
+/// `-a_max`, then constant. No motion inside the limits turns round earlier, so no verified motion fails this check
 /// (a brake that ends at rest swings out a little farther when the joint was about to turn round).
 fn reach_rad(v: f64, a: f64, a_max: f64, j: f64) -> f64 {
     let square = a * a + 2.0 * j * v;

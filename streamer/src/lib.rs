@@ -15,6 +15,7 @@ pub mod facts;
 pub mod guard;
 pub mod intake;
 pub mod log;
+mod operator;
 pub mod phases;
 pub mod recorder;
 pub mod report;

@@ -29,11 +29,10 @@ pub fn note(note: &Note, name: impl Fn(usize) -> String) {
 
 fn write_transition(t: &Transition, name: impl Fn(usize) -> String) {
     let (from, to, tick) = (t.from.word(), t.to.word(), t.tick);
-    match (t.to, t.cause) {
-        (Phase::Fault | Phase::FastStopping | Phase::Braking, Some(cause)) => {
-            error!(tick, "{from} -> {to}: {}", cause_sentence(&cause, name));
-        }
-        _ => info!(tick, "{from} -> {to}: {}", t.event.word()),
+    if let (Phase::Fault | Phase::FastStopping | Phase::Braking, Some(cause)) = (t.to, t.cause) {
+        error!(tick, "{from} -> {to}: {}", cause_sentence(&cause, name));
+    } else {
+        info!(tick, "{from} -> {to}: {}", t.event.word());
     }
 }
 

@@ -55,7 +55,7 @@ pub enum Note {
 pub struct CycleRecord {
     /// Cycle number.
     pub tick: u64,
-    /// CLOCK_MONOTONIC of the wake-up, ns.
+    /// `CLOCK_MONOTONIC` of the wake-up, ns.
     pub time_ns: u64,
     /// SYNCs handed to each bus so far, this cycle's included.
     pub syncs: [u64; BUSES_MAX],
@@ -236,10 +236,10 @@ impl Reporter {
         phase: Phase,
         transitions: &[Option<Transition>; TRANSITIONS_MAX],
     ) {
-        if let Some(verdict) = facts.verdict {
-            if let Decision::Accepted { tick } = verdict.decision {
-                self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id });
-            }
+        if let Some(verdict) = facts.verdict
+            && let Decision::Accepted { tick } = verdict.decision
+        {
+            self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id });
         }
         for transition in transitions.iter().flatten() {
             self.record(Record::Transition(*transition));

@@ -51,7 +51,7 @@ pub enum RightError {
     },
 }
 
-/// CLOCK_MONOTONIC.
+/// `CLOCK_MONOTONIC`.
 ///
 /// Real time: one call, by the vDSO where there is one.
 #[must_use]
@@ -63,7 +63,7 @@ pub fn now() -> Nanos {
     Nanos(part(time.tv_sec) * 1_000_000_000 + part(time.tv_nsec))
 }
 
-/// Sleeps until an instant of CLOCK_MONOTONIC; returns at once when it has passed.
+/// Sleeps until an instant of `CLOCK_MONOTONIC`; returns at once when it has passed.
 ///
 /// Real time: one call; a signal only makes it begin anew.
 pub fn sleep_until(deadline: Nanos) {

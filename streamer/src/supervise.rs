@@ -3,15 +3,15 @@
 //! It is the only owner of the phase. What it decides steers the next cycle: what the drives are wished to be, how the
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
 //! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
-use crate::facts::{Asked, Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition};
+use crate::facts::{Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition};
 use crate::intake::Leave;
 use crate::phases::{self, Event};
 use crate::track::ScaleOrder;
-use crate::watch::{REST_RAD_S, Watch};
+use crate::watch::Watch;
 use crate::words::{Answer, Why};
 use taustream_arm::settings::{Cycle, Supervision};
 use taustream_drivers::{DriveState, DriveWish, Nanos, ServoStatus};
-use taustream_messages::{Command, FaultReason, Phase};
+use taustream_messages::{FaultReason, Phase};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// How long the drives may take to come to rest after a stall before the arm stays paused, s.
@@ -41,23 +41,23 @@ pub struct Orders {
 /// The arm's phase and everything that decides it.
 #[derive(Debug)]
 pub struct Supervisor {
-    rules: Supervision,
-    limits: [JointLimits; MAX_JOINTS],
-    joints: usize,
+    pub(crate) rules: Supervision,
+    pub(crate) limits: [JointLimits; MAX_JOINTS],
+    pub(crate) joints: usize,
     stall_resume_s: f64,
     watchdog_s: f64,
-    watch: Watch,
-    phase: Phase,
+    pub(crate) watch: Watch,
+    pub(crate) phase: Phase,
     since: Nanos,
     cause: Option<Cause>,
     /// In fault: the drives hold instead of being off.
-    holds: bool,
-    torque_off: bool,
-    speed: f64,
+    pub(crate) holds: bool,
+    pub(crate) torque_off: bool,
+    pub(crate) speed: f64,
     /// A stall froze the motion; it goes on when the drives rest.
-    stalled_since: Option<Nanos>,
-    resetting_since: Option<Nanos>,
-    leaving: Leave,
+    pub(crate) stalled_since: Option<Nanos>,
+    pub(crate) resetting_since: Option<Nanos>,
+    pub(crate) leaving: Leave,
     leaving_since: Nanos,
 }
 
@@ -151,7 +151,7 @@ impl Supervisor {
     }
 
     /// Applies an event to the table, and what every entry into a phase brings with it.
-    fn step(&mut self, event: Event, facts: &Facts, orders: &mut Orders) -> bool {
+    pub(crate) fn step(&mut self, event: Event, facts: &Facts, orders: &mut Orders) -> bool {
         let Some(to) = phases::next(self.phase, event) else { return false };
         let transition =
             Transition { tick: facts.tick.number, from: self.phase, to, event, cause: self.cause };
@@ -177,7 +177,7 @@ impl Supervisor {
         true
     }
 
-    fn raise(&mut self, event: Event, cause: Cause, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn raise(&mut self, event: Event, cause: Cause, facts: &Facts, orders: &mut Orders) {
         // Drives that were on their way to energised go back; drives that carry the arm hold.
         let holds = self.wish() == DriveWish::Enabled && self.phase != Phase::Enabling;
         let before = self.cause.replace(cause);
@@ -190,11 +190,9 @@ impl Supervisor {
     }
 
     fn judge_motion(&mut self, facts: &Facts, orders: &mut Orders) {
-        if let Some(verdict) = facts.verdict {
-            if matches!(verdict.decision, Decision::Accepted { .. }) {
-                self.stalled_since = None;
-                self.step(Event::Accepted, facts, orders);
-            }
+        if facts.verdict.is_some_and(|v| matches!(v.decision, Decision::Accepted { .. })) {
+            self.stalled_since = None;
+            self.step(Event::Accepted, facts, orders);
         }
         if let Some(trip) = facts.trip {
             let joint = Some(trip.joint);
@@ -203,17 +201,14 @@ impl Supervisor {
             let cause = if self.phase == Phase::FastStopping { self.cause.unwrap_or(cause) } else { cause };
             self.raise(Event::GuardTrip, cause, facts, orders);
         }
-        match self.phase {
-            Phase::Braking if facts.braking == Braking::Rested => {
+        if self.phase == Phase::Braking {
+            if facts.braking == Braking::Rested {
                 self.step(Event::AtRest, facts, orders);
             }
-            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping => {
-                let event = if facts.end_reached { Event::EndReached } else { Event::AtRest };
-                if facts.end_reached || facts.at_rest {
-                    self.step(event, facts, orders);
-                }
-            }
-            _ => {}
+        } else if facts.end_reached {
+            self.step(Event::EndReached, facts, orders);
+        } else if facts.at_rest {
+            self.step(Event::AtRest, facts, orders);
         }
     }
 
@@ -320,7 +315,7 @@ impl Supervisor {
         }
     }
 
-    fn clear(&mut self, event: Event, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn clear(&mut self, event: Event, facts: &Facts, orders: &mut Orders) {
         self.resetting_since = None;
         (self.cause, self.torque_off, self.holds) = (None, false, false);
         self.step(event, facts, orders);
@@ -379,7 +374,7 @@ impl Supervisor {
         }
     }
 
-    fn switch_off(&mut self, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn switch_off(&mut self, facts: &Facts, orders: &mut Orders) {
         self.torque_off = true;
         self.holds = false;
         self.resetting_since = None;
@@ -389,225 +384,24 @@ impl Supervisor {
         self.raise(Event::HardFault, cause, facts, orders);
     }
 
-    fn command(&mut self, asked: Asked, facts: &Facts, orders: &mut Orders) -> Answer {
-        let result = match asked.command {
-            Command::Enable | Command::Resume if self.leaving != Leave::No => Err(Why::Leaving),
-            Command::Enable => self.enable(facts, orders),
-            Command::Disable => self.disable(facts, orders),
-            Command::Pause => self.pause(facts, orders),
-            Command::Resume => self.resume(facts, orders),
-            Command::Stop => self.stop(facts, orders),
-            Command::FastStop => self.fast_stop(facts, orders),
-            Command::TorqueOff => {
-                self.switch_off(facts, orders);
-                Ok(Why::TorqueOff)
-            }
-            Command::Speed { percent } => self.set_speed(percent, facts, orders),
-            Command::ClearFault => self.clear_fault(facts, orders),
-        };
-        let (accepted, why) = match result {
-            Ok(why) => (true, why),
-            Err(why) => (false, why),
-        };
-        Answer { sequence: asked.sequence, accepted, phase: self.phase, why }
-    }
-
-    fn enable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Locked => {
-                self.step(Event::EnableAsked, facts, orders);
-                Ok(Why::Unlocked)
-            }
-            Phase::Disabled => {
-                let pose_rad = self.trusted_pose(facts)?;
-                self.watch.restart(&pose_rad);
-                orders.pose_rad = Some(pose_rad);
-                self.step(Event::EnableAsked, facts, orders);
-                Ok(Why::Enabling)
-            }
-            Phase::Configuring => Err(self.first_not(facts, DriveState::Disabled).unwrap_or(Why::Wait)),
-            Phase::Fault | Phase::FastStopping | Phase::Braking => Err(Why::ClearFirst),
-            Phase::Disabling => Err(Why::Wait),
-            Phase::Enabling
-            | Phase::Holding
-            | Phase::Moving
-            | Phase::Pausing
-            | Phase::Paused
-            | Phase::Stopping => Ok(Why::Already),
-        }
-    }
-
-    /// The measured pose, if every joint answers, rests, and stands inside its range.
-    fn trusted_pose(&self, facts: &Facts) -> Result<JointArray, Why> {
-        let mut pose_rad = [0.0; MAX_JOINTS];
-        for (joint, servo) in self.servos(facts) {
-            let age_s = self.watch.age_s(facts, joint);
-            if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
-                return Err(Why::NoFeedback { joint, age_s });
-            }
-            if servo.warning {
-                return Err(Why::Warns { joint, status_word: servo.status_word });
-            }
-            let range_rad = self.limits[joint].position_rad;
-            let position_rad = servo.position_rad;
-            if !(range_rad[0]..=range_rad[1]).contains(&position_rad) {
-                return Err(Why::OutOfRange { joint, position_rad, range_rad });
-            }
-            pose_rad[joint] = position_rad;
-        }
-        let (joint, speed_rad_s) = self.watch.fastest();
-        if speed_rad_s > REST_RAD_S {
-            return Err(Why::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
-        }
-        Ok(pose_rad)
-    }
-
-    fn disable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Fault if self.holds => {
-                self.holds = false;
-                Ok(Why::Disabling)
-            }
-            Phase::Configuring | Phase::Disabled | Phase::Disabling | Phase::Fault => Ok(Why::Already),
-            Phase::Enabling | Phase::Holding | Phase::Paused | Phase::Locked => {
-                self.step(Event::DisableAsked, facts, orders);
-                Ok(Why::Disabling)
-            }
-            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking => {
-                Err(Why::StopFirst)
-            }
-        }
-    }
-
-    fn pause(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Moving => {
-                self.step(Event::PauseAsked, facts, orders);
-                Ok(Why::Pausing)
-            }
-            Phase::Pausing | Phase::Paused => Ok(Why::Already),
-            _ => Err(Why::NothingMoves),
-        }
-    }
-
-    fn resume(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Pausing | Phase::Paused if !facts.can_ramp => Err(Why::TooManyRamps),
-            Phase::Pausing | Phase::Paused => {
-                orders.speed = Some(ScaleOrder::Wish(self.speed));
-                self.step(Event::ResumeAsked, facts, orders);
-                Ok(Why::Resuming)
-            }
-            Phase::Moving => Ok(Why::Already),
-            Phase::Fault => Err(Why::ClearFirst),
-            _ => Err(Why::NothingToResume),
-        }
-    }
-
-    fn stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Moving | Phase::Pausing | Phase::Paused => {
-                self.step(Event::StopAsked, facts, orders);
-                Ok(Why::Stopping)
-            }
-            Phase::Stopping | Phase::FastStopping | Phase::Braking => Ok(Why::Already),
-            _ => Ok(Why::NothingMoves),
-        }
-    }
-
-    fn fast_stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::FastStopping | Phase::Braking | Phase::Fault => Ok(Why::Already),
-            Phase::Configuring | Phase::Disabled | Phase::Disabling => Ok(Why::NothingMoves),
-            Phase::Enabling
-            | Phase::Holding
-            | Phase::Moving
-            | Phase::Pausing
-            | Phase::Paused
-            | Phase::Stopping
-            | Phase::Locked => {
-                let cause = Cause { reason: FaultReason::Operator, joint: None, value: 0.0, limit: 0.0 };
-                self.raise(Event::StopFault, cause, facts, orders);
-                Ok(Why::FastStopping)
-            }
-        }
-    }
-
-    fn set_speed(&mut self, percent: f64, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        let moving = self.phase == Phase::Moving;
-        if moving && self.stalled_since.is_none() {
-            if !facts.can_ramp {
-                return Err(Why::TooManyRamps);
-            }
-            orders.speed = Some(ScaleOrder::Wish((percent / 100.0).clamp(0.0, 1.0)));
-        }
-        self.speed = (percent / 100.0).clamp(0.0, 1.0);
-        Ok(Why::SpeedSet { percent, moving })
-    }
-
-    fn clear_fault(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
-        match self.phase {
-            Phase::Fault => {}
-            Phase::FastStopping | Phase::Braking => return Err(Why::Wait),
-            _ => return Err(Why::NoFault),
-        }
-        if self.watch.bus_cause(facts).is_some() {
-            return Err(Why::BusFails { lost_in_a_row: facts.lost_in_a_row() });
-        }
-        if self.holds {
-            self.may_hold_on(facts)?;
-            self.clear(Event::ClearedHolding, facts, orders);
-            return Ok(Why::ClearedHolding);
-        }
-        if let Some((joint, state)) = self.energised(facts) {
-            let unowned = state == DriveState::EnergisedUnowned;
-            return Err(if unowned { Why::Unowned { joint } } else { Why::StillEnergised { joint } });
-        }
-        orders.clear_faults = true;
-        let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
-        if self.servos(facts).any(|(_, s)| faulty(s)) {
-            self.resetting_since = Some(facts.tick.woke);
-            return Ok(Why::Resetting);
-        }
-        self.clear(Event::ClearedOff, facts, orders);
-        Ok(Why::ClearedOff)
-    }
-
-    /// A fault is forgotten while drives hold only if every one of them does, and nothing is left to complain about.
-    fn may_hold_on(&self, facts: &Facts) -> Result<(), Why> {
-        for (joint, servo) in self.servos(facts) {
-            if servo.state != DriveState::Enabled {
-                return Err(Why::PartlyEnergised { joint, state: servo.state });
-            }
-            if servo.warning {
-                return Err(Why::Warns { joint, status_word: servo.status_word });
-            }
-            if let Some(cause) = self.watch.feedback_cause(facts, joint) {
-                return Err(if cause.reason == FaultReason::FeedbackLate {
-                    Why::NoFeedback { joint, age_s: cause.value }
-                } else {
-                    Why::Tracking { joint, error_rad: cause.value, limit_rad: cause.limit }
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn servos<'a>(&self, facts: &'a Facts) -> impl Iterator<Item = (usize, &'a ServoStatus)> + use<'a> {
+    pub(crate) fn servos<'a>(
+        &self,
+        facts: &'a Facts,
+    ) -> impl Iterator<Item = (usize, &'a ServoStatus)> + use<'a> {
         facts.servos.iter().enumerate().take(self.joints)
     }
 
-    fn all(&self, facts: &Facts, test: impl Fn(&ServoStatus) -> bool) -> bool {
+    pub(crate) fn all(&self, facts: &Facts, test: impl Fn(&ServoStatus) -> bool) -> bool {
         self.servos(facts).all(|(_, servo)| test(servo))
     }
 
-    fn first_not(&self, facts: &Facts, state: DriveState) -> Option<Why> {
+    pub(crate) fn first_not(&self, facts: &Facts, state: DriveState) -> Option<Why> {
         let mut others = self.servos(facts).filter(|(_, s)| s.state != state);
         others.next().map(|(joint, s)| Why::NotConfigured { joint, state: s.state })
     }
 
     /// The first drive that carries torque.
-    fn energised(&self, facts: &Facts) -> Option<(usize, DriveState)> {
+    pub(crate) fn energised(&self, facts: &Facts) -> Option<(usize, DriveState)> {
         let on = |s: &ServoStatus| {
             matches!(
                 s.state,

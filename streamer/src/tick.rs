@@ -1,6 +1,6 @@
 //! The grid of deadlines: which one a wake-up serves, and which ones it gave up.
 //!
-//! Deadlines are absolute multiples of the period on CLOCK_MONOTONIC. One that has passed is skipped and counted,
+//! Deadlines are absolute multiples of the period on `CLOCK_MONOTONIC`. One that has passed is skipped and counted,
 //! never made up for: two sendings closer than half a period would reach the drives as a burst. All of this is a
 //! function of the wake-up time, so a recorded run replays exactly.
 use taustream_drivers::Nanos;

@@ -56,10 +56,11 @@ pub enum Why {
 impl Why {
     /// The sentence for people. `name` gives a joint's name.
     pub fn sentence(&self, name: impl Fn(usize) -> String) -> String {
-        self.taken(&name).unwrap_or_else(|| self.refused(&name))
+        self.taken().unwrap_or_else(|| self.refused(&name))
     }
 
-    fn taken(self, _name: &impl Fn(usize) -> String) -> Option<String> {
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
+    fn taken(self) -> Option<String> {
         let text = match self {
             Self::Enabling => "drives are being energised at the measured pose",
             Self::Unlocked => "the arm holds and takes trajectories",
@@ -83,6 +84,7 @@ impl Why {
         Some(text.to_owned())
     }
 
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
     fn refused(self, name: &impl Fn(usize) -> String) -> String {
         match self {
             Self::NotConfigured { joint, state } => format!(
@@ -129,6 +131,7 @@ impl Why {
         }
     }
 
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above")]
     fn plain_refusal(self) -> &'static str {
         match self {
             Self::ClearFirst => "the arm is in fault; `status` shows why, then `clear-fault`",

@@ -1,0 +1,223 @@
+//! What the operator may ask, phase by phase, and the answer. Every refusal says why and what to do.
+//!
+//! Stops are never refused: they depend on the time scale alone, which keeps a slot back for them.
+use crate::facts::{Asked, Cause, Facts};
+use crate::intake::Leave;
+use crate::phases::Event;
+use crate::supervise::{Orders, Supervisor};
+use crate::track::ScaleOrder;
+use crate::watch::REST_RAD_S;
+use crate::words::{Answer, Why};
+use taustream_drivers::{DriveState, ServoStatus};
+use taustream_messages::{Command, FaultReason, Phase};
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+impl Supervisor {
+    /// Takes a command over, or says why not.
+    ///
+    /// Real time: bounded work, no allocation.
+    pub(crate) fn command(&mut self, asked: Asked, facts: &Facts, orders: &mut Orders) -> Answer {
+        let result = match asked.command {
+            Command::Enable | Command::Resume if self.leaving != Leave::No => Err(Why::Leaving),
+            Command::Enable => self.enable(facts, orders),
+            Command::Disable => self.disable(facts, orders),
+            Command::Pause => self.pause(facts, orders),
+            Command::Resume => self.resume(facts, orders),
+            Command::Stop => self.stop(facts, orders),
+            Command::FastStop => self.fast_stop(facts, orders),
+            Command::TorqueOff => {
+                self.switch_off(facts, orders);
+                Ok(Why::TorqueOff)
+            }
+            Command::Speed { percent } => self.set_speed(percent, facts, orders),
+            Command::ClearFault => self.clear_fault(facts, orders),
+        };
+        let (accepted, why) = match result {
+            Ok(why) => (true, why),
+            Err(why) => (false, why),
+        };
+        Answer { sequence: asked.sequence, accepted, phase: self.phase, why }
+    }
+
+    fn enable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Locked => {
+                self.step(Event::EnableAsked, facts, orders);
+                Ok(Why::Unlocked)
+            }
+            Phase::Disabled => {
+                let pose_rad = self.trusted_pose(facts)?;
+                self.watch.restart(&pose_rad);
+                orders.pose_rad = Some(pose_rad);
+                self.step(Event::EnableAsked, facts, orders);
+                Ok(Why::Enabling)
+            }
+            Phase::Configuring => Err(self.first_not(facts, DriveState::Disabled).unwrap_or(Why::Wait)),
+            Phase::Fault | Phase::FastStopping | Phase::Braking => Err(Why::ClearFirst),
+            Phase::Disabling => Err(Why::Wait),
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping => Ok(Why::Already),
+        }
+    }
+
+    /// The measured pose, if every joint answers, rests, and stands inside its range.
+    fn trusted_pose(&self, facts: &Facts) -> Result<JointArray, Why> {
+        let mut pose_rad = [0.0; MAX_JOINTS];
+        for (joint, servo) in self.servos(facts) {
+            let age_s = self.watch.age_s(facts, joint);
+            if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
+                return Err(Why::NoFeedback { joint, age_s });
+            }
+            if servo.warning {
+                return Err(Why::Warns { joint, status_word: servo.status_word });
+            }
+            let range_rad = self.limits[joint].position_rad;
+            let position_rad = servo.position_rad;
+            if !(range_rad[0]..=range_rad[1]).contains(&position_rad) {
+                return Err(Why::OutOfRange { joint, position_rad, range_rad });
+            }
+            pose_rad[joint] = position_rad;
+        }
+        let (joint, speed_rad_s) = self.watch.fastest();
+        if speed_rad_s > REST_RAD_S {
+            return Err(Why::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
+        }
+        Ok(pose_rad)
+    }
+
+    fn disable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::Fault if self.holds => {
+                self.holds = false;
+                Ok(Why::Disabling)
+            }
+            Phase::Configuring | Phase::Disabled | Phase::Disabling | Phase::Fault => Ok(Why::Already),
+            Phase::Enabling | Phase::Holding | Phase::Paused | Phase::Locked => {
+                self.step(Event::DisableAsked, facts, orders);
+                Ok(Why::Disabling)
+            }
+            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking => {
+                Err(Why::StopFirst)
+            }
+        }
+    }
+
+    fn pause(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        if self.step(Event::PauseAsked, facts, orders) {
+            Ok(Why::Pausing)
+        } else if matches!(self.phase, Phase::Pausing | Phase::Paused) {
+            Ok(Why::Already)
+        } else {
+            Err(Why::NothingMoves)
+        }
+    }
+
+    fn resume(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        let paused = matches!(self.phase, Phase::Pausing | Phase::Paused);
+        if paused && !facts.can_ramp {
+            Err(Why::TooManyRamps)
+        } else if paused {
+            orders.speed = Some(ScaleOrder::Wish(self.speed));
+            self.step(Event::ResumeAsked, facts, orders);
+            Ok(Why::Resuming)
+        } else if self.phase == Phase::Moving {
+            Ok(Why::Already)
+        } else if self.phase == Phase::Fault {
+            Err(Why::ClearFirst)
+        } else {
+            Err(Why::NothingToResume)
+        }
+    }
+
+    fn stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        if self.step(Event::StopAsked, facts, orders) {
+            Ok(Why::Stopping)
+        } else if matches!(self.phase, Phase::Stopping | Phase::FastStopping | Phase::Braking) {
+            Ok(Why::Already)
+        } else {
+            Ok(Why::NothingMoves)
+        }
+    }
+
+    fn fast_stop(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        match self.phase {
+            Phase::FastStopping | Phase::Braking | Phase::Fault => Ok(Why::Already),
+            Phase::Configuring | Phase::Disabled | Phase::Disabling => Ok(Why::NothingMoves),
+            Phase::Enabling
+            | Phase::Holding
+            | Phase::Moving
+            | Phase::Pausing
+            | Phase::Paused
+            | Phase::Stopping
+            | Phase::Locked => {
+                let cause = Cause { reason: FaultReason::Operator, joint: None, value: 0.0, limit: 0.0 };
+                self.raise(Event::StopFault, cause, facts, orders);
+                Ok(Why::FastStopping)
+            }
+        }
+    }
+
+    fn set_speed(&mut self, percent: f64, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        let moving = self.phase == Phase::Moving;
+        if moving && self.stalled_since.is_none() {
+            if !facts.can_ramp {
+                return Err(Why::TooManyRamps);
+            }
+            orders.speed = Some(ScaleOrder::Wish((percent / 100.0).clamp(0.0, 1.0)));
+        }
+        self.speed = (percent / 100.0).clamp(0.0, 1.0);
+        Ok(Why::SpeedSet { percent, moving })
+    }
+
+    fn clear_fault(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
+        if matches!(self.phase, Phase::FastStopping | Phase::Braking) {
+            return Err(Why::Wait);
+        } else if self.phase != Phase::Fault {
+            return Err(Why::NoFault);
+        }
+        if self.watch.bus_cause(facts).is_some() {
+            return Err(Why::BusFails { lost_in_a_row: facts.lost_in_a_row() });
+        }
+        if self.holds {
+            self.may_hold_on(facts)?;
+            self.clear(Event::ClearedHolding, facts, orders);
+            return Ok(Why::ClearedHolding);
+        }
+        if let Some((joint, state)) = self.energised(facts) {
+            let unowned = state == DriveState::EnergisedUnowned;
+            return Err(if unowned { Why::Unowned { joint } } else { Why::StillEnergised { joint } });
+        }
+        orders.clear_faults = true;
+        let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
+        if self.servos(facts).any(|(_, s)| faulty(s)) {
+            self.resetting_since = Some(facts.tick.woke);
+            return Ok(Why::Resetting);
+        }
+        self.clear(Event::ClearedOff, facts, orders);
+        Ok(Why::ClearedOff)
+    }
+
+    /// A fault is forgotten while drives hold only if every one of them does, and nothing is left to complain about.
+    fn may_hold_on(&self, facts: &Facts) -> Result<(), Why> {
+        for (joint, servo) in self.servos(facts) {
+            if servo.state != DriveState::Enabled {
+                return Err(Why::PartlyEnergised { joint, state: servo.state });
+            }
+            if servo.warning {
+                return Err(Why::Warns { joint, status_word: servo.status_word });
+            }
+            if let Some(cause) = self.watch.feedback_cause(facts, joint) {
+                return Err(if cause.reason == FaultReason::FeedbackLate {
+                    Why::NoFeedback { joint, age_s: cause.value }
+                } else {
+                    Why::Tracking { joint, error_rad: cause.value, limit_rad: cause.limit }
+                });
+            }
+        }
+        Ok(())
+    }
+}
