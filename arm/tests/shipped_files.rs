@@ -1,6 +1,8 @@
 //! Every file in config/ loads, and says what its documents say.
+use nalgebra::Point3;
 use std::path::{Path, PathBuf};
-use taustream_arm::{BusKind, Robot, Scene, Settings};
+use taustream_arm::{BusKind, Obstacle, Robot, Scene, Settings, Shape};
+use taustream_motion::{JointArray, MAX_JOINTS};
 
 fn config() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config")
@@ -55,3 +57,82 @@ fn vcan6_binds_six_servos_in_joint_order_to_one_virtual_bus() {
     assert_eq!((settings.buses[0].interface.as_str(), settings.cycle.period_us), ("vcan0", 1000));
     assert_eq!(settings.robot.name, "ur5");
 }
+
+#[expect(clippy::panic, reason = "a helper of tests fails by panicking")]
+/// Distance from a point to the surface of an obstacle (below 0 inside), from the definition of each shape.
+fn distance_m(obstacle: &Obstacle, point: &Point3<f64>) -> f64 {
+    let local = obstacle.pose.inverse_transform_point(point);
+    let box_distance_m = |excess: &[f64]| {
+        let outside = excess.iter().map(|e| e.max(0.0).powi(2)).sum::<f64>().sqrt();
+        outside + excess.iter().fold(f64::NEG_INFINITY, |most, e| most.max(*e)).min(0.0)
+    };
+    let radial_m = local.x.hypot(local.y);
+    match &obstacle.shape {
+        Shape::Sphere { radius_m } => local.coords.norm() - radius_m,
+        Shape::Box { size_m } => {
+            box_distance_m(&[0, 1, 2].map(|axis| local[axis].abs() - 0.5 * size_m[axis]))
+        }
+        Shape::Cylinder { radius_m, length_m } => {
+            box_distance_m(&[radial_m - radius_m, local.z.abs() - 0.5 * length_m])
+        }
+        Shape::Capsule { radius_m, length_m } => {
+            radial_m.hypot((local.z.abs() - 0.5 * length_m).max(0.0)) - radius_m
+        }
+        Shape::Mesh { .. } => panic!("no shipped scene has a mesh"),
+    }
+}
+
+#[expect(clippy::expect_used, reason = "a helper of tests fails by panicking")]
+/// Least distance of each link to any obstacle, by points along the capsules' axes.
+fn clearances_m(robot: &Robot, scene: &Scene, pose: &JointArray) -> Vec<(usize, String, f64)> {
+    const POINTS: u32 = 200;
+    let frames = robot.chain.frames(pose);
+    let mut found = Vec::new();
+    for shape in &robot.shapes {
+        let (ends, radius_m) = shape.segment().expect("links are capsules");
+        for obstacle in &scene.obstacles {
+            let point = |i: u32| {
+                frames[shape.frame] * (ends[0] + (ends[1] - ends[0]) * (f64::from(i) / f64::from(POINTS)))
+            };
+            let least_m = (0..=POINTS).map(|i| distance_m(obstacle, &point(i))).fold(f64::INFINITY, f64::min);
+            found.push((shape.link, obstacle.name.clone(), least_m - radius_m));
+        }
+    }
+    found
+}
+
+#[test]
+fn shipped_scene_leaves_common_poses_of_the_ur5_free_and_its_foot_always() {
+    let robot = Robot::load(&config().join("robots/ur5.toml")).unwrap();
+    for file in files_of("scenes") {
+        let scene = Scene::load(&file).unwrap();
+        for pose in COMMON_POSES {
+            for (link, obstacle, clearance_m) in clearances_m(&robot, &scene, &pose) {
+                let at = file.display();
+                assert!(
+                    clearance_m > scene.margin_m,
+                    "{at}: link {link} and {obstacle}: {clearance_m:.3} m at {pose:?}"
+                );
+            }
+        }
+        // The first link only turns about its own axis: it must be free whatever the arm does.
+        let foot =
+            clearances_m(&robot, &scene, &[0.0; MAX_JOINTS]).into_iter().filter(|(link, ..)| *link == 1);
+        assert!(
+            foot.map(|(.., clearance_m)| clearance_m).all(|clearance_m| clearance_m > 0.05),
+            "{}",
+            file.display()
+        );
+    }
+}
+
+/// Straight up; the usual working pose, straight and to each side; the help's example; folded; reaching up and forward.
+const COMMON_POSES: [JointArray; 7] = [
+    [0.0, -1.57, 0.0, -1.57, 0.0, 0.0, 0.0, 0.0],
+    [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
+    [0.8, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
+    [-0.8, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
+    [1.2, -1.3, 1.4, -1.6, -1.57, 0.0, 0.0, 0.0],
+    [0.0, -2.2, 2.2, -1.57, -1.57, 0.0, 0.0, 0.0],
+    [0.0, -1.2, 0.6, -1.57, -1.57, 0.0, 0.0, 0.0],
+];
