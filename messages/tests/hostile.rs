@@ -1,0 +1,213 @@
+//! Messages come from shared memory that anybody of our user may have written: whatever their bits are, reading them
+//! must neither panic nor let an unchecked number through.
+use proptest::prelude::*;
+use taustream_messages::command::CommandError;
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::trajectory::{Doctored, MessageError};
+use taustream_messages::{
+    CheckedTrajectory, Command, CommandReply, CommandRequest, Outcome, Phase, PlanReply, PlanRequest, Receipt,
+    Rejection, Replaces, Report, Text, TrajectoryMessage,
+};
+use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+
+/// Makes a message of arbitrary bytes, as a hostile sender can.
+#[expect(unsafe_code, reason = "a test of arbitrary bits has to write arbitrary bits")]
+fn from_bytes<T: Copy>(bytes: &[u8]) -> Box<T> {
+    assert_eq!(bytes.len(), size_of::<T>());
+    // SAFETY: every message is `repr(C)` and holds only integers, floats and arrays of them, for which every bit
+    // pattern is a value; the read is unaligned and of exactly the size of `T`.
+    Box::new(unsafe { bytes.as_ptr().cast::<T>().read_unaligned() })
+}
+
+fn bytes_of(size: usize) -> impl Strategy<Value = Vec<u8>> {
+    let any_byte = proptest::collection::vec(any::<u8>(), size);
+    // Mostly zero bytes reach deeper than noise, which fails at the layout version.
+    let sparse = proptest::collection::vec((0..size, any::<u8>()), 0..40).prop_map(move |writes| {
+        let mut bytes = vec![0; size];
+        bytes[0] = 1;
+        for (at, byte) in writes {
+            bytes[at] = byte;
+        }
+        bytes
+    });
+    prop_oneof![any_byte, sparse]
+}
+
+fn example() -> CheckedTrajectory {
+    let mut delta_rad = [0.0; MAX_JOINTS];
+    delta_rad[0] = 0.5;
+    let strokes = [Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad }];
+    CheckedTrajectory {
+        trajectory_id: 7,
+        generation: 3,
+        robot_digest: [9; 32],
+        replaces: Replaces::Rest,
+        trajectory: Trajectory::new(6, [0.0; MAX_JOINTS], &strokes).expect("a plain trajectory"),
+    }
+}
+
+proptest! {
+    #[test]
+    fn trajectory_of_any_bytes_is_checked_or_refused(bytes in bytes_of(size_of::<TrajectoryMessage>())) {
+        let message = from_bytes::<TrajectoryMessage>(&bytes);
+        if let Ok(checked) = CheckedTrajectory::try_from(&*message) {
+            prop_assert!((1..=MAX_JOINTS).contains(&checked.trajectory.joints()));
+            prop_assert!(checked.trajectory.duration_s().is_finite());
+            prop_assert!(checked.trajectory.end_rad().iter().all(|q| q.is_finite()));
+        }
+    }
+
+    #[test]
+    fn other_messages_of_any_bytes_never_panic(
+        receipt in bytes_of(size_of::<Receipt>()),
+        command in bytes_of(size_of::<CommandRequest>()),
+        reply in bytes_of(size_of::<CommandReply>()),
+        request in bytes_of(size_of::<PlanRequest>()),
+        answer in bytes_of(size_of::<PlanReply>()),
+        report in bytes_of(size_of::<Report>()),
+    ) {
+        if let Some(Outcome::Rejected(rejection)) = from_bytes::<Receipt>(&receipt).outcome() {
+            prop_assert!(!rejection.to_string().is_empty());
+        }
+        if let Ok(Command::Speed { percent }) = Command::try_from(&*from_bytes::<CommandRequest>(&command)) {
+            prop_assert!((0.0..=100.0).contains(&percent));
+        }
+        let reply = from_bytes::<CommandReply>(&reply);
+        prop_assert!(reply.text().chars().all(|c| !c.is_control()));
+        if let Ok(checked) = CheckedPlanRequest::try_from(&*from_bytes::<PlanRequest>(&request)) {
+            prop_assert!(checked.goal_rad.iter().all(|q| q.is_finite()));
+        }
+        let _ = from_bytes::<PlanReply>(&answer).outcome();
+        let report = from_bytes::<Report>(&report);
+        prop_assert!(report.joints() <= MAX_JOINTS);
+        let _ = report.checked();
+    }
+}
+
+#[test]
+fn trajectory_written_and_read_is_the_same() {
+    let checked = example();
+    let message = TrajectoryMessage::new(&checked);
+    assert_eq!(CheckedTrajectory::try_from(&*message), Ok(checked));
+}
+
+#[test]
+fn trajectory_doctored_in_one_field_is_refused_for_that_field() {
+    let cases: [(Doctored, &str); 10] = [
+        (Doctored::Layout(2), "layout version 2"),
+        (Doctored::Joints(0), "0 joints"),
+        (Doctored::Joints(9), "joint_count is 9"),
+        (Doctored::StrokeCount(600), "stroke_count is 600; at most 512"),
+        (Doctored::Exponent(3), "n is 3"),
+        (Doctored::Delta(f64::NAN), "delta_rad is not finite"),
+        (Doctored::Duration(0.0), "at least 0.001 s"),
+        (Doctored::Start(-1.0), "start_s is -1"),
+        (Doctored::Base(f64::INFINITY), "base_rad of joint 0"),
+        (Doctored::Replaces(5), "replaces code 5"),
+    ];
+    for (doctored, words) in cases {
+        let message = TrajectoryMessage::new(&example()).doctored(doctored);
+        let error = CheckedTrajectory::try_from(&*message).expect_err("a doctored message is refused");
+        assert!(error.to_string().contains(words), "{doctored:?} gave: {error}");
+    }
+    let other_robot = TrajectoryMessage::new(&example()).doctored(Doctored::Digest(1));
+    let read = CheckedTrajectory::try_from(&*other_robot).expect("a digest is compared by the streamer");
+    assert_ne!(read.robot_digest, example().robot_digest);
+}
+
+#[test]
+fn cut_at_a_time_that_is_no_time_is_refused() {
+    for at_s in [f64::NAN, f64::INFINITY, -0.5] {
+        let mut checked = example();
+        checked.replaces = Replaces::Cut { trajectory_id: 1, at_s };
+        let error = CheckedTrajectory::try_from(&*TrajectoryMessage::new(&checked)).expect_err("no time");
+        assert!(matches!(error, MessageError::CutTime { .. }), "{at_s} gave: {error}");
+    }
+}
+
+#[test]
+fn receipt_carries_every_outcome() {
+    let outcomes = [
+        Outcome::Accepted { from_s: 0.25, tick: 77 },
+        Outcome::Rejected(Rejection::Malformed("stroke 3: n is 3".into())),
+        Outcome::Rejected(Rejection::WrongRobot),
+        Outcome::Rejected(Rejection::JointCount { got: 7, expected: 6 }),
+        Outcome::Rejected(Rejection::StaleGeneration { got: 4, newest: 9 }),
+        Outcome::Rejected(Rejection::Limit {
+            joint: 2,
+            at_s: 1.204,
+            value: 3.3,
+            limit: 3.14,
+            what: "velocity, rad/s".into(),
+        }),
+        Outcome::Rejected(Rejection::NotAtBase { joint: 5, by_rad: 0.02 }),
+        Outcome::Rejected(Rejection::NotReady { phase: Some(Phase::Paused) }),
+        Outcome::Rejected(Rejection::CutUnsupported { at_s: 0.9 }),
+        Outcome::Rejected(Rejection::Busy),
+    ];
+    for outcome in outcomes {
+        let receipt = Receipt::new(5, 4, &outcome);
+        assert_eq!(receipt.outcome(), Some(outcome));
+        assert_eq!(receipt.trajectory_id(), 5);
+    }
+}
+
+#[test]
+fn command_survives_the_wire_and_bad_ones_are_named() {
+    let commands = [
+        Command::Enable,
+        Command::Disable,
+        Command::Pause,
+        Command::Resume,
+        Command::Stop,
+        Command::FastStop,
+        Command::TorqueOff,
+        Command::Speed { percent: 37.5 },
+        Command::ClearFault,
+    ];
+    for command in commands {
+        assert_eq!(Command::try_from(&CommandRequest::from(command)), Ok(command));
+    }
+    for percent in [f64::NAN, -1.0, 100.5, f64::INFINITY] {
+        let refused = Command::try_from(&CommandRequest::from(Command::Speed { percent }));
+        assert!(matches!(refused, Err(CommandError::Percent { .. })), "{percent}");
+    }
+}
+
+#[test]
+fn plan_request_and_answer_survive_the_wire() {
+    let mut goal_rad = [0.0; MAX_JOINTS];
+    goal_rad[5] = -1.25;
+    let request = CheckedPlanRequest {
+        joints: 6,
+        goal_rad,
+        when: When::AfterCurrent,
+        deadline_ms: 1500,
+        seed: 42,
+        planner: "rrt-connect".into(),
+    };
+    assert_eq!(CheckedPlanRequest::try_from(&PlanRequest::from(&request)), Ok(request));
+    let outcomes = [
+        PlanOutcome::Failed { reason: "goal of joint 2 is outside its limits by 0.2 rad".into() },
+        PlanOutcome::Planned {
+            trajectory_id: 9,
+            planning_s: 0.1,
+            duration_s: 2.5,
+            clearance_m: 0.03,
+            strokes: 4,
+            how: "RRT-Connect".into(),
+            receipt: None,
+        },
+    ];
+    for outcome in outcomes {
+        assert_eq!(PlanReply::new(&outcome).outcome(), outcome);
+    }
+}
+
+#[test]
+fn text_too_long_is_cut_at_a_character() {
+    let long = "\u{e9}".repeat(200);
+    let text = Text::new(&long).read();
+    assert_eq!(text, "\u{e9}".repeat(120));
+    assert_eq!(Text::new("a\nb").read(), "a b");
+}

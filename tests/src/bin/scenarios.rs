@@ -1,0 +1,122 @@
+//! Runs every scenario on a real vcan0 and judges every recording. Meant to run inside the test machine.
+use anyhow::{Context, Result, bail, ensure};
+use clap::Parser;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+use taustream_arm::Settings;
+use taustream_tests::scenarios::{ALL, Goals, Scenario};
+use taustream_tests::setpoints::{BusFrame, Encoding, Verdict, judge};
+use taustream_tests::stage::{Place, Stage};
+use taustream_tests::{candump, cycle_log};
+
+/// Runs the scenarios over the real processes on a real vcan0.
+#[derive(Parser, Debug)]
+struct Arguments {
+    /// Demo file: settings, start pose and goals.
+    #[arg(long, default_value = "config/demo.toml")]
+    demo: PathBuf,
+    /// Folder of the built programs; default: where this program is.
+    #[arg(long)]
+    programs: Option<PathBuf>,
+    /// Folder for logs and recordings.
+    #[arg(long, default_value = "target/scenarios")]
+    output: PathBuf,
+    /// Only scenarios whose name contains this.
+    #[arg(long, default_value = "")]
+    only: String,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(0) => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("scenarios: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<usize> {
+    let (place, goals) = read_demo(arguments)?;
+    let settings = Settings::load(&place.settings)?;
+    let bus = settings.buses.first().context("the settings have no bus")?;
+    let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
+    ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
+    let chosen: Vec<&Scenario> = ALL.iter().filter(|s| s.name.contains(&arguments.only)).collect();
+    ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
+    let mut failed = 0;
+    for scenario in &chosen {
+        let since = Instant::now();
+        let result = perform(scenario, &place, &goals);
+        let took_s = since.elapsed().as_secs_f64();
+        match result {
+            Ok(v) => println!(
+                "ok     {}: {} frames on the bus, {} SYNCs, {} setpoints equal to the log, {} of them to a trajectory; {took_s:.1} s",
+                scenario.name, v.frames, v.syncs, v.setpoints, v.on_trajectory
+            ),
+            Err(error) => {
+                failed += 1;
+                println!("FAILED {}: {error:#}; {took_s:.1} s", scenario.name);
+            }
+        }
+    }
+    println!("{} passed, {failed} failed", chosen.len() - failed);
+    Ok(failed)
+}
+
+fn perform(scenario: &Scenario, place: &Place, goals: &Goals) -> Result<Verdict> {
+    let mut stage = Stage::open(place, scenario.name)?;
+    let encodings = encodings(&stage.settings);
+    (scenario.run)(&mut stage, goals)?;
+    let (recording, log) = stage.close()?;
+    let verdict = judge(&frames(&recording)?, &cycle_log::read(&log)?, 0, &encodings)?;
+    // A recording without motion would pass every comparison.
+    ensure!(verdict.on_trajectory > 0, "nothing was compared with a trajectory");
+    Ok(verdict)
+}
+
+fn frames(recording: &str) -> Result<Vec<BusFrame>> {
+    let lines = candump::parse(recording)?;
+    Ok(lines.into_iter().map(|l| BusFrame { time_s: l.time_s, id: l.id, data: l.data }).collect())
+}
+
+fn encodings(settings: &Settings) -> Vec<Encoding> {
+    let encoding = |servo: &taustream_arm::Servo| Encoding {
+        joint: servo.joint,
+        node_id: servo.node_id,
+        counts_per_rad: servo.sign * servo.gear_ratio * servo.counts_per_rev / std::f64::consts::TAU,
+        zero_rad: servo.zero_offset_rad,
+    };
+    settings.servos.iter().map(encoding).collect()
+}
+
+fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
+    let file = &arguments.demo;
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let demo: toml::Table = text.parse().with_context(|| format!("{} is no TOML", file.display()))?;
+    let numbers = |value: &toml::Value| -> Option<Vec<f64>> {
+        value.as_array()?.iter().map(|v| v.as_float()).collect()
+    };
+    let start = demo.get("start_rad").and_then(numbers).context("start_rad is missing")?;
+    let goals = demo.get("goals_rad").and_then(|v| v.as_array()).context("goals_rad is missing")?;
+    let goals: Option<Vec<Vec<f64>>> = goals.iter().map(numbers).collect();
+    let goals = goals.context("goals_rad holds something that is no number")?;
+    let settings = demo.get("settings").and_then(|v| v.as_str()).context("settings is missing")?;
+    let folder = file.parent().context("the demo file has no folder")?;
+    let programs = match &arguments.programs {
+        Some(programs) => programs.clone(),
+        None => std::env::current_exe()?.parent().context("no folder of programs")?.to_owned(),
+    };
+    if goals.len() < 3 {
+        bail!("{} goals; the scenarios need three", goals.len());
+    }
+    let place = Place {
+        programs,
+        settings: folder.join(settings),
+        start_rad: start.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
+        output: arguments.output.clone(),
+    };
+    Ok((place, Goals(goals)))
+}

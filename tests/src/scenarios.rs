@@ -1,0 +1,284 @@
+//! What must hold over the real processes, one function a promise. Names say area, event, condition.
+use crate::stage::Stage;
+use anyhow::{Context, Result, ensure};
+use std::time::{Duration, Instant};
+use taustream_messages::service::Wire;
+use taustream_messages::trajectory::Doctored;
+use taustream_messages::{
+    CheckedTrajectory, FaultReason, Outcome, Phase, Receipt, Rejection, Replaces, Report, TrajectoryMessage,
+};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+
+/// How far a servo may be from the goal when the arm holds: the simulated servos' sag and quantisation.
+const AT_GOAL_RAD: f64 = 5e-3;
+
+/// The three goals of the demo, as the command line takes them.
+#[derive(Clone, Debug)]
+pub struct Goals(pub Vec<Vec<f64>>);
+
+impl Goals {
+    fn text(&self, index: usize) -> Result<String> {
+        let goal = self.0.get(index).context("the demo has too few goals")?;
+        Ok(goal.iter().map(ToString::to_string).collect::<Vec<_>>().join(","))
+    }
+    fn rad(&self, index: usize) -> Result<&[f64]> {
+        self.0.get(index).map(Vec::as_slice).context("the demo has too few goals")
+    }
+}
+
+/// One scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct Scenario {
+    /// Area, event, condition.
+    pub name: &'static str,
+    /// What it does; it fails by an error.
+    pub run: fn(&mut Stage, &Goals) -> Result<()>,
+}
+
+/// Every scenario, in the order in which they run.
+pub const ALL: &[Scenario] = &[
+    Scenario { name: "three_goals_round_obstacles_reached", run: three_goals },
+    Scenario { name: "pause_mid_motion_then_resume_reaches_goal", run: pause_and_resume },
+    Scenario { name: "speed_and_stop_mid_motion_hold_on_path", run: speed_and_stop },
+    Scenario { name: "planner_killed_mid_motion_motion_finishes", run: planner_killed },
+    Scenario { name: "servo_silent_mid_motion_fast_stop_names_joint", run: servo_silent },
+    Scenario { name: "servo_fault_mid_motion_fast_stop_names_joint", run: servo_fault },
+    Scenario { name: "message_hostile_mid_motion_changes_nothing", run: hostile_messages },
+    Scenario { name: "streamer_started_twice_second_is_refused", run: started_twice },
+    Scenario { name: "commands_out_of_place_are_refused_with_reason", run: commands_out_of_place },
+];
+
+fn enable(stage: &mut Stage) -> Result<()> {
+    stage.cli_done(&["enable"])?;
+    stage.await_phase(Phase::Holding)?;
+    stage.cli_done(&["speed", "100"])?;
+    Ok(())
+}
+
+fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
+    let report = stage.await_report("the end of the motion", |report, phase| {
+        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
+    })?;
+    for (joint, goal) in goal_rad.iter().enumerate() {
+        let commanded = report.command_rad[joint];
+        ensure!((commanded - goal).abs() < 1e-9, "joint {}: commanded {commanded}, goal {goal} rad", joint + 1);
+    }
+    stage.await_report("the servos to settle at the goal", |report, _| {
+        goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < AT_GOAL_RAD)
+    })
+}
+
+fn three_goals(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    for (index, goal) in goals.0.iter().enumerate() {
+        stage.replan(&goals.text(index)?)?;
+        let report = arrive(stage, goal)?;
+        ensure!(report.accepted == index as u64 + 1, "{} trajectories accepted", report.accepted);
+        ensure!(report.guard_trips == 0, "the guard tripped in a verified motion");
+        ensure!(report.frames_lost == 0, "{} frames lost", report.frames_lost);
+    }
+    stage.cli_done(&["disable"])?;
+    stage.await_phase(Phase::Disabled)?;
+    Ok(())
+}
+
+fn pause_and_resume(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.2)?;
+    stage.cli_done(&["pause"])?;
+    let paused = stage.await_phase(Phase::Paused)?;
+    ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
+    ensure!(paused.trajectory_s < paused.trajectory_duration_s, "the motion had ended before the pause");
+    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "paused")?;
+    let still = stage.report()?.0;
+    ensure!(still.command_rad == paused.command_rad, "the command moved while paused");
+    stage.cli_done(&["resume"])?;
+    arrive(stage, goals.rad(0)?)?;
+    Ok(())
+}
+
+fn speed_and_stop(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    stage.cli_done(&["speed", "30"])?;
+    stage.await_report("30 % speed", |report, _| (report.sigma - 0.3).abs() < 1e-12)?;
+    stage.cli_done(&["stop"])?;
+    let held = stage.await_phase(Phase::Holding)?;
+    ensure!(held.command_velocity_rad_s.iter().all(|v| *v == 0.0), "holds with a velocity");
+    let goal = goals.rad(0)?;
+    let short = goal.iter().zip(held.command_rad).any(|(goal, at)| (goal - at).abs() > 1e-3);
+    ensure!(short, "the stop came after the motion had ended");
+    stage.cli_done(&["speed", "100"])?;
+    stage.replan(&goals.text(0)?)?;
+    arrive(stage, goal)?;
+    Ok(())
+}
+
+fn planner_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.2)?;
+    stage.planner.signal(libc::SIGKILL)?;
+    stage.planner.await_end()?;
+    let (_, phase) = stage.report()?;
+    ensure!(phase == Phase::Moving, "the arm is {} right after the planner died", phase.word());
+    arrive(stage, goals.rad(0)?)?;
+    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "taustream-planner")?;
+    stage.restart_planner()?;
+    stage.replan(&goals.text(1)?)?;
+    arrive(stage, goals.rad(1)?)?;
+    Ok(())
+}
+
+/// A servo fault ends in `Fault` with the joint named; after the cause is gone the arm is brought back by command only.
+fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.2)?;
+    stage.simulator.tell(fault)?;
+    let report = stage.await_phase(Phase::Fault)?;
+    ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
+    let reason = report.fault().context("a fault without a reason")?;
+    ensure!(reasons.contains(&reason), "reason {reason:?}, expected one of {reasons:?}");
+    ensure!(report.trajectory_s < report.trajectory_duration_s, "the motion had ended before the fault");
+    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "fault")?;
+    stage.cli_refused(&["enable"], "clear-fault")?;
+    stage.simulator.tell("clear")?;
+    let since = Instant::now();
+    while stage.cli(&["clear-fault"])?.code != 0 {
+        ensure!(since.elapsed() < Duration::from_secs(20), "the fault cannot be cleared");
+    }
+    let (after, phase) = stage.report()?;
+    ensure!(phase != Phase::Moving && after.sigma == 0.0, "the arm went on by itself: {}", phase.word());
+    stage.await_report("ready to be enabled", |_, phase| matches!(phase, Phase::Locked | Phase::Disabled))?;
+    enable(stage)?;
+    stage.replan(&goals.text(1)?)?;
+    arrive(stage, goals.rad(1)?)?;
+    Ok(())
+}
+
+fn servo_silent(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    let reasons = [FaultReason::FeedbackLate, FaultReason::DriveFault];
+    fault_and_back(stage, goals, "fault joint=3,kind=silence", &reasons)
+}
+
+fn servo_fault(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    let reasons = [FaultReason::DriveFault, FaultReason::DriveDropped];
+    fault_and_back(stage, goals, "fault joint=3,kind=fault,value=0x2310", &reasons)
+}
+
+/// A small motion of joint 1 from the commanded pose, as a hostile or careless sender would make it.
+fn message(report: &Report, delta_rad: f64, base_shift_rad: f64) -> Result<CheckedTrajectory> {
+    let mut base: JointArray = report.command_rad;
+    base[0] += base_shift_rad;
+    let mut delta = [0.0; MAX_JOINTS];
+    delta[0] = delta_rad;
+    let strokes = [Stroke { start_s: 0.0, duration_s: 4.0, n: 6, delta_rad: delta }];
+    Ok(CheckedTrajectory {
+        trajectory_id: 1_000 + report.sequence,
+        generation: report.generation + 1,
+        robot_digest: report.robot_digest,
+        replaces: Replaces::Rest,
+        trajectory: Trajectory::new(report.joints(), base, &strokes)?,
+    })
+}
+
+fn receipt_of(wire: &Wire, sent: &TrajectoryMessage) -> Result<Receipt> {
+    let receipts = wire.receipt_subscriber()?;
+    wire.trajectory_publisher()?.send_copy(*sent)?;
+    let since = Instant::now();
+    loop {
+        while let Some(receipt) = receipts.receive()? {
+            if receipt.trajectory_id() == sent.claimed_id() {
+                return Ok(*receipt);
+            }
+        }
+        ensure!(since.elapsed() < Duration::from_secs(20), "no receipt of message {}", sent.claimed_id());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn rejection(wire: &Wire, sent: &TrajectoryMessage) -> Result<Rejection> {
+    match receipt_of(wire, sent)?.outcome().context("an unreadable receipt")? {
+        Outcome::Rejected(rejection) => Ok(rejection),
+        Outcome::Accepted { .. } => anyhow::bail!("accepted what had to be refused"),
+    }
+}
+
+fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    let wire = Wire::join(&stage.settings.name, "hostile")?;
+    let (at_rest, _) = stage.report()?;
+    let good = message(&at_rest, 0.05, 0.0)?;
+    let wrong_robot = TrajectoryMessage::new(&good).doctored(Doctored::Digest(0x55));
+    ensure!(rejection(&wire, &wrong_robot)? == Rejection::WrongRobot, "another robot's digest");
+    let mut stale = good.clone();
+    stale.generation = at_rest.generation;
+    let stale = rejection(&wire, &TrajectoryMessage::new(&stale))?;
+    ensure!(matches!(stale, Rejection::StaleGeneration { .. }), "{stale}");
+    let away = rejection(&wire, &TrajectoryMessage::new(&message(&at_rest, 0.05, 0.02)?))?;
+    ensure!(matches!(away, Rejection::NotAtBase { joint: 0, .. }), "{away}");
+    let mut fast = good.clone();
+    let strokes = [Stroke { start_s: 0.0, duration_s: 0.01, n: 6, delta_rad: [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] }];
+    fast.trajectory = Trajectory::new(good.trajectory.joints(), *good.trajectory.base_rad(), &strokes)?;
+    let fast = rejection(&wire, &TrajectoryMessage::new(&fast))?;
+    ensure!(matches!(fast, Rejection::Limit { joint: 0, .. }), "{fast}");
+
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    for doctored in [
+        Doctored::Delta(f64::NAN),
+        Doctored::Base(f64::NAN),
+        Doctored::Duration(f64::NAN),
+        Doctored::StrokeCount(600),
+        Doctored::Joints(7),
+        Doctored::Exponent(3),
+        Doctored::Layout(99),
+    ] {
+        let refused = rejection(&wire, &TrajectoryMessage::new(&good).doctored(doctored))?;
+        let known = matches!(refused, Rejection::Malformed(_) | Rejection::JointCount { .. });
+        ensure!(known, "{doctored:?}: {refused}");
+    }
+    let (running, _) = stage.report()?;
+    let mut cut = message(&running, 0.05, 0.0)?;
+    cut.replaces = Replaces::Cut { trajectory_id: running.trajectory_id, at_s: running.trajectory_s + 0.5 };
+    let cut = rejection(&wire, &TrajectoryMessage::new(&cut))?;
+    ensure!(matches!(cut, Rejection::CutUnsupported { .. } | Rejection::NotReady { .. }), "{cut}");
+    let report = arrive(stage, goals.rad(0)?)?;
+    ensure!(report.accepted == 1, "{} trajectories accepted", report.accepted);
+    ensure!(report.rejected >= 12, "only {} rejections counted", report.rejected);
+    Ok(())
+}
+
+fn started_twice(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    let (status, said) = stage.second_streamer()?;
+    ensure!(status.code() == Some(1), "the second streamer ended with {status}: {said}");
+    ensure!(said.contains("vcan0") || said.contains("command"), "it does not say what is taken: {said}");
+    arrive(stage, goals.rad(0)?)?;
+    Ok(())
+}
+
+fn commands_out_of_place(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    stage.cli_refused(&["replan", "--goal", &goals.text(0)?], "enable")?;
+    stage.cli_refused(&["resume"], "disabled")?;
+    enable(stage)?;
+    stage.cli_refused(&["resume"], "holding")?;
+    let outside = "9,0,0,0,0,0";
+    stage.cli_refused(&["replan", "--goal", outside], "joint")?;
+    ensure!(stage.cli(&["replan", "--goal", "0,0,0,0,0,0,0"])?.code != 0, "seven values for six joints");
+    ensure!(stage.cli(&["speed", "101"])?.code == 2, "101 %");
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    stage.cli_refused(&["disable"], "moving")?;
+    stage.cli_refused(&["enable"], "moving")?;
+    stage.cli_refused(&["replan", "--at-once", "--goal", &goals.text(1)?], "rest")?;
+    stage.cli_done(&["torque-off"])?;
+    let report = stage.await_phase(Phase::Fault)?;
+    ensure!(report.fault() == Some(FaultReason::TorqueOff), "{:?}", report.fault());
+    stage.await_report("no drive energised", |report, _| report.energised == 0)?;
+    Ok(())
+}

@@ -1,0 +1,303 @@
+//! The judge of a recording: was every setpoint on the bus the one that the trajectory demands?
+//!
+//! It shares no encoding with the product. The bus is what `candump` wrote; the claim is the streamer's cycle log. For
+//! each cycle: the frames between two SYNCs are exactly one RPDO per servo, their targets equal the encoding
+//! of the logged setpoint count by count, and the logged setpoint equals the accepted trajectory at the logged
+//! trajectory time: bit for bit by the product's sampler, and to 1e-11 rad by a second formula written here.
+use crate::cycle_log::{Cycle, Event};
+use std::collections::BTreeMap;
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+
+/// CANopen SYNC.
+const SYNC: u32 = 0x080;
+/// RPDO1 of node 0.
+const RPDO1: u32 = 0x200;
+/// TPDO1 of node 0.
+const TPDO1: u32 = 0x180;
+/// Agreement of the second formula with the product's sampler.
+const SECOND_FORMULA_RAD: f64 = 1e-11;
+
+/// One frame as `candump` saw it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BusFrame {
+    /// Reception time.
+    pub time_s: f64,
+    /// The id, with the kernel's flags.
+    pub id: u32,
+    /// The data.
+    pub data: Vec<u8>,
+}
+
+/// How one joint's setpoint is encoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Encoding {
+    /// Joint of the arm.
+    pub joint: usize,
+    /// Node id.
+    pub node_id: u8,
+    /// Counts a link radian, with the sign of the direction.
+    pub counts_per_rad: f64,
+    /// Link angle at count 0.
+    pub zero_rad: f64,
+}
+
+impl Encoding {
+    /// Counts of an angle: rounded half away from zero.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "ranges were checked to fit i32 when settings were read")]
+    pub fn counts(&self, position_rad: f64) -> i32 {
+        ((position_rad - self.zero_rad) * self.counts_per_rad).round() as i32
+    }
+    /// The angle of counts.
+    #[must_use]
+    pub fn rad(&self, counts: i32) -> f64 {
+        f64::from(counts) / self.counts_per_rad + self.zero_rad
+    }
+}
+
+/// What a recording showed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Verdict {
+    /// Frames of any kind on the bus.
+    pub frames: usize,
+    /// SYNCs on the bus.
+    pub syncs: usize,
+    /// Setpoint frames compared.
+    pub setpoints: usize,
+    /// Setpoints that were compared with a trajectory.
+    pub on_trajectory: usize,
+    /// Trajectories accepted.
+    pub trajectories: usize,
+    /// Last position that each servo reported, rad.
+    pub last_measured_rad: Vec<f64>,
+    /// Last setpoint of each joint, rad.
+    pub last_setpoint_rad: Vec<f64>,
+}
+
+/// What is wrong with a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Flaw {
+    /// The log is incomplete or contradicts itself.
+    #[error("log: {0}")]
+    Log(String),
+    /// The bus does not carry what the log claims.
+    #[error("SYNC {sync} (tick {tick}): {what}")]
+    Bus {
+        /// Number of the SYNC.
+        sync: u64,
+        /// Cycle number in the log.
+        tick: u64,
+        /// The difference.
+        what: String,
+    },
+    /// The logged setpoint is not on the trajectory.
+    #[error("tick {tick}: joint {joint} is at {got_rad} rad, the trajectory at s = {s} is at {want_rad} rad")]
+    OffTrajectory {
+        /// Cycle number.
+        tick: u64,
+        /// One-based joint.
+        joint: usize,
+        /// Logged setpoint.
+        got_rad: f64,
+        /// The trajectory there.
+        want_rad: f64,
+        /// Trajectory time.
+        s: f64,
+    },
+}
+
+/// Judges one bus of a recording that began before the first SYNC.
+///
+/// # Errors
+/// The first flaw.
+pub fn judge(
+    frames: &[BusFrame],
+    log: &[Event],
+    bus: usize,
+    encodings: &[Encoding],
+) -> Result<Verdict, Flaw> {
+    let on_bus = split_at_syncs(frames, encodings);
+    let mut verdict =
+        Verdict { frames: frames.len(), syncs: on_bus.len(), ..last_measured(frames, encodings) };
+    let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
+    let mut last: Option<&Cycle> = None;
+    let mut claimed = vec![false; on_bus.len()];
+    for event in log {
+        match event {
+            Event::Start { .. } | Event::Phase { .. } => {}
+            Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
+            Event::Trajectory { trajectory_id, file, .. } => {
+                trajectories.insert(*trajectory_id, trajectory(file)?);
+                verdict.trajectories += 1;
+            }
+            Event::Cycle(cycle) => {
+                follows(last, cycle, bus)?;
+                verdict.setpoints += compare_bus(&on_bus, cycle, bus, encodings, &mut claimed)?;
+                verdict.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                last = Some(cycle);
+            }
+        }
+    }
+    if let Some(at) = on_bus.iter().zip(&claimed).position(|(cycle, claimed)| !claimed && !cycle.is_empty()) {
+        return Err(Flaw::Log(format!("SYNC {} carried setpoints that the log does not know", at + 1)));
+    }
+    verdict.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
+    Ok(verdict)
+}
+
+/// For each SYNC on the bus, the RPDO1 frames that came before the next one: (node id, data).
+fn split_at_syncs(frames: &[BusFrame], encodings: &[Encoding]) -> Vec<Vec<(u8, Vec<u8>)>> {
+    let mut cycles: Vec<Vec<(u8, Vec<u8>)>> = Vec::new();
+    for frame in frames {
+        if frame.id == SYNC {
+            cycles.push(Vec::new());
+            continue;
+        }
+        let node = encodings.iter().find(|e| RPDO1 + u32::from(e.node_id) == frame.id);
+        if let (Some(encoding), Some(cycle)) = (node, cycles.last_mut()) {
+            cycle.push((encoding.node_id, frame.data.clone()));
+        }
+    }
+    cycles
+}
+
+fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> Verdict {
+    let newest = |e: &Encoding| {
+        let id = TPDO1 + u32::from(e.node_id);
+        let data = frames.iter().rev().find(|f| f.id == id).map(|f| f.data.as_slice())?;
+        target(data).map(|counts| e.rad(counts))
+    };
+    let last_measured_rad = encodings.iter().map(|e| newest(e).unwrap_or(f64::NAN)).collect();
+    Verdict { last_measured_rad, ..Verdict::default() }
+}
+
+/// The i32 behind the control or status word of a PDO of 6 bytes.
+fn target(data: &[u8]) -> Option<i32> {
+    let bytes: [u8; 4] = data.get(2..6)?.try_into().ok()?;
+    (data.len() == 6).then(|| i32::from_le_bytes(bytes))
+}
+
+fn follows(last: Option<&Cycle>, cycle: &Cycle, bus: usize) -> Result<(), Flaw> {
+    let flaw = |what: String| Err(Flaw::Log(format!("tick {}: {what}", cycle.tick)));
+    if cycle.lost.get(bus) != Some(&0) {
+        return flaw(format!("frames lost on bus {bus}: {:?}", cycle.lost));
+    }
+    let Some(last) = last else { return Ok(()) };
+    if cycle.tick <= last.tick || cycle.time_ns <= last.time_ns {
+        return flaw(format!("does not come after tick {}", last.tick));
+    }
+    if cycle.sync.get(bus) <= last.sync.get(bus) {
+        return flaw(format!("SYNC count {:?} after {:?}", cycle.sync, last.sync));
+    }
+    if cycle.trajectory_id == last.trajectory_id && cycle.s < last.s {
+        return flaw(format!("trajectory time went back from {} to {}", last.s, cycle.s));
+    }
+    Ok(())
+}
+
+fn compare_bus(
+    on_bus: &[Vec<(u8, Vec<u8>)>],
+    cycle: &Cycle,
+    bus: usize,
+    encodings: &[Encoding],
+    claimed: &mut [bool],
+) -> Result<usize, Flaw> {
+    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
+    let flaw = |what: String| Flaw::Bus { sync, tick: cycle.tick, what };
+    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
+    let sent = at.and_then(|at| on_bus.get(at)).ok_or_else(|| flaw("is not on the bus".into()))?;
+    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
+        *slot = true;
+    }
+    if sent.len() != encodings.len() {
+        return Err(flaw(format!("{} setpoint frames for {} servos", sent.len(), encodings.len())));
+    }
+    for encoding in encodings {
+        let node = encoding.node_id;
+        let mut of_node = sent.iter().filter(|(n, _)| *n == node);
+        let (Some((_, data)), None) = (of_node.next(), of_node.next()) else {
+            return Err(flaw(format!("node {node} has not exactly one setpoint frame")));
+        };
+        let got = target(data).ok_or_else(|| flaw(format!("node {node} got {} bytes", data.len())))?;
+        let wish = cycle.position_rad.get(encoding.joint).copied();
+        let wish = wish.ok_or_else(|| flaw(format!("no setpoint of joint {}", encoding.joint + 1)))?;
+        let want = encoding.counts(wish);
+        if got != want {
+            return Err(flaw(format!("node {node} got target {got}, {wish} rad encodes to {want}")));
+        }
+    }
+    Ok(encodings.len())
+}
+
+/// Phases in which the arm is on its trajectory.
+fn is_on_path(phase: &str) -> bool {
+    matches!(phase, "moving" | "pausing" | "paused" | "stopping" | "fast-stopping")
+}
+
+fn compare_trajectory(trajectories: &BTreeMap<u64, Trajectory>, cycle: &Cycle) -> Result<usize, Flaw> {
+    if !is_on_path(&cycle.phase) {
+        return Ok(0);
+    }
+    let Some(trajectory) = trajectories.get(&cycle.trajectory_id) else {
+        let id = cycle.trajectory_id;
+        return Err(Flaw::Log(format!("tick {}: moves on trajectory {id}, never accepted", cycle.tick)));
+    };
+    let sampled = trajectory.sample(cycle.s).position_rad;
+    let second = second_formula(trajectory, cycle.s);
+    for joint in 0..trajectory.joints() {
+        let got_rad = cycle.position_rad.get(joint).copied().unwrap_or(f64::NAN);
+        let off = |want_rad: f64| Flaw::OffTrajectory {
+            tick: cycle.tick,
+            joint: joint + 1,
+            got_rad,
+            want_rad,
+            s: cycle.s,
+        };
+        if got_rad.to_bits() != sampled[joint].to_bits() {
+            return Err(off(sampled[joint]));
+        }
+        if (got_rad - second[joint]).abs() > SECOND_FORMULA_RAD {
+            return Err(off(second[joint]));
+        }
+    }
+    Ok(trajectory.joints())
+}
+
+/// Positions by the definition of Tau-J*, written without a line of the product's sampler.
+fn second_formula(trajectory: &Trajectory, t_s: f64) -> JointArray {
+    let mut q = *trajectory.base_rad();
+    for Stroke { start_s, duration_s, n, delta_rad } in trajectory.strokes() {
+        let s = ((t_s - start_s) / duration_s).clamp(0.0, 1.0);
+        let phi = 1.0 - (1.0 - s.powf(4.0)).powf(f64::from(*n));
+        for (q, delta) in q.iter_mut().zip(delta_rad) {
+            *q += delta * phi;
+        }
+    }
+    q
+}
+
+/// Reads a trajectory object of the log with plain JSON access.
+fn trajectory(file: &serde_json::Value) -> Result<Trajectory, Flaw> {
+    let missing = || Flaw::Log(format!("a trajectory that is none: {file}"));
+    let joints = |v: &serde_json::Value| -> Option<JointArray> {
+        let mut array = [0.0; MAX_JOINTS];
+        let list = v.as_array()?;
+        for (slot, value) in array.iter_mut().zip(list) {
+            *slot = value.as_f64()?;
+        }
+        (list.len() <= MAX_JOINTS).then_some(array)
+    };
+    let stroke = |v: &serde_json::Value| -> Option<Stroke> {
+        Some(Stroke {
+            start_s: v["start_s"].as_f64()?,
+            duration_s: v["duration_s"].as_f64()?,
+            n: u32::try_from(v["n"].as_u64()?).ok()?,
+            delta_rad: joints(&v["delta_rad"])?,
+        })
+    };
+    let count = file["joints"].as_u64().and_then(|n| usize::try_from(n).ok()).ok_or_else(missing)?;
+    let base = joints(&file["base_rad"]).ok_or_else(missing)?;
+    let strokes = file["strokes"].as_array().ok_or_else(missing)?;
+    let strokes: Option<Vec<Stroke>> = strokes.iter().map(stroke).collect();
+    Trajectory::new(count, base, &strokes.ok_or_else(missing)?).map_err(|e| Flaw::Log(e.to_string()))
+}

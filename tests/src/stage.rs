@@ -1,0 +1,359 @@
+//! A stage for one scenario: the real processes on one bus, a `candump` beside them, everything kept in one folder.
+use anyhow::{Context, Result, bail, ensure};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use taustream_arm::Settings;
+use taustream_messages::service::{ReportSubscriber, Wire};
+use taustream_messages::{Phase, Report};
+
+/// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it judges no speed.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+/// Pause between two looks.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// One process of ours. Ended by pid when dropped.
+#[derive(Debug)]
+pub struct Process {
+    name: String,
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: PathBuf,
+    stderr: PathBuf,
+}
+
+impl Process {
+    fn start(program: &Path, args: &[&str], dir: &Path, name: &str) -> Result<Self> {
+        let (stdout, stderr) = (dir.join(format!("{name}.out")), dir.join(format!("{name}.err")));
+        let mut child = Command::new(program)
+            .args(args)
+            .stdin(Stdio::piped())
+            .stdout(File::create(&stdout)?)
+            .stderr(File::create(&stderr)?)
+            .spawn()
+            .with_context(|| format!("cannot start {}", program.display()))?;
+        let stdin = child.stdin.take();
+        Ok(Self { name: name.to_owned(), child, stdin, stdout, stderr })
+    }
+
+    /// Waits until the process has printed `words`.
+    ///
+    /// # Errors
+    /// When it ends before, or takes longer than [`PATIENCE`]; with what it said.
+    pub fn await_words(&mut self, words: &str) -> Result<()> {
+        let since = Instant::now();
+        while !fs::read_to_string(&self.stdout)?.contains(words) {
+            if let Some(status) = self.child.try_wait()? {
+                bail!("{} ended with {status} before it said `{words}`: {}", self.name, self.said());
+            }
+            ensure!(since.elapsed() < PATIENCE, "{} never said `{words}`: {}", self.name, self.said());
+            sleep(LOOK);
+        }
+        Ok(())
+    }
+
+    /// Everything it has said so far.
+    #[must_use]
+    pub fn said(&self) -> String {
+        let read = |file: &Path| fs::read_to_string(file).unwrap_or_default();
+        format!("{}{}", read(&self.stdout), read(&self.stderr))
+    }
+
+    /// Writes a line to its standard input.
+    ///
+    /// # Errors
+    /// When it has ended.
+    pub fn tell(&mut self, line: &str) -> Result<()> {
+        let stdin = self.stdin.as_mut().context("its input is closed")?;
+        writeln!(stdin, "{line}").with_context(|| format!("cannot tell {} `{line}`", self.name))
+    }
+
+    /// Sends a signal.
+    ///
+    /// # Errors
+    /// When the process has ended.
+    pub fn signal(&self, signal: i32) -> Result<()> {
+        let pid = i32::try_from(self.child.id())?;
+        // SAFETY: kill takes two integers and touches no memory; the pid is that of our child, which is not reaped yet.
+        let done = unsafe { libc::kill(pid, signal) };
+        ensure!(done == 0, "cannot signal {}: {}", self.name, std::io::Error::last_os_error());
+        Ok(())
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Errors
+    /// When it takes longer than [`PATIENCE`].
+    pub fn await_end(&mut self) -> Result<ExitStatus> {
+        let since = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(status);
+            }
+            ensure!(since.elapsed() < PATIENCE, "{} does not end: {}", self.name, self.said());
+            sleep(LOOK);
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended already; then there is nothing left to end.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What a command line answered.
+#[derive(Debug)]
+pub struct Answer {
+    /// Its exit code.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+/// The processes of one scenario.
+#[derive(Debug)]
+pub struct Stage {
+    dir: PathBuf,
+    programs: PathBuf,
+    settings_file: PathBuf,
+    /// The settings that all processes share.
+    pub settings: Settings,
+    /// The simulated servos.
+    pub simulator: Process,
+    /// The streamer.
+    pub streamer: Process,
+    /// The planner.
+    pub planner: Process,
+    candump: Process,
+    reports: ReportSubscriber,
+    _wire: Wire,
+}
+
+/// Where a stage finds things.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// Folder of the built programs.
+    pub programs: PathBuf,
+    /// Settings file.
+    pub settings: PathBuf,
+    /// Pose of the simulated servos at start, "q1,..".
+    pub start_rad: String,
+    /// Folder for logs; one folder a scenario is made in it.
+    pub output: PathBuf,
+}
+
+impl Stage {
+    /// Starts candump, simulator, streamer and planner, in this order, and waits until the arm is ready to be enabled.
+    ///
+    /// # Errors
+    /// When one of them does not come up.
+    pub fn open(place: &Place, scenario: &str) -> Result<Self> {
+        let dir = place.output.join(scenario);
+        fs::create_dir_all(&dir)?;
+        let settings = Settings::load(&place.settings)?;
+        let bus = settings.buses.first().context("the settings have no bus")?.interface.clone();
+        let settings_arg = place.settings.to_str().context("the settings' path is not UTF-8")?;
+        let program = |name: &str| place.programs.join(name);
+
+        let candump_args = ["-L", "-r", "33554432", bus.as_str()];
+        let candump = Process::start(Path::new("candump"), &candump_args, &dir, "candump")?;
+        let simulator_args =
+            ["--settings", settings_arg, "--link", "socketcan", "--start-rad", &place.start_rad];
+        let mut simulator =
+            Process::start(&program("taustream-servosim"), &simulator_args, &dir, "servosim")?;
+        simulator.await_words("taustream-servosim ready")?;
+        let log = dir.join("cycles.jsonl");
+        let log_arg = log.to_str().context("the log's path is not UTF-8")?;
+        let streamer_args = ["--settings", settings_arg, "--link", "socketcan", "--cycle-log", log_arg];
+        let mut streamer =
+            Process::start(&program("taustream-streamer"), &streamer_args, &dir, "streamer")?;
+        streamer.await_words("taustream-streamer ready")?;
+        let mut planner =
+            Process::start(&program("taustream-planner"), &["--settings", settings_arg], &dir, "planner")?;
+        planner.await_words("taustream-planner ready")?;
+
+        let wire = Wire::join(&settings.name, "scenario")?;
+        let reports = wire.report_subscriber()?;
+        let mut stage = Self {
+            dir,
+            programs: place.programs.clone(),
+            settings_file: place.settings.clone(),
+            settings,
+            simulator,
+            streamer,
+            planner,
+            candump,
+            reports,
+            _wire: wire,
+        };
+        stage.await_phase(Phase::Disabled)?;
+        Ok(stage)
+    }
+
+    /// The folder of this scenario's files.
+    #[must_use]
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Starts the planner again, as a service manager would.
+    ///
+    /// # Errors
+    /// When it does not come up.
+    pub fn restart_planner(&mut self) -> Result<()> {
+        let settings = self.settings_file.to_str().context("path is not UTF-8")?;
+        let program = self.programs.join("taustream-planner");
+        self.planner = Process::start(&program, &["--settings", settings], &self.dir, "planner-again")?;
+        self.planner.await_words("taustream-planner ready")
+    }
+
+    /// Starts another streamer on the same bus and waits for its end.
+    ///
+    /// # Errors
+    /// When it does not end.
+    pub fn second_streamer(&self) -> Result<(ExitStatus, String)> {
+        let settings = self.settings_file.to_str().context("path is not UTF-8")?;
+        let program = self.programs.join("taustream-streamer");
+        let args = ["--settings", settings, "--link", "socketcan"];
+        let mut second = Process::start(&program, &args, &self.dir, "second-streamer")?;
+        let status = second.await_end()?;
+        Ok((status, second.said()))
+    }
+
+    /// Runs `taustream ARGS` with this stage's settings.
+    ///
+    /// # Errors
+    /// When it cannot be started.
+    pub fn cli(&self, args: &[&str]) -> Result<Answer> {
+        let output = Command::new(self.programs.join("taustream"))
+            .args(args)
+            .env("TAUSTREAM_SETTINGS", &self.settings_file)
+            .stdin(Stdio::null())
+            .output()
+            .context("cannot start taustream")?;
+        let mut log = fs::OpenOptions::new().create(true).append(true).open(self.dir.join("cli.log"))?;
+        let answer = Answer {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        };
+        writeln!(log, "$ taustream {}\n{answer:?}", args.join(" "))?;
+        Ok(answer)
+    }
+
+    /// Runs a command that must be done.
+    ///
+    /// # Errors
+    /// When it is refused; with its reason.
+    pub fn cli_done(&self, args: &[&str]) -> Result<Answer> {
+        let answer = self.cli(args)?;
+        ensure!(answer.code == 0, "taustream {} ended with {}: {}", args.join(" "), answer.code, answer.stderr);
+        Ok(answer)
+    }
+
+    /// Runs a command that must be refused with a sentence that holds `words`.
+    ///
+    /// # Errors
+    /// When it is not refused, or for another reason.
+    pub fn cli_refused(&self, args: &[&str], words: &str) -> Result<Answer> {
+        let answer = self.cli(args)?;
+        ensure!(answer.code == 1, "taustream {} ended with {}, not 1: {answer:?}", args.join(" "), answer.code);
+        ensure!(answer.stderr.contains(words), "taustream {}: no `{words}` in: {}", args.join(" "), answer.stderr);
+        Ok(answer)
+    }
+
+    /// Asks for a motion to `goal_rad` and expects that the streamer takes it.
+    ///
+    /// # Errors
+    /// When it is refused.
+    pub fn replan(&self, goal_rad: &str) -> Result<Answer> {
+        self.cli_done(&["replan", "--goal", goal_rad, "--seed", "1", "--deadline-ms", "20000"])
+    }
+
+    /// The newest report.
+    ///
+    /// # Errors
+    /// When none comes.
+    pub fn report(&mut self) -> Result<(Report, Phase)> {
+        let since = Instant::now();
+        // What waited in the buffer is old: take the last of it, or the next to come.
+        let mut newest = None;
+        loop {
+            while let Some(sample) = self.reports.receive()? {
+                newest = Some(*sample);
+            }
+            if let Some((report, phase)) = newest.as_ref().and_then(Report::checked) {
+                return Ok((*report, phase));
+            }
+            ensure!(since.elapsed() < PATIENCE, "no report: {}", self.streamer.said());
+            sleep(LOOK);
+        }
+    }
+
+    /// Waits until `wanted` holds.
+    ///
+    /// # Errors
+    /// When it does not come to hold; with the last report.
+    pub fn await_report(&mut self, what: &str, wanted: impl Fn(&Report, Phase) -> bool) -> Result<Report> {
+        let since = Instant::now();
+        loop {
+            let (report, phase) = self.report()?;
+            if wanted(&report, phase) {
+                return Ok(report);
+            }
+            ensure!(
+                since.elapsed() < PATIENCE,
+                "waited for {what}; the arm is {} ({:?} joint {} value {}), s = {} of {}: {}",
+                phase.word(),
+                report.fault(),
+                report.fault_joint,
+                report.fault_value,
+                report.trajectory_s,
+                report.trajectory_duration_s,
+                self.streamer.said()
+            );
+            sleep(LOOK);
+        }
+    }
+
+    /// Waits for a phase.
+    ///
+    /// # Errors
+    /// When it does not come.
+    pub fn await_phase(&mut self, wanted: Phase) -> Result<Report> {
+        self.await_report(wanted.word(), |_, phase| phase == wanted)
+    }
+
+    /// Waits until the running motion is under way: past `share` of its duration.
+    ///
+    /// # Errors
+    /// When it does not get there.
+    pub fn await_under_way(&mut self, share: f64) -> Result<Report> {
+        self.await_report("a motion under way", |r, phase| {
+            phase == Phase::Moving && r.trajectory_s > share * r.trajectory_duration_s
+        })
+    }
+
+    /// Ends everything in order and leaves the recording: the candump text and the path of the cycle log.
+    ///
+    /// # Errors
+    /// When the streamer does not end well.
+    pub fn close(mut self) -> Result<(String, PathBuf)> {
+        self.streamer.signal(libc::SIGTERM)?;
+        let status = self.streamer.await_end()?;
+        ensure!(status.success(), "the streamer ended with {status}: {}", self.streamer.said());
+        for process in [&mut self.planner, &mut self.simulator, &mut self.candump] {
+            process.signal(libc::SIGTERM)?;
+            process.await_end()?;
+        }
+        Ok((fs::read_to_string(self.dir.join("candump.out"))?, self.dir.join("cycles.jsonl")))
+    }
+}

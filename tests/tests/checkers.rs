@@ -1,0 +1,232 @@
+//! The judge of recordings is itself judged: a faithful recording passes, and every doctored one fails for its fault.
+use std::f64::consts::TAU;
+use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+use taustream_tests::cycle_log::{Cycle, Event, parse};
+use taustream_tests::setpoints::{BusFrame, Encoding, Flaw, judge};
+
+const JOINTS: usize = 6;
+const CYCLES: u32 = 400;
+const PERIOD_S: f64 = 1e-3;
+
+fn encodings() -> Vec<Encoding> {
+    (0..6_u8)
+        .map(|joint| Encoding {
+            joint: usize::from(joint),
+            node_id: joint + 1,
+            counts_per_rad: if joint % 2 == 0 { 1.0 } else { -1.0 } * 100.0 * 4096.0 / TAU,
+            zero_rad: 0.01 * f64::from(joint),
+        })
+        .collect()
+}
+
+fn moves() -> Trajectory {
+    let mut delta_rad = [0.0; MAX_JOINTS];
+    for (joint, delta) in delta_rad.iter_mut().take(JOINTS).enumerate() {
+        *delta = 0.4 - 0.15 * f64::from(u8::try_from(joint).expect("few joints"));
+    }
+    let strokes = [
+        Stroke { start_s: 0.0, duration_s: 0.3, n: 5, delta_rad },
+        Stroke { start_s: 0.1, duration_s: 0.25, n: 10, delta_rad: delta_rad.map(|d| -0.5 * d) },
+    ];
+    let mut base_rad = [0.0; MAX_JOINTS];
+    base_rad[1] = -1.57;
+    Trajectory::new(JOINTS, base_rad, &strokes).expect("a plain trajectory")
+}
+
+fn file(trajectory: &Trajectory) -> serde_json::Value {
+    let strokes: Vec<serde_json::Value> = trajectory
+        .strokes()
+        .iter()
+        .map(|s| {
+            serde_json::json!({
+                "start_s": s.start_s, "duration_s": s.duration_s, "n": s.n, "delta_rad": s.delta_rad[..JOINTS],
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "version": 1, "robot": "ur5", "joints": JOINTS,
+        "base_rad": trajectory.base_rad()[..JOINTS], "strokes": strokes,
+    })
+}
+
+/// A faithful recording: what a streamer without a fault leaves on the bus and in its log.
+fn recording() -> (Vec<BusFrame>, Vec<Event>) {
+    let trajectory = moves();
+    let mut frames = Vec::new();
+    let mut log = vec![
+        Event::Start { format: 1, robot: "ur5".into(), digest: "00".into(), joints: JOINTS, period_us: 1000 },
+        Event::Trajectory { tick: 1, trajectory_id: 5, generation: 1, file: file(&trajectory) },
+    ];
+    for tick in 1..=CYCLES {
+        let s = f64::from(tick) * PERIOD_S;
+        let time_s = 100.0 + s;
+        let position_rad = trajectory.sample(s).position_rad[..JOINTS].to_vec();
+        frames.push(BusFrame { time_s, id: 0x080, data: Vec::new() });
+        for e in encodings() {
+            let mut data = vec![0x0F, 0x00];
+            data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
+            frames.push(BusFrame { time_s: time_s + 1e-5, id: 0x200 + u32::from(e.node_id), data });
+        }
+        for e in encodings() {
+            let mut data = vec![0x37, 0x12];
+            data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
+            frames.push(BusFrame { time_s: time_s + 2e-4, id: 0x180 + u32::from(e.node_id), data });
+        }
+        log.push(Event::Cycle(Cycle {
+            tick: u64::from(tick),
+            time_ns: u64::from(tick) * 1_000_000,
+            sync: vec![u64::from(tick)],
+            phase: if s < 0.35 { "moving" } else { "holding" }.into(),
+            trajectory_id: 5,
+            s,
+            sigma: 1.0,
+            position_rad,
+            sent: vec![7],
+            lost: vec![0],
+        }));
+    }
+    (frames, log)
+}
+
+/// The place of the RPDO of `node` after the SYNC of number `sync`.
+fn place(frames: &[BusFrame], sync: usize, node: u8) -> usize {
+    let mut seen = 0;
+    for (at, frame) in frames.iter().enumerate() {
+        seen += usize::from(frame.id == 0x080);
+        if seen == sync && frame.id == 0x200 + u32::from(node) {
+            return at;
+        }
+    }
+    panic!("no setpoint of node {node} after SYNC {sync}");
+}
+
+fn nth_cycle(log: &mut [Event], n: usize) -> &mut Cycle {
+    let mut cycles = log.iter_mut().filter_map(|e| if let Event::Cycle(c) = e { Some(c) } else { None });
+    cycles.nth(n).expect("the cycle")
+}
+
+#[test]
+fn faithful_recording_passes_and_everything_was_compared() {
+    let (frames, log) = recording();
+    let verdict = judge(&frames, &log, 0, &encodings()).expect("nothing is wrong with it");
+    assert_eq!(verdict.syncs, 400);
+    assert_eq!(verdict.frames, 400 * 13);
+    assert_eq!(verdict.setpoints, 400 * JOINTS);
+    assert!(verdict.on_trajectory >= 349 * JOINTS);
+    assert_eq!(verdict.trajectories, 1);
+    let end = moves().end_rad();
+    for (joint, measured) in verdict.last_measured_rad.iter().enumerate() {
+        assert!((measured - end[joint]).abs() < 2.0 * TAU / 409_600.0, "joint {joint}: {measured}");
+    }
+}
+
+#[test]
+fn frame_off_by_two_counts_fails() {
+    for (sync, node) in [(1, 1), (200, 4), (400, 6)] {
+        let (mut frames, log) = recording();
+        let at = place(&frames, sync, node);
+        let counts = i32::from_le_bytes(frames[at].data[2..6].try_into().expect("4 bytes")) + 2;
+        frames[at].data[2..6].copy_from_slice(&counts.to_le_bytes());
+        let flaw = judge(&frames, &log, 0, &encodings()).expect_err("two counts off");
+        assert!(matches!(flaw, Flaw::Bus { sync: s, .. } if s == sync as u64), "{flaw}");
+    }
+}
+
+#[test]
+fn frame_missing_fails() {
+    let (mut frames, log) = recording();
+    frames.remove(place(&frames, 250, 3));
+    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a frame is missing");
+    assert!(flaw.to_string().contains("5 setpoint frames for 6 servos"), "{flaw}");
+}
+
+#[test]
+fn sync_missing_fails() {
+    let (mut frames, log) = recording();
+    let at = place(&frames, 120, 1) - 1;
+    assert_eq!(frames[at].id, 0x080);
+    frames.remove(at);
+    judge(&frames, &log, 0, &encodings()).expect_err("a SYNC is missing");
+}
+
+#[test]
+fn frame_late_by_one_cycle_fails() {
+    let (mut frames, log) = recording();
+    let at = place(&frames, 99, 2);
+    let late = frames.remove(at);
+    let after = place(&frames, 100, 2);
+    frames.insert(after, late);
+    judge(&frames, &log, 0, &encodings()).expect_err("a frame came one cycle late");
+}
+
+#[test]
+fn joints_swapped_fails() {
+    let (mut frames, log) = recording();
+    let (a, b) = (place(&frames, 300, 1), place(&frames, 300, 5));
+    let data = frames[a].data.clone();
+    frames[a].data = frames[b].data.clone();
+    frames[b].data = data;
+    judge(&frames, &log, 0, &encodings()).expect_err("two joints are swapped");
+}
+
+#[test]
+fn frame_twice_or_short_fails() {
+    let (mut frames, log) = recording();
+    let at = place(&frames, 17, 6);
+    frames.insert(at, frames[at].clone());
+    judge(&frames, &log, 0, &encodings()).expect_err("a frame came twice");
+
+    let (mut frames, log) = recording();
+    let at = place(&frames, 18, 6);
+    frames[at].data.pop();
+    judge(&frames, &log, 0, &encodings()).expect_err("a frame is short");
+}
+
+#[test]
+fn setpoint_off_the_trajectory_by_one_bit_fails() {
+    let (mut frames, mut log) = recording();
+    let cycle = nth_cycle(&mut log, 150);
+    cycle.position_rad[1] = f64::from_bits(cycle.position_rad[1].to_bits() + 1);
+    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("one bit off");
+    assert!(matches!(flaw, Flaw::OffTrajectory { joint: 2, .. }), "{flaw}");
+
+    let (_, mut log) = recording();
+    nth_cycle(&mut log, 150).s += 1e-4;
+    judge(&frames, &log, 0, &encodings()).expect_err("another trajectory time");
+    frames.clear();
+    judge(&frames, &log, 0, &encodings()).expect_err("an empty bus");
+}
+
+#[test]
+fn log_that_hides_something_fails() {
+    let (frames, mut log) = recording();
+    log.push(Event::Lost { records: 1 });
+    judge(&frames, &log, 0, &encodings()).expect_err("records are missing");
+
+    let (frames, mut log) = recording();
+    let unknown = log.len() - 20;
+    log.remove(unknown);
+    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("the bus carried more than the log says");
+    assert!(flaw.to_string().contains("the log does not know"), "{flaw}");
+
+    let (frames, mut log) = recording();
+    nth_cycle(&mut log, 9).lost = vec![1];
+    judge(&frames, &log, 0, &encodings()).expect_err("a lost frame");
+
+    let (frames, mut log) = recording();
+    log.remove(1);
+    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a motion that was never accepted");
+    assert!(flaw.to_string().contains("never accepted"), "{flaw}");
+
+    let (frames, mut log) = recording();
+    nth_cycle(&mut log, 30).s = 0.0;
+    judge(&frames, &log, 0, &encodings()).expect_err("trajectory time went back");
+}
+
+#[test]
+fn log_line_that_is_not_understood_is_an_error() {
+    assert!(parse("{\"event\":\"surprise\"}").is_err());
+    assert!(parse("{\"event\":\"cycle\",\"tick\":1}").is_err());
+    assert!(parse("not json").is_err());
+    assert_eq!(parse("{\"event\":\"lost\",\"records\":3}").expect("a plain line"), [Event::Lost { records: 3 }]);
+}
