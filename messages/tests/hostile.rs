@@ -1,12 +1,13 @@
 //! Messages come from shared memory that anybody of our user may have written: whatever their bits are, reading them
 //! must neither panic nor let an unchecked number through.
+#![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::trajectory::{Doctored, MessageError};
 use taustream_messages::{
-    CheckedTrajectory, Command, CommandReply, CommandRequest, Outcome, Phase, PlanReply, PlanRequest, Receipt,
-    Rejection, Replaces, Report, Text, TrajectoryMessage,
+    CheckedTrajectory, Command, CommandReply, CommandRequest, Outcome, Phase, PlanReply, PlanRequest,
+    Receipt, Rejection, Replaces, Report, Text, TrajectoryMessage,
 };
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 

@@ -1,9 +1,14 @@
-//! Scenarios over the real processes on a real vcan0: the machine they run in and what reads their recordings.
+//! Scenarios over the real processes on a real vcan0: the machine they run in and what judges their recordings.
 //!
-//! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`candump`] reads what an independent
-//! recorder saw on the bus.
+//! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`stage`] starts the real processes
+//! for one of the [`scenarios`]. [`candump`] reads what an independent recorder saw on the bus, [`cycle_log`] what the
+//! streamer claims, and [`setpoints`] judges the one by the other.
 #![forbid(unsafe_code)]
 
 pub mod candump;
+pub mod cycle_log;
 pub mod machine;
+pub mod scenarios;
 mod scratch;
+pub mod setpoints;
+pub mod stage;

@@ -1,6 +1,7 @@
 //! What must hold over the real processes, one function a promise. Names say area, event, condition.
 use crate::stage::Stage;
 use anyhow::{Context, Result, ensure};
+use rustix::process::Signal;
 use std::time::{Duration, Instant};
 use taustream_messages::service::Wire;
 use taustream_messages::trajectory::Doctored;
@@ -61,7 +62,11 @@ fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
     })?;
     for (joint, goal) in goal_rad.iter().enumerate() {
         let commanded = report.command_rad[joint];
-        ensure!((commanded - goal).abs() < 1e-9, "joint {}: commanded {commanded}, goal {goal} rad", joint + 1);
+        ensure!(
+            (commanded - goal).abs() < 1e-9,
+            "joint {}: commanded {commanded}, goal {goal} rad",
+            joint + 1
+        );
     }
     stage.await_report("the servos to settle at the goal", |report, _| {
         goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < AT_GOAL_RAD)
@@ -92,7 +97,8 @@ fn pause_and_resume(stage: &mut Stage, goals: &Goals) -> Result<()> {
     ensure!(paused.trajectory_s < paused.trajectory_duration_s, "the motion had ended before the pause");
     stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "paused")?;
     let still = stage.report()?.0;
-    ensure!(still.command_rad == paused.command_rad, "the command moved while paused");
+    let bits = |report: &Report| report.command_rad.map(f64::to_bits);
+    ensure!(bits(&still) == bits(&paused), "the command moved while paused");
     stage.cli_done(&["resume"])?;
     arrive(stage, goals.rad(0)?)?;
     Ok(())
@@ -120,7 +126,7 @@ fn planner_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
     stage.replan(&goals.text(0)?)?;
     stage.await_under_way(0.2)?;
-    stage.planner.signal(libc::SIGKILL)?;
+    stage.planner.signal(Signal::KILL)?;
     stage.planner.await_end()?;
     let (_, phase) = stage.report()?;
     ensure!(phase == Phase::Moving, "the arm is {} right after the planner died", phase.word());
@@ -221,7 +227,12 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let away = rejection(&wire, &TrajectoryMessage::new(&message(&at_rest, 0.05, 0.02)?))?;
     ensure!(matches!(away, Rejection::NotAtBase { joint: 0, .. }), "{away}");
     let mut fast = good.clone();
-    let strokes = [Stroke { start_s: 0.0, duration_s: 0.01, n: 6, delta_rad: [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] }];
+    let strokes = [Stroke {
+        start_s: 0.0,
+        duration_s: 0.01,
+        n: 6,
+        delta_rad: [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    }];
     fast.trajectory = Trajectory::new(good.trajectory.joints(), *good.trajectory.base_rad(), &strokes)?;
     let fast = rejection(&wire, &TrajectoryMessage::new(&fast))?;
     ensure!(matches!(fast, Rejection::Limit { joint: 0, .. }), "{fast}");

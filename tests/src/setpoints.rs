@@ -20,8 +20,6 @@ const SECOND_FORMULA_RAD: f64 = 1e-11;
 /// One frame as `candump` saw it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusFrame {
-    /// Reception time.
-    pub time_s: f64,
     /// The id, with the kernel's flags.
     pub id: u32,
     /// The data.
@@ -44,7 +42,10 @@ pub struct Encoding {
 impl Encoding {
     /// Counts of an angle: rounded half away from zero.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "ranges were checked to fit i32 when settings were read")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "ranges were checked to fit i32 when settings were read"
+    )]
     pub fn counts(&self, position_rad: f64) -> i32 {
         ((position_rad - self.zero_rad) * self.counts_per_rad).round() as i32
     }

@@ -1,5 +1,6 @@
 //! A stage for one scenario: the real processes on one bus, a `candump` beside them, everything kept in one folder.
 use anyhow::{Context, Result, bail, ensure};
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -75,12 +76,9 @@ impl Process {
     ///
     /// # Errors
     /// When the process has ended.
-    pub fn signal(&self, signal: i32) -> Result<()> {
-        let pid = i32::try_from(self.child.id())?;
-        // SAFETY: kill takes two integers and touches no memory; the pid is that of our child, which is not reaped yet.
-        let done = unsafe { libc::kill(pid, signal) };
-        ensure!(done == 0, "cannot signal {}: {}", self.name, std::io::Error::last_os_error());
-        Ok(())
+    pub fn signal(&self, signal: Signal) -> Result<()> {
+        let pid = Pid::from_child(&self.child);
+        kill_process(pid, signal).with_context(|| format!("cannot signal {}", self.name))
     }
 
     /// Waits for its end.
@@ -173,8 +171,7 @@ impl Stage {
         let log = dir.join("cycles.jsonl");
         let log_arg = log.to_str().context("the log's path is not UTF-8")?;
         let streamer_args = ["--settings", settings_arg, "--link", "socketcan", "--cycle-log", log_arg];
-        let mut streamer =
-            Process::start(&program("taustream-streamer"), &streamer_args, &dir, "streamer")?;
+        let mut streamer = Process::start(&program("taustream-streamer"), &streamer_args, &dir, "streamer")?;
         streamer.await_words("taustream-streamer ready")?;
         let mut planner =
             Process::start(&program("taustream-planner"), &["--settings", settings_arg], &dir, "planner")?;
@@ -255,7 +252,13 @@ impl Stage {
     /// When it is refused; with its reason.
     pub fn cli_done(&self, args: &[&str]) -> Result<Answer> {
         let answer = self.cli(args)?;
-        ensure!(answer.code == 0, "taustream {} ended with {}: {}", args.join(" "), answer.code, answer.stderr);
+        ensure!(
+            answer.code == 0,
+            "taustream {} ended with {}: {}",
+            args.join(" "),
+            answer.code,
+            answer.stderr
+        );
         Ok(answer)
     }
 
@@ -265,8 +268,18 @@ impl Stage {
     /// When it is not refused, or for another reason.
     pub fn cli_refused(&self, args: &[&str], words: &str) -> Result<Answer> {
         let answer = self.cli(args)?;
-        ensure!(answer.code == 1, "taustream {} ended with {}, not 1: {answer:?}", args.join(" "), answer.code);
-        ensure!(answer.stderr.contains(words), "taustream {}: no `{words}` in: {}", args.join(" "), answer.stderr);
+        ensure!(
+            answer.code == 1,
+            "taustream {} ended with {}, not 1: {answer:?}",
+            args.join(" "),
+            answer.code
+        );
+        ensure!(
+            answer.stderr.contains(words),
+            "taustream {}: no `{words}` in: {}",
+            args.join(" "),
+            answer.stderr
+        );
         Ok(answer)
     }
 
@@ -347,11 +360,11 @@ impl Stage {
     /// # Errors
     /// When the streamer does not end well.
     pub fn close(mut self) -> Result<(String, PathBuf)> {
-        self.streamer.signal(libc::SIGTERM)?;
+        self.streamer.signal(Signal::TERM)?;
         let status = self.streamer.await_end()?;
         ensure!(status.success(), "the streamer ended with {status}: {}", self.streamer.said());
         for process in [&mut self.planner, &mut self.simulator, &mut self.candump] {
-            process.signal(libc::SIGTERM)?;
+            process.signal(Signal::TERM)?;
             process.await_end()?;
         }
         Ok((fs::read_to_string(self.dir.join("candump.out"))?, self.dir.join("cycles.jsonl")))

@@ -1,4 +1,5 @@
 //! The judge of recordings is itself judged: a faithful recording passes, and every doctored one fails for its fault.
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 use std::f64::consts::TAU;
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 use taustream_tests::cycle_log::{Cycle, Event, parse};
@@ -21,8 +22,8 @@ fn encodings() -> Vec<Encoding> {
 
 fn moves() -> Trajectory {
     let mut delta_rad = [0.0; MAX_JOINTS];
-    for (joint, delta) in delta_rad.iter_mut().take(JOINTS).enumerate() {
-        *delta = 0.4 - 0.15 * f64::from(u8::try_from(joint).expect("few joints"));
+    for (delta, joint) in delta_rad.iter_mut().take(JOINTS).zip(0_u8..) {
+        *delta = 0.4 - 0.15 * f64::from(joint);
     }
     let strokes = [
         Stroke { start_s: 0.0, duration_s: 0.3, n: 5, delta_rad },
@@ -59,18 +60,17 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
     ];
     for tick in 1..=CYCLES {
         let s = f64::from(tick) * PERIOD_S;
-        let time_s = 100.0 + s;
         let position_rad = trajectory.sample(s).position_rad[..JOINTS].to_vec();
-        frames.push(BusFrame { time_s, id: 0x080, data: Vec::new() });
+        frames.push(BusFrame { id: 0x080, data: Vec::new() });
         for e in encodings() {
             let mut data = vec![0x0F, 0x00];
             data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
-            frames.push(BusFrame { time_s: time_s + 1e-5, id: 0x200 + u32::from(e.node_id), data });
+            frames.push(BusFrame { id: 0x200 + u32::from(e.node_id), data });
         }
         for e in encodings() {
             let mut data = vec![0x37, 0x12];
             data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
-            frames.push(BusFrame { time_s: time_s + 2e-4, id: 0x180 + u32::from(e.node_id), data });
+            frames.push(BusFrame { id: 0x180 + u32::from(e.node_id), data });
         }
         log.push(Event::Cycle(Cycle {
             tick: u64::from(tick),
@@ -228,5 +228,8 @@ fn log_line_that_is_not_understood_is_an_error() {
     assert!(parse("{\"event\":\"surprise\"}").is_err());
     assert!(parse("{\"event\":\"cycle\",\"tick\":1}").is_err());
     assert!(parse("not json").is_err());
-    assert_eq!(parse("{\"event\":\"lost\",\"records\":3}").expect("a plain line"), [Event::Lost { records: 3 }]);
+    assert_eq!(
+        parse("{\"event\":\"lost\",\"records\":3}").expect("a plain line"),
+        [Event::Lost { records: 3 }]
+    );
 }

@@ -78,8 +78,11 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals) -> Result<Verdict>
 }
 
 fn frames(recording: &str) -> Result<Vec<BusFrame>> {
-    let lines = candump::parse(recording)?;
-    Ok(lines.into_iter().map(|l| BusFrame { time_s: l.time_s, id: l.id, data: l.data }).collect())
+    let seen = |record: candump::Record| BusFrame {
+        id: record.frame.id().raw(),
+        data: record.frame.data().to_vec(),
+    };
+    Ok(candump::parse(recording)?.into_iter().map(seen).collect())
 }
 
 fn encodings(settings: &Settings) -> Vec<Encoding> {
