@@ -138,7 +138,7 @@ fn receipt_carries_every_outcome() {
             joint: 2,
             at_s: 1.204,
             value: 3.3,
-            limit: 3.14,
+            limit: 3.1,
             what: "velocity, rad/s".into(),
         }),
         Outcome::Rejected(Rejection::NotAtBase { joint: 5, by_rad: 0.02 }),
