@@ -100,7 +100,7 @@ fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let demo: toml::Table = text.parse().with_context(|| format!("{} is no TOML", file.display()))?;
     let numbers = |value: &toml::Value| -> Option<Vec<f64>> {
-        value.as_array()?.iter().map(|v| v.as_float()).collect()
+        value.as_array()?.iter().map(toml::Value::as_float).collect()
     };
     let start = demo.get("start_rad").and_then(numbers).context("start_rad is missing")?;
     let goals = demo.get("goals_rad").and_then(|v| v.as_array()).context("goals_rad is missing")?;
