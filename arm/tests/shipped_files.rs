@@ -41,6 +41,7 @@ fn ur5_contact_rule_lets_neighbours_and_short_wrist_links_touch() {
     expected.extend([(3, 5), (4, 6)]);
     expected.sort_unstable();
     assert_eq!(robot.allowed_by_rule, expected);
+    assert_eq!(Robot::load(&robot.file).unwrap(), robot, "the rule draws the same poses every time");
     assert!(
         robot.may_touch(5, 3) && robot.may_touch(3, 5) && !robot.may_touch(3, 6) && !robot.may_touch(6, 3)
     );
@@ -125,6 +126,37 @@ fn shipped_scene_leaves_common_poses_of_the_ur5_free_and_its_foot_always() {
         );
     }
 }
+
+/// A scene that nothing has to go round shows nothing: swinging a stretched arm from one gap to the next must hit.
+#[test]
+fn pillars_stand_in_the_way_of_the_straight_swing_between_their_gaps() {
+    let robot = Robot::load(&config().join("robots/ur5.toml")).unwrap();
+    let scene = Scene::load(&config().join("scenes/pillars.toml")).unwrap();
+    let reach = |pan_rad: f64| [pan_rad, -0.9, 0.9, -1.57, -1.57, 0.0, 0.0, 0.0];
+    let least = |pose: &JointArray| {
+        clearances_m(&robot, &scene, pose).into_iter().min_by(|a, b| a.2.total_cmp(&b.2)).unwrap()
+    };
+    for (from_rad, to_rad, obstacle) in [
+        (GAPS_RAD[0], GAPS_RAD[1], "left_pillar"),
+        (GAPS_RAD[1], GAPS_RAD[2], "front_pillar"),
+        (GAPS_RAD[2], GAPS_RAD[3], "right_ball"),
+    ] {
+        for end_rad in [from_rad, to_rad] {
+            let (link, name, clearance_m) = least(&reach(end_rad));
+            assert!(
+                clearance_m > scene.margin_m,
+                "pan {end_rad}: link {link} and {name}: {clearance_m:.3} m"
+            );
+        }
+        let on_the_way =
+            (1..100).map(|i| least(&reach(from_rad + (to_rad - from_rad) * f64::from(i) / 100.0)));
+        let (_, name, clearance_m) = on_the_way.min_by(|a, b| a.2.total_cmp(&b.2)).unwrap();
+        assert!(name == obstacle && clearance_m < -0.02, "{from_rad} to {to_rad}: {name} {clearance_m:.3} m");
+    }
+}
+
+/// First joint's angles at which the stretched arm points into a gap, from +y to -y.
+const GAPS_RAD: [f64; 4] = [-1.7, -0.65, 0.3, 1.5];
 
 /// Straight up; the usual working pose, straight and to each side; the help's example; folded; reaching up and forward.
 const COMMON_POSES: [JointArray; 7] = [
