@@ -57,6 +57,14 @@ pub(crate) enum Failure {
     /// It was begun and did not come to its end.
     #[error("{0}")]
     Failed(String),
+    /// The demo did not come to its end; its last word is a verdict.
+    #[error("{verdict}: {why}")]
+    Demo {
+        /// `DEMO FAILED` or `DEMO INTERRUPTED`.
+        verdict: &'static str,
+        /// The reason.
+        why: Box<Self>,
+    },
     /// Ctrl-C.
     #[error("interrupted: {0}")]
     Interrupted(String),
@@ -77,6 +85,12 @@ impl Failure {
         Self::Unfit { path: path.to_owned(), why: why.into() }
     }
 
+    /// The demo's verdict over a failure of any kind.
+    pub(crate) fn of_demo(self) -> Self {
+        let verdict = if matches!(self, Self::Interrupted(_)) { "DEMO INTERRUPTED" } else { "DEMO FAILED" };
+        Self::Demo { verdict, why: Box::new(self) }
+    }
+
     /// The exit code of the process.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
@@ -88,6 +102,7 @@ impl Failure {
             | Self::Refused(_)
             | Self::Failed(_) => 1,
             Self::Interrupted(_) => 130,
+            Self::Demo { why, .. } => why.exit_code(),
         }
     }
 
@@ -103,6 +118,7 @@ impl Failure {
             Self::Refused(_) => "refused",
             Self::Failed(_) => "failed",
             Self::Interrupted(_) => "interrupted",
+            Self::Demo { why, .. } => why.kind(),
         }
     }
 

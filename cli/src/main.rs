@@ -4,11 +4,13 @@
 mod angles;
 mod args;
 mod arm;
+mod demo;
 mod failure;
 mod interrupt;
 mod live;
 mod offline;
 mod output;
+mod plot;
 mod words;
 
 use args::{Action, Cli};
@@ -55,6 +57,7 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
+        Action::Demo(args) => demo::run(form, args),
         Action::Completions { shell } => completions(form, *shell),
     }
 }
@@ -88,6 +91,8 @@ fn completions(form: Form, shell: clap_complete::Shell) -> Result<(), Failure> {
 fn report(form: Form, failure: &Failure) -> ExitCode {
     if !matches!(failure, Failure::BrokenPipe) {
         match form {
+            // A verdict stands at the beginning of its line.
+            Form::Text if matches!(failure, Failure::Demo { .. }) => note(failure),
             Form::Text => note(format_args!("taustream: {failure}")),
             Form::Json => note(failure.to_json()),
         }

@@ -56,8 +56,13 @@ impl Client {
         }
     }
 
-    /// Sends a replan request to the planner; its answer, within `limit_s`.
-    pub(crate) fn plan(&self, request: PlanRequest, limit_s: f64) -> Result<PlanReply, Failure> {
+    /// Sends a replan request to the planner; its answer, within `limit_s`. `meanwhile` runs while it plans.
+    pub(crate) fn plan(
+        &self,
+        request: PlanRequest,
+        limit_s: f64,
+        meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+    ) -> Result<PlanReply, Failure> {
         let client = self.wire.plan_client()?;
         let pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
         if pending.number_of_server_connections() == 0 {
@@ -70,6 +75,7 @@ impl Client {
                 Ok(None) => self.pause(&limit, PLANNER)?,
                 Err(e) => return Err(self.refused("receive the answer", &e)),
             }
+            meanwhile()?;
         }
     }
 

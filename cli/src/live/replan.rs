@@ -99,13 +99,14 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         planner: wanted.planner.name().to_owned(),
     };
     form.progress(format_args!("planning, {:.1} s at most ..", f64::from(args.deadline_ms) * 1e-3));
-    let planned =
-        ask(&client, &arm, &request).map_err(|failure| match args.goal.degrees_hint(&settings.robot) {
+    let planned = ask_while(&client, &arm, &request, &mut || Ok(())).map_err(|failure| {
+        match args.goal.degrees_hint(&settings.robot) {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))
             }
             _ => failure,
-        })?;
+        }
+    })?;
     let executed = if args.wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
         Some(follow(&client, &arm, planned.trajectory_id, |_, _| {})?)
@@ -115,12 +116,18 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     form.print(&Answer { arm: arm.name, planned, executed })
 }
 
-/// Sends a request and reads the answer; an answer without an accepting receipt is a failure.
-pub(crate) fn ask(client: &Client, arm: &ArmName, request: &CheckedPlanRequest) -> Result<Planned, Failure> {
+/// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
+/// planner plans.
+pub(crate) fn ask_while(
+    client: &Client,
+    arm: &ArmName,
+    request: &CheckedPlanRequest,
+    meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+) -> Result<Planned, Failure> {
     // A planner without a streamer has no pose to start from; saying so here is clearer than a time-out.
     let (report, _) = client.report()?;
     let limit_s = f64::from(request.deadline_ms) * 1e-3 + ANSWER_S + remaining_s(&report, request.when);
-    let reply = client.plan(PlanRequest::from(request), limit_s)?;
+    let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
     match reply.outcome() {
         PlanOutcome::Failed { reason } => Err(Failure::Refused(format!("no plan: {reason}"))),
         PlanOutcome::Planned { receipt: None, trajectory_id, .. } => Err(Failure::Failed(format!(

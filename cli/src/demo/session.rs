@@ -1,0 +1,176 @@
+//! The demo's moves: enable, every goal, disable; everything that reports say is kept for the plots.
+use super::file::DemoFile;
+use super::summary::{Move, Summary};
+use super::view::View;
+use crate::arm::ArmName;
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::live::client::{Client, Limit};
+use crate::live::command::obey;
+use crate::live::follow::follow;
+use crate::live::replan::ask_while;
+use crate::output::{Form, note};
+use crate::plot::Sample;
+use crate::words::fault_sentence;
+use std::cell::RefCell;
+use std::thread;
+use std::time::Duration;
+use taustream_messages::plan::{CheckedPlanRequest, When};
+use taustream_messages::{Command, Phase, Report};
+use taustream_motion::Setpoint;
+
+/// Deadline of each plan; the shipped goals need a fraction of it.
+const DEADLINE_MS: u32 = 4000;
+/// Longest wait for drives that are found, configured, energised or switched off.
+const DRIVES_S_MAX: f64 = 20.0;
+/// Longest wait for rest after a stop.
+const REST_S_MAX: f64 = 5.0;
+
+/// What is known at one time.
+struct Seen {
+    view: View,
+    samples: Vec<Sample>,
+    first_ns: Option<u64>,
+    last: Option<Report>,
+    tracking_error_rad_max: f64,
+}
+
+/// A demo under way.
+pub(crate) struct Session<'a> {
+    arm: &'a ArmName,
+    client: Client,
+    seen: RefCell<Seen>,
+    limit: Limit,
+    moves: Vec<Move>,
+}
+
+impl<'a> Session<'a> {
+    /// Joins the services and waits until all drives are configured.
+    pub(crate) fn begin(
+        form: Form,
+        demo: &DemoFile,
+        arm: &'a ArmName,
+        limit_s: f64,
+    ) -> Result<Self, Failure> {
+        let session = Self {
+            arm,
+            client: Client::join(&arm.name)?,
+            seen: RefCell::new(Seen {
+                view: View::new(form, arm, demo.goals_rad.len()),
+                samples: Vec::new(),
+                first_ns: None,
+                last: None,
+                tracking_error_rad_max: 0.0,
+            }),
+            limit: Limit::after_s(limit_s),
+            moves: Vec::new(),
+        };
+        session.wait_for(Phase::Disabled, "find and configure all drives")?;
+        Ok(session)
+    }
+
+    /// Enables, then plans and executes one move after the other.
+    pub(crate) fn go_through_goals(&mut self, demo: &DemoFile) -> Result<(), Failure> {
+        obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX)?;
+        obey(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
+        for (i, goal_rad) in demo.goals_rad.iter().enumerate() {
+            self.seen.borrow_mut().view.begin_move(i + 1);
+            let request = CheckedPlanRequest {
+                joints: demo.settings.robot.joints.len(),
+                goal_rad: *goal_rad,
+                when: When::AtOnce,
+                deadline_ms: DEADLINE_MS,
+                seed: 1,
+                planner: "auto".to_owned(),
+            };
+            let planned = ask_while(&self.client, self.arm, &request, &mut || self.look())?;
+            let executed = follow(&self.client, self.arm, planned.trajectory_id, |report, phase| {
+                self.seen.borrow_mut().note(report, phase);
+            })?;
+            self.moves.push(Move::new(i + 1, planned, executed));
+            self.check_time()?;
+        }
+        Ok(())
+    }
+
+    /// Switches the drives off and sums up.
+    pub(crate) fn finish(self) -> Result<Summary, Failure> {
+        self.look()?;
+        // The report of the last moving instant: tracking error and lateness are of interest up to here.
+        let moved = self.seen.borrow().tracking_error_rad_max;
+        obey(&self.client, self.arm, Command::Disable, DRIVES_S_MAX)?;
+        self.look()?;
+        let seen = self.seen.into_inner();
+        let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
+        Ok(Summary::new(&last, self.moves, seen.samples, moved))
+    }
+
+    /// After a failure or Ctrl-C: stop on the path, wait for rest, switch off. What cannot be done is said, and the
+    /// streamer does the same once more when it is ended.
+    pub(crate) fn stop_in_order(&self) {
+        interrupt::forget();
+        note("stopping the arm (Ctrl-C again ends the processes at once) ..");
+        if let Err(refused) = obey(&self.client, self.arm, Command::Stop, REST_S_MAX) {
+            note(format_args!("  {refused}"));
+        }
+        if let Err(refused) = obey(&self.client, self.arm, Command::Disable, DRIVES_S_MAX) {
+            note(format_args!("  {refused}"));
+        }
+    }
+
+    fn wait_for(&self, wanted: Phase, what: &str) -> Result<(), Failure> {
+        let limit = Limit::after_s(DRIVES_S_MAX);
+        loop {
+            let (report, phase) = self.client.report()?;
+            self.seen.borrow_mut().note(&report, phase);
+            if phase == wanted {
+                return Ok(());
+            }
+            if phase == Phase::Fault || limit.is_over() {
+                let fault = fault_sentence(&report, self.arm);
+                return Err(Failure::Failed(format!(
+                    "the streamer did not {what}: it is {}: {fault}",
+                    phase.word()
+                )));
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Takes all reports that have arrived.
+    fn look(&self) -> Result<(), Failure> {
+        self.client.drain_reports(|report, phase| self.seen.borrow_mut().note(report, phase))
+    }
+
+    fn check_time(&self) -> Result<(), Failure> {
+        if self.limit.is_over() {
+            return Err(Failure::Failed("the demo takes longer than --limit-s allows".to_owned()));
+        }
+        Ok(())
+    }
+}
+
+impl Seen {
+    fn note(&mut self, r: &Report, phase: Phase) {
+        let first_ns = *self.first_ns.get_or_insert(r.time_ns);
+        let t_s = Duration::from_nanos(r.time_ns.saturating_sub(first_ns)).as_secs_f64();
+        if phase == Phase::Moving {
+            let errors = r.tracking_error_rad.iter().take(r.joints());
+            self.tracking_error_rad_max = errors.fold(self.tracking_error_rad_max, |max, e| max.max(e.abs()));
+        }
+        if r.energised == 1 {
+            self.samples.push(Sample {
+                t_s,
+                commanded: Setpoint {
+                    position_rad: r.command_rad,
+                    velocity_rad_s: r.command_velocity_rad_s,
+                    acceleration_rad_s2: r.command_acceleration_rad_s2,
+                    jerk_rad_s3: r.command_jerk_rad_s3,
+                },
+                measured_rad: r.measured_rad,
+            });
+        }
+        self.view.show(r, phase, t_s);
+        self.last = Some(*r);
+    }
+}

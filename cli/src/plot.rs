@@ -1,0 +1,336 @@
+//! Joint curves as SVG: position, velocity, acceleration and jerk over time, commanded and measured.
+//!
+//! Commanded derivatives are the streamer's own. Drives send positions only, so measured derivatives are those of a
+//! cubic fitted to the measured positions around each instant (Savitzky and Golay, Analytical Chemistry 36, 1964, for
+//! uneven times); the pictures say so. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
+use crate::failure::Failure;
+use plotters::coord::Shift;
+use plotters::prelude::{
+    ChartBuilder, Color, DrawingArea, IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor,
+    SVGBackend, SeriesLabelPosition, ShapeStyle, WHITE,
+};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use taustream_motion::{JointArray, MAX_JOINTS, Setpoint};
+
+/// One instant of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sample {
+    /// Seconds since the recording began.
+    pub(crate) t_s: f64,
+    /// What the streamer sent.
+    pub(crate) commanded: Setpoint,
+    /// What the drives answered; NaN before the first answer.
+    pub(crate) measured_rad: JointArray,
+}
+
+/// Most points of one curve; more cannot be seen and make the file heavy.
+const POINTS_MAX: usize = 1200;
+/// Half the width of the fit, in samples.
+const FIT_HALF_WIDTH: usize = 4;
+const SIZE_PX: (u32, u32) = (1100, 1180);
+const COMMANDED: RGBColor = RGBColor(31, 119, 180);
+const MEASURED: RGBColor = RGBColor(255, 127, 14);
+/// One colour a joint, told apart by colour-blind eyes too (Okabe and Ito).
+const JOINT_COLOURS: [RGBColor; MAX_JOINTS] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(213, 94, 0),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(150, 150, 0),
+    RGBColor(0, 0, 0),
+];
+/// Title of each panel, and its quantity's order of derivation.
+const PANELS: [&str; 4] = ["position (rad)", "velocity (rad/s)", "acceleration (rad/s^2)", "jerk (rad/s^3)"];
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Point = (f64, f64);
+
+/// A curve of one panel.
+struct Curve {
+    label: String,
+    colour: RGBColor,
+    width_px: u32,
+    opacity: f64,
+    points: Vec<Point>,
+}
+
+/// Writes `motion.svg` with all joints and one picture a joint into `directory`; the files that were written.
+pub(crate) fn write_all(
+    directory: &Path,
+    joints: &[String],
+    samples: &[Sample],
+) -> Result<Vec<PathBuf>, Failure> {
+    let measured: Vec<Vec<[f64; 4]>> = (0..joints.len()).map(|j| measured_derivatives(samples, j)).collect();
+    let mut files = Vec::new();
+
+    let overview = directory.join("motion.svg");
+    let panels = PANELS.map(|_| Vec::new());
+    let panels = add_overview(panels, joints, samples, &measured);
+    draw(&overview, "All joints: commanded (thin, dark) over measured (wide, light)", &panels)?;
+    files.push(overview);
+
+    for (j, name) in joints.iter().enumerate() {
+        let file = directory.join(format!("joint{}-{}.svg", j + 1, file_word(name)));
+        let title = format!("Joint {} {name}: commanded and measured", j + 1);
+        let measured = measured.get(j).map_or(&[][..], Vec::as_slice);
+        draw(&file, &title, &joint_panels(j, samples, measured))?;
+        files.push(file);
+    }
+    Ok(files)
+}
+
+/// Names of joints come from files: only harmless characters may stand in a file name.
+fn file_word(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
+}
+
+fn add_overview(
+    mut panels: [Vec<Curve>; 4],
+    joints: &[String],
+    samples: &[Sample],
+    measured: &[Vec<[f64; 4]>],
+) -> [Vec<Curve>; 4] {
+    for (order, panel) in panels.iter_mut().enumerate() {
+        for (j, (name, colour)) in joints.iter().zip(JOINT_COLOURS).enumerate() {
+            let of_joint = measured.get(j).map_or(&[][..], Vec::as_slice);
+            let points = measured_points(samples, of_joint, order);
+            panel.push(Curve { label: String::new(), colour, width_px: 5, opacity: 0.3, points });
+            let points = commanded_points(samples, j, order);
+            panel.push(Curve { label: name.clone(), colour, width_px: 1, opacity: 1.0, points });
+        }
+    }
+    panels
+}
+
+fn joint_panels(j: usize, samples: &[Sample], measured: &[[f64; 4]]) -> [Vec<Curve>; 4] {
+    let mut order = 0;
+    PANELS.map(|_| {
+        let commanded = Curve {
+            label: "commanded".to_owned(),
+            colour: COMMANDED,
+            width_px: 2,
+            opacity: 1.0,
+            points: commanded_points(samples, j, order),
+        };
+        let label = if order == 0 { "measured" } else { "measured (derivative of a cubic fit)" };
+        let points = measured_points(samples, measured, order);
+        order += 1;
+        let measured = Curve { label: label.to_owned(), colour: MEASURED, width_px: 1, opacity: 1.0, points };
+        vec![commanded, measured]
+    })
+}
+
+fn commanded_points(samples: &[Sample], j: usize, order: usize) -> Vec<Point> {
+    let value = |s: &Sample| {
+        let c = &s.commanded;
+        let block = [&c.position_rad, &c.velocity_rad_s, &c.acceleration_rad_s2, &c.jerk_rad_s3];
+        block.get(order).and_then(|b| b.get(j)).copied().unwrap_or(f64::NAN)
+    };
+    thinned(samples.iter().map(|s| (s.t_s, value(s))).collect())
+}
+
+fn measured_points(samples: &[Sample], measured: &[[f64; 4]], order: usize) -> Vec<Point> {
+    let value = |m: &[f64; 4]| m.get(order).copied().unwrap_or(f64::NAN);
+    thinned(samples.iter().zip(measured).map(|(s, m)| (s.t_s, value(m))).collect())
+}
+
+/// Finite points, evenly thinned; the last one stays.
+fn thinned(points: Vec<Point>) -> Vec<Point> {
+    let points: Vec<Point> = points.into_iter().filter(|(t, y)| t.is_finite() && y.is_finite()).collect();
+    let step = points.len().div_ceil(POINTS_MAX).max(1);
+    let last = points.last().copied();
+    let mut kept: Vec<Point> = points.into_iter().step_by(step).collect();
+    if kept.last().copied() != last {
+        kept.extend(last);
+    }
+    kept
+}
+
+/// Position, velocity, acceleration and jerk of one joint at every sample, from its measured positions.
+fn measured_derivatives(samples: &[Sample], joint: usize) -> Vec<[f64; 4]> {
+    let points: Vec<Point> =
+        samples.iter().map(|s| (s.t_s, s.measured_rad.get(joint).copied().unwrap_or(f64::NAN))).collect();
+    (0..points.len())
+        .map(|i| {
+            let first = i.saturating_sub(FIT_HALF_WIDTH);
+            let last = (i + FIT_HALF_WIDTH + 1).min(points.len());
+            let (t_s, q) = points.get(i).copied().unwrap_or((f64::NAN, f64::NAN));
+            let fit = cubic_at(t_s, points.get(first..last).unwrap_or(&[]));
+            // The position is what was measured; only its derivatives need the fit.
+            fit.map_or([q, f64::NAN, f64::NAN, f64::NAN], |[_, v, a, j]| [q, v, a, j])
+        })
+        .collect()
+}
+
+/// Value and derivatives at `t_s` of the cubic that fits the points best; `None` when they do not determine one.
+fn cubic_at(t_s: f64, points: &[Point]) -> Option<[f64; 4]> {
+    // Times in units of the window keep the normal equations well conditioned.
+    let scale_s = points.iter().map(|(t, _)| (t - t_s).abs()).fold(0.0, f64::max);
+    if points.len() < 5 || scale_s <= 0.0 || !points.iter().all(|(t, q)| t.is_finite() && q.is_finite()) {
+        return None;
+    }
+    let mut system = [[0.0; 5]; 4];
+    for (t, q) in points {
+        let x = (t - t_s) / scale_s;
+        let powers = [1.0, x, x * x, x * x * x];
+        for (row, p) in system.iter_mut().zip(powers) {
+            for (cell, r) in row.iter_mut().zip(powers.iter().chain(std::iter::once(q))) {
+                *cell += p * r;
+            }
+        }
+    }
+    let [c0, c1, c2, c3] = solve(system)?;
+    Some([c0, c1 / scale_s, 2.0 * c2 / scale_s.powi(2), 6.0 * c3 / scale_s.powi(3)])
+}
+
+/// Four equations (coefficients, then the right side) by elimination with row exchange.
+fn solve(mut m: [[f64; 5]; 4]) -> Option<[f64; 4]> {
+    const SINGULAR: f64 = 1e-9;
+    for c in 0..4 {
+        let pivot = (c..4).max_by(|a, b| m[*a][c].abs().total_cmp(&m[*b][c].abs()))?;
+        m.swap(c, pivot);
+        if m[c][c].abs() < SINGULAR {
+            return None;
+        }
+        let pivot = m[c];
+        for row in m.iter_mut().skip(c + 1) {
+            let factor = row[c] / pivot[c];
+            for (cell, p) in row.iter_mut().zip(pivot) {
+                *cell -= factor * p;
+            }
+        }
+    }
+    let mut x = [0.0; 4];
+    for r in (0..4).rev() {
+        let known: f64 = (r + 1..4).map(|c| m[r][c] * x[c]).sum();
+        x[r] = (m[r][4] - known) / m[r][r];
+    }
+    Some(x)
+}
+
+fn draw(file: &Path, title: &str, panels: &[Vec<Curve>; 4]) -> Result<(), Failure> {
+    let fail =
+        |e: &dyn std::fmt::Display| Failure::Failed(format!("{} cannot be drawn: {e}", file.display()));
+    let root = SVGBackend::new(file, SIZE_PX).into_drawing_area();
+    root.fill(&WHITE).map_err(|e| fail(&e))?;
+    let body = root.titled(title, ("sans-serif", 24).into_font()).map_err(|e| fail(&e))?;
+    for ((area, curves), name) in body.split_evenly((4, 1)).iter().zip(panels).zip(PANELS) {
+        draw_panel(area, name, curves).map_err(|e| fail(&e))?;
+    }
+    root.present().map_err(|e| fail(&e))
+}
+
+fn draw_panel(area: &Area<'_>, name: &str, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
+    let (times, values) = ranges(curves);
+    let mut chart = ChartBuilder::on(area)
+        .margin_right(16)
+        .x_label_area_size(34)
+        .y_label_area_size(74)
+        .build_cartesian_2d(times, values)?;
+    chart
+        .configure_mesh()
+        .x_desc("time (s)")
+        .y_desc(name)
+        .x_labels(12)
+        .y_labels(6)
+        .label_style(("sans-serif", 14))
+        .light_line_style(RGBColor(245, 245, 245))
+        .draw()?;
+    for curve in curves {
+        let style: ShapeStyle = curve.colour.mix(curve.opacity).stroke_width(curve.width_px);
+        let series = chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
+        if !curve.label.is_empty() {
+            series
+                .label(curve.label.clone())
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style.stroke_width(2)));
+        }
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    Ok(())
+}
+
+/// The axes: all points, with a little room above and below.
+fn ranges(curves: &[Curve]) -> (Range<f64>, Range<f64>) {
+    let points = || curves.iter().flat_map(|c| &c.points);
+    let times = span(points().map(|p| p.0));
+    let values = span(points().map(|p| p.1));
+    let room = 0.06 * (values.end - values.start);
+    (times, values.start - room..values.end + room)
+}
+
+/// Least and largest value; never empty, so that an axis can be drawn.
+fn span(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    if low < high {
+        low..high
+    } else if low.is_finite() {
+        low - 0.5..low + 0.5
+    } else {
+        0.0..1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(samples: usize, measured_rad: impl Fn(f64) -> f64) -> Vec<Sample> {
+        let sample = |i: usize| {
+            let t_s = 0.01 * i as f64;
+            Sample { t_s, commanded: Setpoint::default(), measured_rad: [measured_rad(t_s); MAX_JOINTS] }
+        };
+        (0..samples).map(sample).collect()
+    }
+
+    /// Goal: what is drawn as measured derivative is the derivative. Method: a cubic is fitted exactly, at its ends too.
+    #[test]
+    fn measured_derivatives_of_a_cubic_are_exact() {
+        let samples = recording(40, |t| 0.3 - 1.2 * t + 2.0 * t * t - 0.7 * t * t * t);
+        for (s, [_, v, a, j]) in samples.iter().zip(measured_derivatives(&samples, 0)) {
+            let t = s.t_s;
+            assert!((v - (-1.2 + 4.0 * t - 2.1 * t * t)).abs() < 1e-9, "velocity at {t}: {v}");
+            assert!((a - (4.0 - 4.2 * t)).abs() < 1e-6, "acceleration at {t}: {a}");
+            assert!((j + 4.2).abs() < 1e-3, "jerk at {t}: {j}");
+        }
+    }
+
+    #[test]
+    fn measured_derivatives_of_what_was_not_measured_are_left_out() {
+        let samples = recording(20, |t| if t < 0.1 { f64::NAN } else { t });
+        let derivatives = measured_derivatives(&samples, 0);
+        assert!(
+            measured_points(&samples, &derivatives, 1)
+                .iter()
+                .all(|(t, v)| *t > 0.1 && (v - 1.0).abs() < 1e-9)
+        );
+        assert!(measured_derivatives(&samples[..3], 0).iter().all(|d| d[1].is_nan()));
+    }
+
+    #[test]
+    fn plot_has_axes_words_and_curves_without_any_font_file() {
+        let dir = std::env::temp_dir().join(format!("taustream-plot-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let samples = recording(5000, |t| t.sin());
+        let files = write_all(&dir, &["pan/../x".to_owned(), "lift".to_owned()], &samples).unwrap();
+        assert_eq!(files.len(), 3);
+        assert!(files.iter().all(|f| f.parent() == Some(dir.as_path())), "{files:?}");
+        for file in &files {
+            let svg = std::fs::read_to_string(file).unwrap();
+            for word in ["time (s)", "jerk (rad/s^3)", "<polyline", "</svg>"] {
+                assert!(svg.contains(word), "{}: no {word}", file.display());
+            }
+            assert!(svg.len() < 1_000_000, "{} bytes", svg.len());
+        }
+        // A recording of nothing is drawn as empty axes, not as a failure.
+        assert!(write_all(&dir, &["pan".to_owned()], &[]).is_ok());
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}
