@@ -144,7 +144,7 @@ mod tests {
     use taustream_arm::Fault;
 
     fn fault(key: &str) -> Fault {
-        Fault::new(std::path::Path::new("arm.toml"), key, "NaN", "a number")
+        Fault::new(Path::new("arm.toml"), key, "NaN", "a number")
     }
 
     #[test]

@@ -318,7 +318,7 @@ mod tests {
     fn plot_has_axes_words_and_curves_without_any_font_file() {
         let dir = std::env::temp_dir().join(format!("taustream-plot-{}", std::process::id()));
         std::fs::create_dir_all(&dir).unwrap();
-        let samples = recording(5000, |t| t.sin());
+        let samples = recording(5000, f64::sin);
         let files = write_all(&dir, &["pan/../x".to_owned(), "lift".to_owned()], &samples).unwrap();
         assert_eq!(files.len(), 3);
         assert!(files.iter().all(|f| f.parent() == Some(dir.as_path())), "{files:?}");

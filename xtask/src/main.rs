@@ -1,2 +1,37 @@
-//! Placeholder.
-fn main() {}
+//! The project's chores: `cargo xtask demo`.
+//!
+//! Each task installs what it needs on a fresh Debian machine, says so before it does, and ends with a verdict.
+mod demo;
+mod packages;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Chores of the taustream workspace.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", arg_required_else_help = true)]
+struct Arguments {
+    /// Which one.
+    #[command(subcommand)]
+    task: Task,
+}
+
+/// The chores.
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Build, then move a simulated arm round obstacles and show it.
+    Demo(demo::Arguments),
+}
+
+fn main() -> ExitCode {
+    let (verdict, outcome) = match Arguments::parse().task {
+        Task::Demo(arguments) => ("DEMO FAILED", demo::run(&arguments)),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("{verdict}: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

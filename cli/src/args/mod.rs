@@ -39,7 +39,7 @@ pub(crate) struct Cli {
 
     /// Settings of the arm to talk to: a path, or the name of shipped settings.
     ///
-    /// Without it: $TAUSTREAM_SETTINGS, else /etc/taustream/settings.toml if that exists, else the shipped
+    /// Without it: `$TAUSTREAM_SETTINGS`, else /etc/taustream/settings.toml if that exists, else the shipped
     /// `vcan6`. `plan`, `sample`, `cost`, `verify` and `check` do not use it.
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) settings: Option<PathBuf>,

@@ -132,6 +132,7 @@ impl Process {
         let mut copy = errors.try_clone().map_err(fail)?;
         let mut child = Command::new(&program)
             .args(words)
+            .env("NO_COLOR", "1")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(errors)
