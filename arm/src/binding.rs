@@ -16,7 +16,7 @@ const BITRATE_BIT_S: [i64; 2] = [10_000, 1_000_000];
 const NODE_ID: [i64; 2] = [1, 127];
 const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
 const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
-const ZERO_RAD: Bounds = Bounds::within(-16.0 * TAU, 16.0 * TAU, "rad");
+const ZERO_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const FEEDBACK_RAD: Bounds = Bounds::within(-1e6, 1e6, "rad");
 
 /// Reads the buses; a faulty one keeps its place as `None`, so that the indices of the others hold.

@@ -43,7 +43,7 @@ const LENGTH_M: Bounds = Bounds::within(-10.0, 10.0, "m");
 const ANGLE_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
 const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
 /// Sixteen turns; a larger number is a slip of the unit (degrees).
-const POSITION_RAD: Bounds = Bounds::within(-16.0 * TAU, 16.0 * TAU, "rad");
+const POSITION_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
 const ACCELERATION_RAD_S2: Bounds = Bounds::above(0.0, 1e4, "rad/s^2");
 const JERK_RAD_S3: Bounds = Bounds::above(0.0, 1e7, "rad/s^3");

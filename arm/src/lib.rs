@@ -5,6 +5,8 @@
 #![forbid(unsafe_code)]
 
 mod binding;
+pub mod bus_load;
+mod consistency;
 mod contact;
 mod description;
 pub mod digest;
@@ -18,6 +20,7 @@ pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
 
+pub use bus_load::BusLoad;
 pub use fault::{Fault, Faults};
 pub use lookup::{Kind, find};
 pub use robot::{LinkShape, Robot, RobotJoint};

@@ -1,7 +1,7 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
 use crate::reader::{Book, Bounds, Table};
-use crate::{Faults, Robot, Scene, binding};
+use crate::{Faults, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
 
 /// What carries frames.
@@ -173,11 +173,13 @@ impl Settings {
         let supervision = top.table("supervision", "a table [supervision]").and_then(read_supervision);
         let simulator = read_simulator(&mut top, text);
         top.done();
-        check_times(book, cycle.as_ref(), supervision.as_ref());
+        if let (Some(cycle), Some(supervision)) = (&cycle, &supervision) {
+            consistency::check_times(book, cycle, supervision);
+        }
         if !book.is_clean() {
             return None;
         }
-        Some(Self {
+        let settings = Self {
             name: name?,
             file: book.file().to_owned(),
             robot: robot?,
@@ -187,7 +189,10 @@ impl Settings {
             cycle: cycle?,
             supervision: supervision?,
             simulator,
-        })
+        };
+        consistency::check_jump(book, &settings);
+        consistency::check_loads(book, &settings);
+        Some(settings)
     }
 }
 
@@ -261,33 +266,5 @@ fn read_simulator(top: &mut Table<'_>, text: &str) -> Option<toml::Table> {
     match whole.remove("simulator") {
         Some(toml::Value::Table(section)) => Some(section),
         _ => None,
-    }
-}
-
-/// Times that only make sense in one order.
-fn check_times(book: &Book, cycle: Option<&Cycle>, supervision: Option<&Supervision>) {
-    let Some(cycle) = cycle else { return };
-    let gap_ms = f64::from(cycle.tolerated_gap_periods) * f64::from(cycle.period_us) * 1e-3;
-    let (watchdog_ms, stall_ms) = (cycle.drive_watchdog_ms, cycle.stall_resume_ms);
-    if f64::from(watchdog_ms) <= gap_ms {
-        let expected =
-            format!("more than the tolerated gap of {gap_ms} ms (tolerated_gap_periods x period_us)");
-        book.add(None, "cycle.drive_watchdog_ms", &watchdog_ms.to_string(), &expected);
-    }
-    if stall_ms > watchdog_ms {
-        let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
-        book.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
-    }
-    let Some(supervision) = supervision else { return };
-    let period_s = f64::from(cycle.period_us) * 1e-6;
-    // Feedback is one cycle old when it is looked at; below two periods, jitter alone would stop the arm.
-    if supervision.feedback_age_s_max < 2.0 * period_s {
-        let value = format!("{:?}", supervision.feedback_age_s_max);
-        book.add(
-            None,
-            "supervision.feedback_age_s_max",
-            &value,
-            &format!("at least two periods, {} s", 2.0 * period_s),
-        );
     }
 }

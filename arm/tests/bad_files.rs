@@ -258,6 +258,21 @@ const SETTINGS_CASES: &[Case] = &[
         "supervision.first_speed_percent",
         "percent",
     ),
+    (
+        Settings,
+        "position_jump_rad_max = 0.05",
+        "position_jump_rad_max = 0.009",
+        "supervision.position_jump_rad_max",
+        "at full speed",
+    ),
+    (
+        Settings,
+        "lost_cycles_max = 3",
+        "lost_cycles_max = 100",
+        "supervision.lost_cycles_max",
+        "fewer cycles than drive_watchdog_ms",
+    ),
+    (Settings, "virtual = true", "bitrate_bit_s = 500000", "bus[0]", "287 % full in the worst case"),
     (Settings, "[[bus]]", "[[buses]]", "bus", "missing"),
     (
         Settings,

@@ -1,0 +1,71 @@
+//! Settings that only make sense together.
+use crate::bus_load::REFUSED_PERCENT;
+use crate::reader::Book;
+use crate::settings::{Cycle, Settings, Supervision};
+
+/// Times that only make sense in one order.
+pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision) {
+    let period_ms = f64::from(cycle.period_us) * 1e-3;
+    let gap_ms = f64::from(cycle.tolerated_gap_periods) * period_ms;
+    let (watchdog_ms, stall_ms) = (cycle.drive_watchdog_ms, cycle.stall_resume_ms);
+    if f64::from(watchdog_ms) <= gap_ms {
+        let expected =
+            format!("more than the tolerated gap of {gap_ms} ms (tolerated_gap_periods x period_us)");
+        book.add(None, "cycle.drive_watchdog_ms", &watchdog_ms.to_string(), &expected);
+    }
+    if stall_ms > watchdog_ms {
+        let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
+        book.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
+    }
+    // Our own stop keeps the arm on its path; the drives' does not, so ours must come first.
+    let lost_ms = f64::from(supervision.lost_cycles_max) * period_ms;
+    if lost_ms >= f64::from(watchdog_ms) {
+        let expected =
+            format!("fewer cycles than drive_watchdog_ms = {watchdog_ms} holds ({lost_ms} ms as it stands)");
+        book.add(None, "supervision.lost_cycles_max", &supervision.lost_cycles_max.to_string(), &expected);
+    }
+    // Feedback is one cycle old when it is looked at; below two periods, jitter alone would stop the arm.
+    let age_ms = supervision.feedback_age_s_max * 1e3;
+    if age_ms < 2.0 * period_ms {
+        let expected = format!("at least two periods, {} s", 2e-3 * period_ms);
+        book.add(
+            None,
+            "supervision.feedback_age_s_max",
+            &format!("{:?}", supervision.feedback_age_s_max),
+            &expected,
+        );
+    }
+}
+
+/// A step that a joint makes at full speed, over the gap that is tolerated, is no jump.
+pub(crate) fn check_jump(book: &Book, settings: &Settings) {
+    let period_s = f64::from(settings.cycle.period_us) * 1e-6;
+    let longest_s = f64::from(settings.cycle.tolerated_gap_periods + 1) * period_s;
+    let jump_rad = settings.supervision.position_jump_rad_max;
+    let joints = settings.robot.joints.iter();
+    let fastest =
+        joints.max_by(|a, b| a.limits.motion.velocity_rad_s.total_cmp(&b.limits.motion.velocity_rad_s));
+    let Some(joint) = fastest else { return };
+    let step_rad = joint.limits.motion.velocity_rad_s * longest_s;
+    if jump_rad <= step_rad {
+        let expected = format!(
+            "more than {step_rad:.5} rad, which joint {} makes in {longest_s} s at full speed",
+            joint.name
+        );
+        book.add(None, "supervision.position_jump_rad_max", &format!("{jump_rad:?}"), &expected);
+    }
+}
+
+/// A bus that its own cycle does not fit on would lose setpoints from the first second.
+pub(crate) fn check_loads(book: &Book, settings: &Settings) {
+    for (i, bus) in settings.buses.iter().enumerate() {
+        let load = settings.bus_load(i);
+        let Some(percent) = load.percent.filter(|percent| *percent > REFUSED_PERCENT) else { continue };
+        let value = format!("{percent:.0} % full in the worst case ({} bits a cycle)", load.cycle_bits);
+        let expected = format!(
+            "at most {REFUSED_PERCENT} % on {}: use more buses or a longer cycle.period_us",
+            bus.interface
+        );
+        book.add(None, &format!("bus[{i}]"), &value, &expected);
+    }
+}
