@@ -1,5 +1,6 @@
 //! `cargo xtask demo`: build everything, then hand over to `taustream demo`, here or in the vcan machine.
-use crate::packages;
+use crate::packages::{self, MACHINE};
+use crate::workspace;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::env;
@@ -9,8 +10,6 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-/// Debian packages of the vcan machine.
-const MACHINE_PACKAGES: [&str; 4] = ["user-mode-linux", "iproute2", "can-utils", "kmod"];
 /// Packages of the workspace whose programs the demo starts.
 const PROGRAMS: [&str; 4] = ["taustream-cli", "taustream-drivers", "taustream-streamer", "taustream-planner"];
 /// What the machine takes to boot and to end, beyond the demo itself.
@@ -40,9 +39,9 @@ pub(crate) struct Arguments {
 
 /// Builds and hands over; returns only when something went wrong before.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let root = workspace_root()?;
+    let root = workspace::root()?;
     if arguments.vm {
-        packages::ensure(&MACHINE_PACKAGES)?;
+        packages::ensure(&MACHINE)?;
     }
     let programs = build(&root, arguments.vm)?;
     let output = root.join(&arguments.output);
@@ -88,12 +87,5 @@ fn build(root: &Path, with_machine: bool) -> Result<PathBuf> {
     if !status.success() {
         bail!("the build ended with {status}; its messages are above");
     }
-    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |dir| root.join(dir));
-    Ok(target.join("release"))
-}
-
-/// The workspace: the directory above this package.
-fn workspace_root() -> Result<PathBuf> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
-    own.parent().map(Path::to_owned).context("the workspace directory is gone; run this from the source tree")
+    Ok(workspace::target(root).join("release"))
 }

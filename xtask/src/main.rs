@@ -1,8 +1,10 @@
-//! The project's chores: `cargo xtask demo`.
+//! The project's chores: `cargo xtask demo` and `cargo xtask test`.
 //!
 //! Each task installs what it needs on a fresh Debian machine, says so before it does, and ends with a verdict.
 mod demo;
 mod packages;
+mod test;
+mod workspace;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -21,11 +23,14 @@ struct Arguments {
 enum Task {
     /// Build, then move a simulated arm round obstacles and show it.
     Demo(demo::Arguments),
+    /// Check everything: format, lints, tests, documentation, and the scenarios on a real vcan0.
+    Test,
 }
 
 fn main() -> ExitCode {
     let (verdict, outcome) = match Arguments::parse().task {
         Task::Demo(arguments) => ("DEMO FAILED", demo::run(&arguments)),
+        Task::Test => ("TEST FAILED", test::run()),
     };
     match outcome {
         Ok(code) => code,

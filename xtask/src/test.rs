@@ -1,117 +1,94 @@
 //! `cargo xtask test`: everything that must hold before a change lands, in one command.
-use crate::packages;
+use crate::packages::{self, MACHINE};
+use crate::workspace;
 use anyhow::{Context, Result, bail};
-use std::path::Path;
-use std::process::Command;
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
 use std::time::Instant;
 
-/// What the test machine needs from Debian.
-const PACKAGES: &[&str] = &["user-mode-linux", "iproute2", "can-utils", "kmod"];
-/// How long the scenarios may take inside the machine before they count as hung, s.
+/// How long one run in the machine may take before it counts as hung, s.
 const MACHINE_LIMIT_S: &str = "900";
-/// Priority of the machine on the host: its one processor runs everything, so it must not wait for builds.
+/// Priority of the machine on the host: its one processor runs everything, so it must not wait for others.
 const MACHINE_PRIORITY: &str = "40";
 
-/// One step with the words that announce it.
-struct Step {
-    what: &'static str,
-    program: &'static str,
-    args: &'static [&'static str],
-    env: &'static [(&'static str, &'static str)],
-}
-
-const STEPS: &[Step] = &[
-    Step { what: "formatting", program: "cargo", args: &["fmt", "--all", "--check"], env: &[] },
-    Step {
-        what: "lints",
-        program: "cargo",
-        args: &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"],
-        env: &[],
-    },
-    Step {
-        what: "unit, property and command line tests",
-        program: "cargo",
-        args: &["test", "--workspace", "--locked"],
-        env: &[],
-    },
-    Step {
-        what: "documentation",
-        program: "cargo",
-        args: &["doc", "--workspace", "--no-deps", "--locked"],
-        env: &[("RUSTDOCFLAGS", "-D warnings")],
-    },
-    Step {
-        what: "programs for the test machine",
-        program: "cargo",
-        args: &["build", "--workspace", "--bins", "--locked"],
-        env: &[],
-    },
-    Step {
-        what: "link tests for the test machine",
-        program: "cargo",
-        args: &["test", "--package", "taustream-tests", "--test", "on_vcan", "--no-run", "--locked"],
-        env: &[],
-    },
+/// What cargo does, with the words that announce it, in this order.
+const STEPS: [(&str, &[&str]); 6] = [
+    ("format", &["fmt", "--all", "--check"]),
+    ("lints", &["clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"]),
+    ("unit, property and command line tests", &["test", "--locked", "--workspace"]),
+    ("documentation", &["doc", "--locked", "--workspace", "--no-deps"]),
+    ("programs", &["build", "--locked", "--workspace", "--bins"]),
+    ("the test machine itself", &["test", "--locked", "--package", "taustream-tests", "--test", "machine"]),
 ];
 
-/// Runs everything; the first failure ends the run.
-pub(crate) fn run() -> Result<()> {
+/// Runs everything; the first failure ends the run. Nothing is skipped.
+pub(crate) fn run() -> Result<ExitCode> {
     let since = Instant::now();
-    packages::install_missing(PACKAGES, "the test machine")?;
-    for step in STEPS {
-        perform(step)?;
+    let root = workspace::root()?;
+    packages::ensure(&MACHINE)?;
+    for (what, words) in STEPS {
+        perform(what, cargo(&root).args(words))?;
     }
-    links_on_vcan()?;
-    scenarios()?;
-    println!("\ncargo xtask test: everything passed in {:.0} s", since.elapsed().as_secs_f64());
-    Ok(())
+    let programs = workspace::target(&root).join("debug");
+    links_on_vcan(&root, &programs)?;
+    scenarios_on_vcan(&root, &programs)?;
+    println!("\nTEST OK: everything passed, nothing was skipped, {:.0} s", since.elapsed().as_secs_f64());
+    Ok(ExitCode::SUCCESS)
 }
 
-fn perform(step: &Step) -> Result<()> {
-    announce(step.what);
-    let mut command = Command::new(step.program);
-    command.args(step.args).envs(step.env.iter().copied());
-    finish(command, step.what)
+fn cargo(root: &Path) -> Command {
+    let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root).env("RUSTDOCFLAGS", "-D warnings");
+    command
 }
 
-fn announce(what: &str) {
+fn perform(what: &str, command: &mut Command) -> Result<()> {
     println!("\n=== {what}");
-}
-
-fn finish(mut command: Command, what: &str) -> Result<()> {
     let since = Instant::now();
     let status = command.status().with_context(|| format!("{what}: cannot start {command:?}"))?;
     if !status.success() {
-        bail!("{what}: failed ({status})");
+        bail!("{what}: {status}");
     }
     println!("=== {what}: passed in {:.0} s", since.elapsed().as_secs_f64());
     Ok(())
 }
 
-/// A command in the test machine, with `output` writable through to the host.
-fn machine(output: &Path) -> Result<Command> {
-    std::fs::create_dir_all(output).with_context(|| format!("cannot make {}", output.display()))?;
-    let programs = packages::target_dir()?.join("debug");
-    let mut command = Command::new(programs.join("vcan-machine"));
-    command.args(["--limit-s", MACHINE_LIMIT_S, "--realtime", MACHINE_PRIORITY, "--writable"]);
-    command.arg(output).arg("--");
-    Ok(command)
+/// The words that run a program in the machine.
+fn machine(programs: &Path, output: &Path) -> Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(output).with_context(|| format!("{} cannot be made", output.display()))?;
+    let mut words = vec![programs.join("vcan-machine")];
+    let options = ["--limit-s", MACHINE_LIMIT_S, "--realtime", MACHINE_PRIORITY, "--writable"];
+    words.extend(options.map(PathBuf::from));
+    words.extend([output.to_owned(), "--".into()]);
+    Ok(words)
 }
 
-fn links_on_vcan() -> Result<()> {
-    let what = "links on a real vcan0";
-    announce(what);
-    let test = packages::test_program("on_vcan")?;
-    let mut command = machine(&packages::target_dir()?.join("on-vcan"))?;
-    command.arg(test).args(["--test-threads", "1"]);
-    finish(command, what)
+/// The links' tests, which cargo starts through the machine as their runner.
+fn links_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    let words = machine(programs, &workspace::target(root).join("on-vcan"))?;
+    let words: Vec<String> = words.iter().map(|word| format!("{:?}", word.display().to_string())).collect();
+    let runner = format!("target.'cfg(all())'.runner = [{}]", words.join(", "));
+    let mut command = cargo(root);
+    command.args([
+        "test",
+        "--locked",
+        "--package",
+        "taustream-tests",
+        "--test",
+        "on_vcan",
+        "--config",
+        &runner,
+    ]);
+    command.args(["--", "--test-threads", "1"]);
+    perform("links on a real vcan0", &mut command)
 }
 
-fn scenarios() -> Result<()> {
-    let what = "scenarios on a real vcan0";
-    announce(what);
-    let output = packages::target_dir()?.join("scenarios");
-    let mut command = machine(&output)?;
-    command.arg(packages::target_dir()?.join("debug/scenarios")).arg("--output").arg(&output);
-    finish(command, what)
+fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    let output = workspace::target(root).join("scenarios");
+    let words = machine(programs, &output)?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).current_dir(root);
+    perform("scenarios on a real vcan0", &mut command)
 }
