@@ -5,10 +5,20 @@
 //! allocate and use every core, and it never touches a bus.
 #![forbid(unsafe_code)]
 
+pub mod collide;
 pub mod cost;
+pub mod draw;
+pub mod optimize;
+pub mod pipeline;
 pub mod plan;
+pub mod refine;
 pub mod send;
+pub mod shortcut;
+pub mod timing;
+pub mod tree;
 pub mod verify;
+pub mod work;
+pub mod world;
 
 pub use cost::{CostError, CostModel, PaperCost, paper_cost};
 pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan};

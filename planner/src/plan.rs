@@ -1,5 +1,9 @@
 //! From two poses to a verified motion.
+use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
+use crate::work::Work;
+use crate::world::World;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, Trajectory};
@@ -131,6 +135,12 @@ pub enum PlanError {
         /// What touches what.
         contact: Contact,
     },
+    /// A shape of the robot or the scene cannot be built.
+    #[error("{name}: its mesh has no usable triangles; correct the file")]
+    Shape {
+        /// The link or obstacle.
+        name: String,
+    },
     /// Nothing was found.
     #[error(
         "no path found: {tried}{}; try a longer deadline, another seed or another goal",
@@ -157,11 +167,64 @@ pub enum PlanError {
 /// # Errors
 /// What is wrong with a pose, or what was tried in vain.
 pub fn plan(
-    _robot: &Robot,
-    _scene: &Scene,
-    _start_rad: &JointArray,
-    _goal_rad: &JointArray,
-    _options: &PlanOptions,
+    robot: &Robot,
+    scene: &Scene,
+    start_rad: &JointArray,
+    goal_rad: &JointArray,
+    options: &PlanOptions,
 ) -> Result<Plan, PlanError> {
-    todo!("planner")
+    let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad };
+    plan_until(&task, options, None)
+}
+
+/// What to plan.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// Its surroundings.
+    pub scene: &'a Scene,
+    /// Where the motion begins.
+    pub start_rad: JointArray,
+    /// Where it shall end.
+    pub goal_rad: JointArray,
+}
+
+/// Like [`plan`], and given up as soon as `cancel` is set.
+///
+/// # Errors
+/// What is wrong with a pose, or what was tried in vain.
+pub fn plan_until(
+    task: &Task,
+    options: &PlanOptions,
+    cancel: Option<&AtomicBool>,
+) -> Result<Plan, PlanError> {
+    let work = Work::until(options.deadline, cancel);
+    check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
+    check_pose(task.robot, PoseOf::Goal, &task.goal_rad)?;
+    let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
+    for (which, pose_rad) in [(PoseOf::Start, &task.start_rad), (PoseOf::Goal, &task.goal_rad)] {
+        if let Some(contact) = world.contact(pose_rad) {
+            return Err(PlanError::InCollision { which, contact });
+        }
+    }
+    Pipeline::new(&world, &work, options).run(&task.start_rad, &task.goal_rad)
+}
+
+fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
+    let joints = robot.joints.len();
+    for (joint, &value_rad) in pose_rad.iter().enumerate() {
+        if !value_rad.is_finite() || (joint >= joints && value_rad != 0.0) {
+            return Err(PlanError::BadPose { which, joint, value_rad, joints });
+        }
+    }
+    for (joint, (described, &value_rad)) in robot.joints.iter().zip(pose_rad).enumerate() {
+        let range_rad = described.limits.position_rad;
+        let by_rad = (range_rad[0] - value_rad).max(value_rad - range_rad[1]);
+        if by_rad > 0.0 {
+            let name = described.name.clone();
+            return Err(PlanError::OutsideLimits { which, joint, name, value_rad, by_rad, range_rad });
+        }
+    }
+    Ok(())
 }

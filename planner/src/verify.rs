@@ -1,7 +1,13 @@
 //! The proof that a trajectory keeps the limits and the distance to everything, along its whole length.
+//!
+//! Limits are proven by the motion crate from closed-form peaks; distances by bisection with a proven step
+//! ([`crate::collide::sweep`]). A motion that cannot be proven within bounded work is refused, and said to be so.
+use crate::collide::{Blocked, SweepRules, sweep};
+use crate::work::Work;
+use crate::world::World;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::Trajectory;
-use taustream_motion::limits::{LimitViolation, Peaks};
+use taustream_motion::limits::{LimitViolation, Peaks, check_motion};
 
 /// What was proven about a trajectory.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +59,12 @@ pub enum Violation {
         /// Of the robot.
         expected: usize,
     },
+    /// A shape of the robot or the scene cannot be built.
+    #[error("{name}: its mesh has no usable triangles; correct the file")]
+    Shape {
+        /// The link or obstacle.
+        name: String,
+    },
     /// A limit is exceeded.
     #[error("joint {} ({name}): {violation}", violation.joint + 1)]
     Limit {
@@ -85,6 +97,57 @@ pub enum Violation {
 ///
 /// # Errors
 /// The first violation, with joint or pair, time and amount.
-pub fn verify(_robot: &Robot, _scene: &Scene, _trajectory: &Trajectory) -> Result<Proof, Violation> {
-    todo!("planner")
+pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<Proof, Violation> {
+    let world = World::new(robot, scene).map_err(|name| Violation::Shape { name })?;
+    verify_in(&world, trajectory, &Work::unbounded())
+}
+
+/// Like [`verify`], in a world that exists already and with a clock that may cut the proof short.
+///
+/// # Errors
+/// The first violation; `Unresolved` when the clock cut in.
+pub fn verify_in(world: &World, trajectory: &Trajectory, work: &Work) -> Result<Proof, Violation> {
+    let robot = world.robot();
+    let (got, expected) = (trajectory.joints(), robot.joints.len());
+    if got != expected {
+        return Err(Violation::Joints { got, expected });
+    }
+    // Limits first: beyond them angles may be so large that geometry means nothing.
+    let peaks = check_motion(trajectory, &robot.limits()).map_err(|violation| {
+        let name = robot.joints.get(violation.joint).map(|j| j.name.clone()).unwrap_or_default();
+        Violation::Limit { name, violation }
+    })?;
+    // Once a motion, with bodies inside of meshes: nothing gets in later without crossing a surface.
+    if let Some(contact) = world.contact(trajectory.base_rad()) {
+        return Err(Violation::Collision { from_s: 0.0, at_s: 0.0, contact });
+    }
+    let duration_s = trajectory.duration_s();
+    let clearance = sweep(world, trajectory, [0.0, duration_s], &SweepRules::PROOF, work)
+        .map_err(|blocked| explain(world, trajectory, &blocked))?;
+    Ok(Proof {
+        duration_s,
+        clearance_m: clearance.proven_m,
+        clearance_at_s: clearance.at,
+        clearance_between: clearance.pair.map(|pair| world.names(&pair)).unwrap_or_default(),
+        peaks,
+    })
+}
+
+/// States the contact where it is deepest, which tells more than the instant at which it begins.
+fn explain(world: &World, trajectory: &Trajectory, blocked: &Blocked) -> Violation {
+    const SAMPLES: u32 = 2_000;
+    let Some((mut pair, mut distance_m)) = blocked.pair else {
+        return Violation::Unresolved { checks: blocked.checks, at_s: blocked.at };
+    };
+    let (from_s, mut at_s) = (blocked.at, blocked.at);
+    let duration_s = trajectory.duration_s();
+    for i in 0..=SAMPLES {
+        let t_s = duration_s * f64::from(i) / f64::from(SAMPLES);
+        if let Some((p, d)) = world.closest(&trajectory.sample(t_s).position_rad)
+            && d - p.required_m < distance_m - pair.required_m
+        {
+            (pair, distance_m, at_s) = (p, d, t_s);
+        }
+    }
+    Violation::Collision { from_s, at_s, contact: world.contact_of(&pair, distance_m) }
 }

@@ -1,0 +1,205 @@
+//! One collision shape as a core and a radius, and where it stands.
+use super::closed_form::{segment_to_box_m, segment_to_segment_m};
+use parry3d_f64::math::{Pose, Rot3, Vector};
+use parry3d_f64::query::distance;
+use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Segment, Shape as ParryShape, TriMesh};
+use std::sync::Arc;
+use taustream_arm::scene::Shape;
+use taustream_motion::chain;
+
+/// What parry3d's iterative distances may be off by: taken away, so that they stay lower bounds.
+const ITERATION_SLACK_M: f64 = 1e-7;
+/// A segment shorter than this is a point.
+const POINT_M: f64 = 1e-12;
+
+/// The hard inside of a shape.
+#[derive(Clone)]
+enum Core {
+    /// From the first to the second point; equal points make a sphere.
+    Segment(Vector, Vector),
+    /// Half edges around the origin.
+    Box(Vector),
+    /// Anything that only parry3d knows.
+    Other,
+    /// Triangles; the solid is what they enclose.
+    Mesh(Arc<TriMesh>),
+}
+
+/// A shape in the frame that it is rigid with.
+#[derive(Clone)]
+pub struct Body {
+    core: Core,
+    /// Radius around the core.
+    radius_m: f64,
+    /// From the frame to the core's own axes.
+    local: Pose,
+    /// Centre of a ball around the whole shape, in the core's axes.
+    centre: Vector,
+    /// Radius of that ball.
+    bound_m: f64,
+    parry: Arc<dyn ParryShape>,
+}
+
+/// Where a body stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Posed {
+    /// Of the core's axes.
+    pub pose: Pose,
+    /// Centre of the ball around the shape.
+    pub centre: Vector,
+    /// Ends of the segment; the centre twice for other cores.
+    ends: [Vector; 2],
+}
+
+/// From the motion crate's pose to parry3d's.
+#[must_use]
+pub fn to_parry(pose: &chain::Pose) -> Pose {
+    let (t, r) = (pose.translation.vector, pose.rotation.coords);
+    Pose::from_parts(Vector::new(t.x, t.y, t.z), Rot3::from_xyzw(r.x, r.y, r.z, r.w))
+}
+
+impl Body {
+    /// Makes a body; `None` for a mesh without triangles, or with corners that do not exist.
+    #[must_use]
+    pub fn new(shape: &Shape, pose: &chain::Pose) -> Option<Self> {
+        let local = to_parry(pose);
+        Some(match shape {
+            Shape::Sphere { radius_m } => Self::capsule(0.0, *radius_m, local),
+            Shape::Capsule { radius_m, length_m } => Self::capsule(0.5 * length_m, *radius_m, local),
+            Shape::Box { size_m } => {
+                let half = 0.5 * Vector::from_array(*size_m);
+                let parry = Arc::new(Cuboid::new(half));
+                let (core, bound_m) = (Core::Box(half), half.length());
+                Self { core, radius_m: 0.0, local, centre: Vector::ZERO, bound_m, parry }
+            }
+            Shape::Cylinder { radius_m, length_m } => {
+                // parry3d's cylinder stands on y, ours on z.
+                let local = local * Pose::from_rotation(Rot3::from_rotation_x(std::f64::consts::FRAC_PI_2));
+                let parry = Arc::new(Cylinder::new(0.5 * length_m, *radius_m));
+                let bound_m = radius_m.hypot(0.5 * length_m);
+                Self { core: Core::Other, radius_m: 0.0, local, centre: Vector::ZERO, bound_m, parry }
+            }
+            Shape::Mesh { vertices_m, triangles } => {
+                let corners: Vec<Vector> = vertices_m.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
+                let known =
+                    |t: &[u32; 3]| t.iter().all(|i| usize::try_from(*i).is_ok_and(|i| i < corners.len()));
+                if corners.iter().any(|c| !c.is_finite()) || !triangles.iter().all(known) {
+                    return None;
+                }
+                let mesh = Arc::new(TriMesh::new(corners, triangles.clone()).ok()?);
+                let aabb = mesh.local_aabb();
+                let (centre, bound_m) = (aabb.center(), aabb.half_extents().length());
+                Self { core: Core::Mesh(mesh.clone()), radius_m: 0.0, local, centre, bound_m, parry: mesh }
+            }
+        })
+    }
+
+    fn capsule(half_m: f64, radius_m: f64, local: Pose) -> Self {
+        let (a, b) = (Vector::new(0.0, 0.0, -half_m), Vector::new(0.0, 0.0, half_m));
+        let parry: Arc<dyn ParryShape> =
+            if half_m > POINT_M { Arc::new(Segment::new(a, b)) } else { Arc::new(Ball::new(0.0)) };
+        let bound_m = half_m + radius_m;
+        Self { core: Core::Segment(a, b), radius_m, local, centre: Vector::ZERO, bound_m, parry }
+    }
+
+    /// Where the body stands when its frame does.
+    #[must_use]
+    pub fn placed(&self, frame: &Pose) -> Posed {
+        let pose = *frame * self.local;
+        let centre = pose.transform_point(self.centre);
+        let ends = match self.core {
+            Core::Segment(a, b) => [pose.transform_point(a), pose.transform_point(b)],
+            Core::Box(_) | Core::Other | Core::Mesh(_) => [centre; 2],
+        };
+        Posed { pose, centre, ends }
+    }
+
+    /// Radius of the ball around the shape.
+    #[must_use]
+    pub fn bound_m(&self) -> f64 {
+        self.bound_m
+    }
+
+    /// Radius around the core.
+    #[must_use]
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    /// Upper bound of the distance of the shape's points to the axis through `point` along the unit `direction`.
+    #[must_use]
+    pub fn lever_m(&self, at: &Posed, point: Vector, direction: Vector) -> f64 {
+        let distance_m = |p: Vector| (p - point).cross(direction).length();
+        match self.core {
+            // The distance to a line is convex: the ends of a segment are the furthest.
+            Core::Segment(..) => distance_m(at.ends[0]).max(distance_m(at.ends[1])) + self.radius_m,
+            Core::Box(_) | Core::Other | Core::Mesh(_) => distance_m(at.centre) + self.bound_m,
+        }
+    }
+
+    /// Distance between the surfaces: exact when positive, negative when capsules or spheres overlap by less than
+    /// their radii, and at most 0 when they touch. A body *wholly* inside a mesh is outside of its triangles and
+    /// not seen here: ask [`Self::is_inside`] once a motion, nothing gets in without crossing them.
+    #[must_use]
+    pub fn distance_m(&self, at: &Posed, other: &Self, other_at: &Posed) -> f64 {
+        self.core_distance_m(at, other, other_at) - self.radius_m - other.radius_m
+    }
+
+    /// Distance between the cores; 0 when they touch.
+    #[must_use]
+    pub fn core_distance_m(&self, at: &Posed, other: &Self, other_at: &Posed) -> f64 {
+        let into = |pose: &Pose, ends: &[Vector; 2]| ends.map(|p| pose.inverse_transform_point(p));
+        match (&self.core, &other.core) {
+            (Core::Segment(..), Core::Segment(..)) => {
+                segment_to_segment_m(at.ends[0], at.ends[1], other_at.ends[0], other_at.ends[1])
+            }
+            (Core::Segment(..), Core::Box(half)) => {
+                let [a, b] = into(&other_at.pose, &at.ends);
+                segment_to_box_m(a, b, *half)
+            }
+            (Core::Box(half), Core::Segment(..)) => {
+                let [a, b] = into(&at.pose, &other_at.ends);
+                segment_to_box_m(a, b, *half)
+            }
+            _ => {
+                let found = distance(&at.pose, &*self.parry, &other_at.pose, &*other.parry);
+                // A pair that parry3d does not know counts as touching: refused, never let through.
+                found.map_or(0.0, |d| (d.distance * (1.0 - ITERATION_SLACK_M) - ITERATION_SLACK_M).max(0.0))
+            }
+        }
+    }
+
+    /// True when a point of `other` lies inside this body's mesh, or the other way round.
+    #[must_use]
+    pub fn is_inside(&self, at: &Posed, other: &Self, other_at: &Posed) -> bool {
+        let one = |mesh: &Body, mesh_at: &Posed, body: &Body, body_at: &Posed| {
+            let Core::Mesh(triangles) = &mesh.core else { return false };
+            let point = match &body.core {
+                Core::Mesh(m) => m.vertices().first().map(|v| body_at.pose.transform_point(*v)),
+                Core::Segment(..) | Core::Box(_) | Core::Other => Some(body_at.ends[0]),
+            };
+            point.is_some_and(|p| encloses(triangles, mesh_at.pose.inverse_transform_point(p)))
+        };
+        one(self, at, other, other_at) || one(other, other_at, self, at)
+    }
+}
+
+/// True when the triangles go round the point: the solid angle that they fill is more than half of the sphere.
+/// Orientation of the whole mesh and small holes do not matter.
+///
+/// Source: van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983); Jacobson et al., SIGGRAPH 2013.
+fn encloses(mesh: &TriMesh, point: Vector) -> bool {
+    if !mesh.local_aabb().contains_local_point(point) {
+        return false;
+    }
+    let angle: f64 = mesh
+        .triangles()
+        .map(|t| {
+            let (a, b, c) = (t.a - point, t.b - point, t.c - point);
+            let (la, lb, lc) = (a.length(), b.length(), c.length());
+            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            2.0 * a.dot(b.cross(c)).atan2(below)
+        })
+        .sum();
+    angle.abs() > 2.0 * std::f64::consts::PI
+}

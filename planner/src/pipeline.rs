@@ -1,0 +1,297 @@
+//! The stages of planning, one after the other, each on a budget of evaluations.
+//!
+//! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> IBFOA -> timing with rounded corners ->
+//! proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
+use crate::collide::{StraightEdge, SweepRules, sweep};
+use crate::draw::Draw;
+use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind};
+use crate::refine::refine;
+use crate::shortcut::shorten;
+use crate::timing::{Path, Timed, stand_still};
+use crate::tree::{Space, rrt_connect};
+use crate::verify::{Proof, Violation, verify_in};
+use crate::work::Work;
+use crate::world::World;
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
+
+/// Independent searches; the best path of them is kept.
+const SEARCHES: u64 = 3;
+/// What a corner costs in comparing paths: about what a stop there would (s).
+const CORNER_S: f64 = 0.3;
+
+/// Evaluations granted a stage, from the deadline alone: about half of what a small controller does in the time,
+/// so that the clock cuts in on slow or busy machines only.
+#[derive(Clone, Copy, Debug)]
+struct Budget {
+    /// Poses checked by all searches.
+    search_checks: usize,
+    /// Shortcuts tried a path.
+    shortcuts: usize,
+    /// Evaluations of the refinement.
+    refinements: usize,
+    /// Timings of one path tried.
+    timings: usize,
+}
+
+impl Budget {
+    fn of(options: &PlanOptions) -> Self {
+        // A minute is the most that anybody waits for; beyond it more work finds nothing new.
+        let ms = usize::try_from(options.deadline.as_millis()).unwrap_or(usize::MAX).clamp(1, 60_000);
+        Self {
+            search_checks: ms * 100,
+            shortcuts: (ms / 10).clamp(20, 200),
+            refinements: ms,
+            timings: (ms / 50).clamp(6, 40),
+        }
+    }
+}
+
+/// One planning run.
+pub struct Pipeline<'a> {
+    space: Space<'a>,
+    options: &'a PlanOptions,
+    budget: Budget,
+    limits: [JointLimits; MAX_JOINTS],
+    /// What was done, in words.
+    tried: Vec<String>,
+    best: Option<(Trajectory, Proof, String)>,
+    /// Why the latest motion was not proven.
+    violation: Option<Violation>,
+}
+
+impl<'a> Pipeline<'a> {
+    /// Prepares a run.
+    #[must_use]
+    pub fn new(world: &'a World<'a>, work: &'a Work<'a>, options: &'a PlanOptions) -> Self {
+        Self {
+            space: Space::new(world, work),
+            options,
+            budget: Budget::of(options),
+            limits: world.robot().limits(),
+            tried: Vec::new(),
+            best: None,
+            violation: None,
+        }
+    }
+
+    /// Runs the stages that the kind of planner asks for.
+    ///
+    /// # Errors
+    /// What was tried in vain.
+    pub fn run(mut self, start_rad: &JointArray, goal_rad: &JointArray) -> Result<Plan, PlanError> {
+        if start_rad == goal_rad {
+            self.stay(start_rad);
+            return self.finish();
+        }
+        let line = vec![*start_rad, *goal_rad];
+        match self.options.planner {
+            PlannerKind::Straight => {
+                self.straight(&line);
+            }
+            PlannerKind::Auto => {
+                if !self.straight(&line)
+                    && let Some(path) = self.search(&line)
+                {
+                    self.propose(&path, "shortcuts");
+                    if let Some(refined) = self.refine(&path) {
+                        self.round(&refined);
+                    }
+                    self.round(&path);
+                }
+            }
+            PlannerKind::RrtConnect => {
+                if let Some(path) = self.search(&line) {
+                    self.propose(&path, "shortcuts");
+                    self.round(&path);
+                }
+            }
+            PlannerKind::Ibfoa => {
+                if let Some(refined) = self.refine(&line) {
+                    self.propose(&refined, "IBFOA");
+                    self.round(&refined);
+                }
+            }
+        }
+        self.finish()
+    }
+
+    fn path<'p>(&'p self, corners_rad: &'p [JointArray]) -> Path<'p> {
+        Path { corners_rad, joints: self.space.world.joints(), limits: &self.limits }
+    }
+
+    fn stay(&mut self, pose_rad: &JointArray) {
+        if let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) {
+            self.keep(trajectory, "already there");
+        }
+    }
+
+    /// The straight line; true when its motion is proven.
+    fn straight(&mut self, line: &[JointArray]) -> bool {
+        let [from_rad, to_rad] = line else { return false };
+        let edge = StraightEdge { from_rad, to_rad };
+        let result = sweep(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.work);
+        match result.map_err(|b| b.pair) {
+            Ok(_) => {
+                self.tried.push("straight line".to_owned());
+                self.propose(line, "straight line");
+                self.best.is_some()
+            }
+            Err(Some((pair, _))) => {
+                let (a, b) = self.space.world.names(&pair);
+                self.tried.push(format!("straight line (blocked: {a} and {b})"));
+                false
+            }
+            Err(None) => {
+                self.tried.push("straight line (not proven in time)".to_owned());
+                false
+            }
+        }
+    }
+
+    /// Several searches with shortcuts; the path that is estimated to be fastest.
+    fn search(&mut self, line: &[JointArray]) -> Option<Vec<JointArray>> {
+        let [start, goal] = line else { return None };
+        let mut best: Option<(f64, Vec<JointArray>)> = None;
+        let (mut nodes, mut found) = (0, 0);
+        let end = self.space.checks() + self.budget.search_checks;
+        for stream in 0..SEARCHES {
+            let mut draw = Draw::new(self.options.seed, 10 + stream);
+            let left = end.saturating_sub(self.space.checks());
+            let search = rrt_connect(&self.space, start, goal, left, &mut draw);
+            nodes += search.nodes;
+            let Some(mut path) = search.path else { continue };
+            found += 1;
+            shorten(&self.space, &mut path, self.budget.shortcuts, &mut draw);
+            let estimate_s = self.estimate_s(&path);
+            if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
+                best = Some((estimate_s, path));
+            }
+        }
+        self.tried.push(format!("RRT-Connect ({nodes} nodes, {found} of {SEARCHES} searches)"));
+        best.map(|(_, path)| path)
+    }
+
+    /// Time at full speed plus a toll for each corner.
+    fn estimate_s(&self, path: &[JointArray]) -> f64 {
+        let segment_s = |a: &JointArray, b: &JointArray| {
+            let joints = a.iter().zip(b).zip(&self.limits).take(self.space.world.joints());
+            joints.map(|((a, b), l)| (a - b).abs() / l.motion.velocity_rad_s).fold(0.0, f64::max)
+        };
+        let corners = path.len().saturating_sub(2) as f64;
+        corners * CORNER_S
+            + path.windows(2).map(|p| if let [a, b] = p { segment_s(a, b) } else { 0.0 }).sum::<f64>()
+    }
+
+    /// IBFOA around a path; only a path whose every edge is proven comes back.
+    fn refine(&mut self, path: &[JointArray]) -> Option<Vec<JointArray>> {
+        let (mut corners, found) = refine(&self.space, path, self.budget.refinements, self.options.seed)?;
+        let free = corners.windows(2).all(|p| {
+            let [a, b] = p else { return false };
+            self.space.is_edge_free(a, b)
+        });
+        let evaluations = found.progress.evaluations;
+        let verdict = if free { "" } else { ", collides" };
+        self.tried.push(format!("IBFOA ({evaluations} evaluations{verdict})"));
+        if !free {
+            return None;
+        }
+        // The optimiser always has three control points; those that lie on the way are not needed.
+        shorten(&self.space, &mut corners, 0, &mut Draw::new(self.options.seed, 2));
+        Some(corners)
+    }
+
+    /// Times a path with a stop at every corner and proves the motion.
+    fn propose(&mut self, path: &[JointArray], how: &str) {
+        let waits = vec![1.0; path.len().saturating_sub(2)];
+        let timed = self.path(path).fastest(&waits, self.space.work);
+        if let Some(timed) = timed {
+            self.prove(path, timed, how);
+        }
+    }
+
+    /// Rounds the corners of a path as far as that is free and saves time, and proves the motion.
+    fn round(&mut self, path: &[JointArray]) {
+        let corners = path.len().saturating_sub(2);
+        let mut left = self.budget.timings;
+        let mut best: Option<Timed> = None;
+        let mut attempt = |waits: &[f64], best: &mut Option<Timed>| {
+            if left == 0 || self.space.work.is_over() {
+                return;
+            }
+            left -= 1;
+            let Some(timed) = self.path(path).fastest(waits, self.space.work) else { return };
+            let duration_s = timed.trajectory.duration_s();
+            let shorter = best.as_ref().is_none_or(|b| duration_s < b.trajectory.duration_s());
+            let span = [0.0, duration_s];
+            let rules = &SweepRules::CANDIDATE;
+            if shorter && sweep(self.space.world, &timed.trajectory, span, rules, self.space.work).is_ok() {
+                *best = Some(timed);
+            }
+        };
+        for wait in [0.0, 0.25, 0.5, 0.75, 1.0] {
+            attempt(&vec![wait; corners], &mut best);
+        }
+        // Then one corner after the other: a tight one must not hold back the rest.
+        for step in [0.5, 0.25] {
+            for corner in 0..corners {
+                let Some(shape) = best.as_ref().map(|b| b.shape.clone()) else { return };
+                let mut waits = shape.waits;
+                waits[corner] = f64::max(waits[corner] - step, 0.0);
+                attempt(&waits, &mut best);
+            }
+        }
+        if let Some(timed) = best {
+            self.prove(path, timed, "corners rounded");
+        }
+    }
+
+    /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is shorter
+    /// than what there is.
+    fn prove(&mut self, path: &[JointArray], mut timed: Timed, how: &str) {
+        const SLOWER: f64 = 1.002;
+        for _ in 0..6 {
+            match verify_in(self.space.world, &timed.trajectory, self.space.work) {
+                Ok(proof) => {
+                    let shorter = self.best.as_ref().is_none_or(|(_, b, _)| proof.duration_s < b.duration_s);
+                    if shorter {
+                        self.best = Some((timed.trajectory, proof, how.to_owned()));
+                    }
+                    return;
+                }
+                Err(violation) => {
+                    let limit = matches!(violation, Violation::Limit { .. });
+                    self.violation = Some(violation);
+                    let Some(slower) = self.path(path).slower(&timed, SLOWER).filter(|_| limit) else {
+                        return;
+                    };
+                    timed = slower;
+                }
+            }
+        }
+    }
+
+    fn keep(&mut self, trajectory: Trajectory, how: &str) {
+        match verify_in(self.space.world, &trajectory, self.space.work) {
+            Ok(proof) => self.best = Some((trajectory, proof, how.to_owned())),
+            Err(violation) => self.violation = Some(violation),
+        }
+    }
+
+    fn finish(self) -> Result<Plan, PlanError> {
+        let work = self.space.work;
+        let cut = work.was_cut();
+        let tried = self.tried.join(", ");
+        match (self.best, self.violation) {
+            (Some((trajectory, proof, last)), _) => {
+                let mut how =
+                    if tried.is_empty() || tried == last { last } else { format!("{tried}, {last}") };
+                if cut {
+                    how.push_str("; cut short by the deadline");
+                }
+                Ok(Plan { trajectory, how, proof, planning_s: work.elapsed_s() })
+            }
+            (None, Some(violation)) => Err(PlanError::Unproven { tried, violation }),
+            (None, None) => Err(PlanError::NotFound { tried, cut_short: cut }),
+        }
+    }
+}

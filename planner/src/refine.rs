@@ -1,0 +1,165 @@
+//! Refinement of a path by a metaheuristic over three control points, under the paper's cost.
+//!
+//! The structure is the paper's (length of the tip's path, joint travel, penalty when anything collides); the
+//! distances are the world's own, of every shape, and the penalty's width is the radii and the margin. What comes
+//! out is a proposal: its edges are proven like any other path's.
+use crate::cost::CostModel;
+use crate::draw::Draw;
+use crate::optimize::{Found, Ibfoa, Optimizer, Parameters, Problem, Run};
+use crate::tree::Space;
+use crate::world::{Snapshot, World};
+use std::cell::RefCell;
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// Control points between start and goal (the paper's M).
+pub const CONTROL_POINTS: usize = 3;
+/// Poses a segment, evenly spaced along its line: the paper's even time steps put 40 % of them into the first and
+/// last 1 % of a stroke (papers.md 1.2), and the path is the same for every timing.
+const POSES_PER_SEGMENT: u32 = 12;
+/// Guesses beside the path itself, scattered around it by this much (rad).
+const SCATTER_RAD: f64 = 0.15;
+const SCATTERED: usize = 5;
+
+/// Proposes a path near a given one (which may collide), or none when the run was cut before its first evaluation.
+pub fn refine(
+    space: &Space,
+    path: &[JointArray],
+    evaluations_max: usize,
+    seed: u64,
+) -> Option<(Vec<JointArray>, Found)> {
+    let (start, goal) = (*path.first()?, *path.last()?);
+    let problem = PathProblem::new(space.world, start, goal);
+    let guesses = problem.guesses(path, seed);
+    let optimizer = Ibfoa { parameters: Parameters::CASE_1 };
+    let (is_over, mut watch) = (|| space.work.is_over(), |_: &crate::optimize::Progress| ());
+    let run = Run { seed, evaluations_max, guesses: &guesses, is_over: &is_over, watch: &mut watch };
+    let found = optimizer.minimise(&problem, run);
+    (!found.x.is_empty()).then(|| (problem.corners(&found.x), found))
+}
+
+/// The paper's problem: where to put the control points.
+pub struct PathProblem<'a> {
+    world: &'a World<'a>,
+    start_rad: JointArray,
+    goal_rad: JointArray,
+    weights: [f64; 3],
+    bounds: Vec<[f64; 2]>,
+    /// Scratch memory; the trait's evaluation takes no mutable access.
+    snapshot: RefCell<Snapshot>,
+}
+
+impl<'a> PathProblem<'a> {
+    /// The problem between two poses.
+    #[must_use]
+    pub fn new(world: &'a World<'a>, start_rad: JointArray, goal_rad: JointArray) -> Self {
+        let one = world.robot().joints.iter().map(|j| j.limits.position_rad);
+        let bounds = one.cycle().take(CONTROL_POINTS * world.joints()).collect();
+        let (weights, snapshot) = (CostModel::default().weights, RefCell::default());
+        Self { world, start_rad, goal_rad, weights, bounds, snapshot }
+    }
+
+    /// Start, control points and goal of a decision vector.
+    #[must_use]
+    pub fn corners(&self, x: &[f64]) -> Vec<JointArray> {
+        let mut corners = vec![self.start_rad];
+        for point in x.chunks(self.world.joints()) {
+            let mut corner = [0.0; MAX_JOINTS];
+            corner.iter_mut().zip(point).for_each(|(c, p)| *c = *p);
+            corners.push(corner);
+        }
+        corners.push(self.goal_rad);
+        corners
+    }
+
+    /// The path with three control points, some scattered around it, and the straight line.
+    fn guesses(&self, path: &[JointArray], seed: u64) -> Vec<Vec<f64>> {
+        let joints = self.world.joints();
+        let flat = |corners: &[JointArray]| -> Vec<f64> {
+            let inner = corners.iter().skip(1).take(CONTROL_POINTS);
+            inner.flat_map(|c| c.iter().take(joints).copied()).collect()
+        };
+        let seeded = flat(&with_control_points(path));
+        let mut draw = Draw::new(seed, 1);
+        let mut guesses = vec![seeded.clone(), flat(&with_control_points(&[self.start_rad, self.goal_rad]))];
+        for _ in 0..SCATTERED {
+            guesses.push(seeded.iter().map(|x| x + draw.within(-SCATTER_RAD, SCATTER_RAD)).collect());
+        }
+        guesses
+    }
+}
+
+impl Problem for PathProblem<'_> {
+    fn bounds(&self) -> &[[f64; 2]] {
+        &self.bounds
+    }
+
+    fn cost(&self, x: &[f64]) -> f64 {
+        let snapshot = &mut *self.snapshot.borrow_mut();
+        let corners = self.corners(x);
+        let (mut length_m, mut travel_rad, mut penalty, mut collides) = (0.0, 0.0, 0.0, false);
+        let mut last: Option<parry3d_f64::math::Vector> = None;
+        for segment in corners.windows(2) {
+            let [from, to] = segment else { continue };
+            travel_rad += from.iter().zip(to).map(|(a, b)| (b - a).abs()).sum::<f64>();
+            for i in 1..=POSES_PER_SEGMENT {
+                let share = f64::from(i) / f64::from(POSES_PER_SEGMENT);
+                self.world.place(&Space::between(from, to, share), snapshot);
+                let tip = snapshot.tip();
+                length_m += last.map_or(0.0, |l| (tip - l).length());
+                last = Some(tip);
+                for pair in self.world.pairs() {
+                    let hinge = self.world.hinge(pair, snapshot);
+                    penalty += hinge;
+                    collides |= hinge > 0.0;
+                }
+            }
+        }
+        let [length, travel, weight] = self.weights;
+        let penalty = if collides { weight * penalty } else { 0.0 };
+        length * length_m + travel * travel_rad + penalty
+    }
+}
+
+/// The same path with exactly three inner corners: the longest segments are halved, or the corner whose removal
+/// changes least goes.
+fn with_control_points(path: &[JointArray]) -> Vec<JointArray> {
+    let distance = |a: &JointArray, b: &JointArray| -> f64 {
+        a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+    };
+    let mut corners = path.to_vec();
+    while corners.len() < CONTROL_POINTS + 2 {
+        let longest = (1..corners.len())
+            .max_by(|a, b| {
+                let length = |i: usize| distance(&corners[i - 1], &corners[i]);
+                length(*a).total_cmp(&length(*b)).then(b.cmp(a))
+            })
+            .unwrap_or(1);
+        corners.insert(longest, Space::between(&corners[longest - 1], &corners[longest], 0.5));
+    }
+    while corners.len() > CONTROL_POINTS + 2 {
+        let detour = |i: usize| {
+            distance(&corners[i - 1], &corners[i]) + distance(&corners[i], &corners[i + 1])
+                - distance(&corners[i - 1], &corners[i + 1])
+        };
+        let least = (1..corners.len() - 1).min_by(|a, b| detour(*a).total_cmp(&detour(*b))).unwrap_or(1);
+        corners.remove(least);
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_points_are_three_whatever_the_path_and_ends_stay() {
+        for corners in 2..12_u32 {
+            let path: Vec<JointArray> = (0..corners)
+                .map(|i| std::array::from_fn(|j| (f64::from(i) * (j as f64 + 1.0)).sin()))
+                .collect();
+            let five = with_control_points(&path);
+            assert_eq!(five.len(), CONTROL_POINTS + 2);
+            assert_eq!((five.first(), five.last()), (path.first(), path.last()));
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! The robot and its surroundings as bodies, and which pairs of them must keep apart.
+//!
+//! Obstacles keep the scene's margin; links keep more than 0 m from each other unless the robot file or the
+//! contact rule lets them touch. The base does not move, so that it is not checked against obstacles: planning
+//! could not change it.
+use crate::collide::body::to_parry;
+use crate::collide::{Body, Posed};
+use crate::verify::Contact;
+use parry3d_f64::math::{Pose, Vector};
+use taustream_arm::{Robot, Scene};
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// The other side of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Other {
+    /// Index into the world's obstacles.
+    Obstacle(usize),
+    /// Index into the world's link bodies.
+    Link(usize),
+}
+
+/// Two bodies that must keep apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// Index of the link body; in a pair of links, the one nearer to the tip.
+    pub link: usize,
+    /// What it must not touch.
+    pub other: Other,
+    /// The distance that they must keep, exclusive.
+    pub required_m: f64,
+}
+
+/// A body of a link.
+struct LinkBody {
+    /// Index into [`Robot::links`].
+    link: usize,
+    /// Index of the frame that it is rigid with.
+    frame: usize,
+    body: Body,
+}
+
+/// An obstacle, which stands still.
+struct StillBody {
+    name: String,
+    body: Body,
+    at: Posed,
+}
+
+/// The axis of a joint in the frame before it: a point of it, and its direction.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    point: Vector,
+    direction: Vector,
+}
+
+/// Everything that can collide.
+pub struct World<'a> {
+    robot: &'a Robot,
+    links: Vec<LinkBody>,
+    obstacles: Vec<StillBody>,
+    pairs: Vec<Pair>,
+    axes: Vec<Axis>,
+    reach_m: JointArray,
+}
+
+/// The bodies of the links in one pose of the arm.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    frames: Vec<Pose>,
+    at: Vec<Posed>,
+}
+
+impl Snapshot {
+    /// Where the last frame's origin is, m.
+    #[must_use]
+    pub fn tip(&self) -> Vector {
+        self.frames.last().map_or(Vector::ZERO, |f| f.translation)
+    }
+}
+
+impl<'a> World<'a> {
+    /// Builds the bodies. A shape that cannot be built (a mesh without triangles; files with such are refused) is
+    /// an error with its name.
+    ///
+    /// # Errors
+    /// The name of the link or obstacle whose shape cannot be built.
+    pub fn new(robot: &'a Robot, scene: &Scene) -> Result<Self, String> {
+        let mut links = Vec::new();
+        for shape in &robot.shapes {
+            let name = || robot.links.get(shape.link).cloned().unwrap_or_default();
+            let body = Body::new(&shape.shape, &shape.pose).ok_or_else(name)?;
+            links.push(LinkBody { link: shape.link, frame: shape.frame.min(robot.joints.len()), body });
+        }
+        let mut obstacles = Vec::new();
+        for obstacle in &scene.obstacles {
+            let body = Body::new(&obstacle.shape, &obstacle.pose).ok_or_else(|| obstacle.name.clone())?;
+            let at = body.placed(&Pose::identity());
+            obstacles.push(StillBody { name: obstacle.name.clone(), body, at });
+        }
+        let axes = axes(robot);
+        let mut world = Self { robot, links, obstacles, pairs: Vec::new(), axes, reach_m: [0.0; MAX_JOINTS] };
+        world.pairs = world.pairs_to_keep(scene.margin_m);
+        world.reach_m = world.joint_reach_m();
+        Ok(world)
+    }
+
+    fn pairs_to_keep(&self, margin_m: f64) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        for (link, a) in self.links.iter().enumerate().filter(|(_, a)| a.frame > 0) {
+            let obstacles = 0..self.obstacles.len();
+            pairs.extend(obstacles.map(|o| Pair { link, other: Other::Obstacle(o), required_m: margin_m }));
+            for (other, b) in self.links.iter().enumerate() {
+                // Rigid with one frame: their distance never changes.
+                let once = b.frame < a.frame;
+                if once && a.link != b.link && !self.robot.may_touch(a.link, b.link) {
+                    pairs.push(Pair { link, other: Other::Link(other), required_m: 0.0 });
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Furthest that a point of the arm can be from each joint's axis, in any pose (m).
+    fn joint_reach_m(&self) -> JointArray {
+        let mut snapshot = Snapshot::default();
+        self.place(&[0.0; MAX_JOINTS], &mut snapshot);
+        // Lengths between consecutive frames do not depend on the pose.
+        let steps: Vec<f64> = snapshot
+            .frames
+            .windows(2)
+            .map(|f| if let [a, b] = f { (b.translation - a.translation).length() } else { 0.0 })
+            .collect();
+        let mut reach_m = [0.0; MAX_JOINTS];
+        for (joint, reach) in reach_m.iter_mut().enumerate().take(self.robot.joints.len()) {
+            for (body, at) in self.links.iter().zip(&snapshot.at).filter(|(b, _)| b.frame > joint) {
+                let own_m =
+                    snapshot.frames.get(body.frame).map_or(0.0, |f| (at.centre - f.translation).length());
+                let chain_m: f64 = steps.get(joint..body.frame).unwrap_or(&[]).iter().sum();
+                *reach = f64::max(*reach, chain_m + own_m + body.body.bound_m());
+            }
+        }
+        reach_m
+    }
+
+    /// The robot.
+    #[must_use]
+    pub fn robot(&self) -> &'a Robot {
+        self.robot
+    }
+    /// How many joints.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.robot.joints.len()
+    }
+    /// The pairs that must keep apart.
+    #[must_use]
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+    /// Furthest that a point of the arm can be from each joint's axis, in any pose (m); 0 for unused joints.
+    #[must_use]
+    pub fn reach_m(&self) -> &JointArray {
+        &self.reach_m
+    }
+
+    /// Places the links' bodies.
+    pub fn place(&self, position_rad: &JointArray, snapshot: &mut Snapshot) {
+        let frames = self.robot.chain.frames(position_rad);
+        snapshot.frames.clear();
+        snapshot.frames.extend(frames.iter().take(self.joints() + 1).map(to_parry));
+        snapshot.at.clear();
+        snapshot.at.extend(self.links.iter().map(|l| l.body.placed(&snapshot.frames[l.frame])));
+    }
+
+    /// Distance of a pair; see [`Body::distance_m`].
+    #[must_use]
+    pub fn distance_m(&self, pair: &Pair, snapshot: &Snapshot) -> f64 {
+        let (a, a_at, b, b_at) = self.sides(pair, snapshot);
+        a.distance_m(a_at, b, b_at)
+    }
+
+    /// Lower bound of a pair's distance by the balls around them; cheap.
+    #[must_use]
+    pub fn distance_bound_m(&self, pair: &Pair, snapshot: &Snapshot) -> f64 {
+        let (a, a_at, b, b_at) = self.sides(pair, snapshot);
+        (a_at.centre - b_at.centre).length() - a.bound_m() - b.bound_m()
+    }
+
+    /// The paper's hinge for a pair: max(1 - d / (radii + margin), 0) with d between the cores; for a sphere it is
+    /// the corrected eq. 3.9 with the margin and the link's radius as its expansion.
+    #[must_use]
+    pub fn hinge(&self, pair: &Pair, snapshot: &Snapshot) -> f64 {
+        /// A box has no radius and a margin may be 0: the hinge needs some width.
+        const WIDTH_M_MIN: f64 = 0.01;
+        let (a, a_at, b, b_at) = self.sides(pair, snapshot);
+        let width_m = (a.radius_m() + b.radius_m() + pair.required_m).max(WIDTH_M_MIN);
+        let centres_m = (a_at.centre - b_at.centre).length();
+        if centres_m - a.bound_m() - b.bound_m() >= width_m {
+            return 0.0;
+        }
+        (1.0 - a.core_distance_m(a_at, b, b_at) / width_m).max(0.0)
+    }
+
+    fn sides<'s>(
+        &'s self,
+        pair: &Pair,
+        snapshot: &'s Snapshot,
+    ) -> (&'s Body, &'s Posed, &'s Body, &'s Posed) {
+        let (b, b_at) = match pair.other {
+            Other::Obstacle(o) => (&self.obstacles[o].body, &self.obstacles[o].at),
+            Other::Link(l) => (&self.links[l].body, &snapshot.at[l]),
+        };
+        (&self.links[pair.link].body, &snapshot.at[pair.link], b, b_at)
+    }
+
+    /// The pair that keeps least beyond what it must, with its distance; `None` when nothing can collide. Sees
+    /// bodies wholly inside a mesh, too.
+    #[must_use]
+    pub fn closest(&self, position_rad: &JointArray) -> Option<(Pair, f64)> {
+        let mut snapshot = Snapshot::default();
+        self.place(position_rad, &mut snapshot);
+        let measured = self.pairs.iter().map(|pair| {
+            let (a, a_at, b, b_at) = self.sides(pair, &snapshot);
+            let d = a.distance_m(a_at, b, b_at);
+            (*pair, if d > 0.0 && a.is_inside(a_at, b, b_at) { 0.0 } else { d })
+        });
+        measured.min_by(|(p, d), (q, e)| (d - p.required_m).total_cmp(&(e - q.required_m)))
+    }
+
+    /// What is too close in a pose, the worst first; `None` when the pose is free.
+    #[must_use]
+    pub fn contact(&self, position_rad: &JointArray) -> Option<Contact> {
+        let (pair, distance_m) = self.closest(position_rad)?;
+        (distance_m <= pair.required_m).then(|| self.contact_of(&pair, distance_m))
+    }
+
+    /// A contact in words.
+    #[must_use]
+    pub fn contact_of(&self, pair: &Pair, distance_m: f64) -> Contact {
+        Contact { between: self.names(pair), distance_m, required_m: pair.required_m }
+    }
+
+    /// The names of a pair.
+    #[must_use]
+    pub fn names(&self, pair: &Pair) -> (String, String) {
+        let link = |l: usize| self.robot.links.get(self.links[l].link).cloned().unwrap_or_default();
+        let other = match pair.other {
+            Other::Obstacle(o) => self.obstacles[o].name.clone(),
+            Other::Link(l) => link(l),
+        };
+        (link(pair.link), other)
+    }
+
+    /// True when every pair keeps what it must and `extra_m` more; stops at the first that does not.
+    pub fn is_free(&self, position_rad: &JointArray, extra_m: f64, snapshot: &mut Snapshot) -> bool {
+        self.place(position_rad, snapshot);
+        self.pairs.iter().all(|pair| {
+            let keep_m = pair.required_m + extra_m;
+            self.distance_bound_m(pair, snapshot) > keep_m || self.distance_m(pair, snapshot) > keep_m
+        })
+    }
+
+    /// How far points of each pair can move against each other when joint j turns by at most `turn_rad[j]` away
+    /// from the pose of the snapshot, written into `moves_m[link body][first joint]`.
+    ///
+    /// Turn the joints one after the other, base first: joint j then turns everything beyond it rigidly, in the
+    /// snapshot's shape, about an axis that the joints before it have only carried along. So a point moves by at
+    /// most sum_j turn_j * (its distance to axis j *in the snapshot*): no larger lever can occur on the way. In a
+    /// pair of links, the joints before the lower link move both and drop out.
+    pub fn moves_m(
+        &self,
+        snapshot: &Snapshot,
+        turn_rad: &JointArray,
+        moves_m: &mut Vec<[f64; MAX_JOINTS + 1]>,
+    ) {
+        moves_m.clear();
+        for (body, at) in self.links.iter().zip(&snapshot.at) {
+            let mut sums = [0.0; MAX_JOINTS + 1];
+            for joint in (0..body.frame).rev() {
+                let (axis, frame) = (&self.axes[joint], &snapshot.frames[joint]);
+                let (point, direction) = (frame.transform_point(axis.point), frame.rotation * axis.direction);
+                let lever_m =
+                    if turn_rad[joint] > 0.0 { body.body.lever_m(at, point, direction) } else { 0.0 };
+                sums[joint] = sums[joint + 1] + turn_rad[joint] * lever_m;
+            }
+            moves_m.push(sums);
+        }
+    }
+
+    /// The entry of [`Self::moves_m`] that belongs to a pair.
+    #[must_use]
+    pub fn pair_moves_m(&self, pair: &Pair, moves_m: &[[f64; MAX_JOINTS + 1]]) -> f64 {
+        let fixed = match pair.other {
+            Other::Obstacle(_) => 0,
+            Other::Link(l) => self.links[l].frame,
+        };
+        moves_m[pair.link][fixed]
+    }
+}
+
+/// The joints' axes, each in the frame before it, found from the kinematics: turning joint j by a quarter maps a
+/// point x of the frame before to R x + t, and leaves the axis where it is. With R a quarter turn about u,
+/// R - R^T = 2 [u]x, and the axis' point nearest to the origin is (t + u x t) / 2 with t across u.
+fn axes(robot: &Robot) -> Vec<Axis> {
+    let zero = robot.chain.frames(&[0.0; MAX_JOINTS]);
+    (0..robot.joints.len())
+        .map(|joint| {
+            let mut turned = [0.0; MAX_JOINTS];
+            turned[joint] = std::f64::consts::FRAC_PI_2;
+            let turned = robot.chain.frames(&turned);
+            let base = zero[joint].inverse();
+            let map = (base * turned[joint + 1]) * (base * zero[joint + 1]).inverse();
+            let r = map.rotation.to_rotation_matrix();
+            let r = r.matrix();
+            let direction =
+                0.5 * Vector::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+            let direction = direction.normalize_or_zero();
+            let t = Vector::new(map.translation.x, map.translation.y, map.translation.z);
+            let across = t - direction * t.dot(direction);
+            Axis { point: 0.5 * (across + direction.cross(across)), direction }
+        })
+        .collect()
+}
