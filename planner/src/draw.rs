@@ -1,6 +1,6 @@
 //! Numbered random choices.
 //!
-//! ChaCha8 words are turned into numbers here and not by a library's distributions, whose output may change with
+//! `ChaCha8` words are turned into numbers here and not by a library's distributions, whose output may change with
 //! its version: a seed in a bug report stays good.
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

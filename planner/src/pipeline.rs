@@ -14,6 +14,8 @@ use crate::work::Work;
 use crate::world::World;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 
+/// Poses that differ by less are one: far below a count of any encoder.
+const SAME_RAD: f64 = 1e-12;
 /// Independent searches; the best path of them is kept.
 const SEARCHES: u64 = 3;
 /// What a corner costs in comparing paths: about what a stop there would (s).
@@ -79,7 +81,7 @@ impl<'a> Pipeline<'a> {
     /// # Errors
     /// What was tried in vain.
     pub fn run(mut self, start_rad: &JointArray, goal_rad: &JointArray) -> Result<Plan, PlanError> {
-        if start_rad == goal_rad {
+        if start_rad.iter().zip(goal_rad).all(|(a, b)| (a - b).abs() <= SAME_RAD) {
             self.stay(start_rad);
             return self.finish();
         }

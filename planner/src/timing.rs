@@ -2,8 +2,8 @@
 //!
 //! Every segment of the path is cut into a train of equal strokes of one duration T, started evenly while a
 //! reference runs along the segment at constant speed. The sum is that reference smoothed by the kernel phi' of
-//! width T: its velocity is an average of the reference's, its acceleration at a corner about (change of velocity)
-//! * c_v / T. At a corner the reference waits for a share w of T: at w = 1 the arm stops and follows the path
+//! width T: its velocity is an average of the reference's, its acceleration at a corner about the change of
+//! velocity times `c_v / T`. At a corner the reference waits for a share w of T: at w = 1 the arm stops and follows the path
 //! exactly, at w = 0 it passes and rounds the corner, which is new geometry. Scaling all times by c scales velocity,
 //! acceleration and jerk by 1/c, 1/c^2, 1/c^3 and leaves the geometry, so every shape (T, n, w) is made to fit the
 //! limits exactly, and the shortest wins. One stroke a segment (the paper's way) is the limit of large T.

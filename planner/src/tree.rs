@@ -1,6 +1,6 @@
 //! RRT-Connect: two trees of proven edges that grow towards each other.
 //!
-//! Source: Kuffner and LaValle, "RRT-Connect: An Efficient Approach to Single-Query Path Planning", ICRA 2000.
+//! Source: Kuffner and `LaValle`, "RRT-Connect: An Efficient Approach to Single-Query Path Planning", ICRA 2000.
 //! Distances between poses weigh each joint with how far it can move a point of the arm, so that a step means about
 //! the same way in space for every joint.
 use crate::collide::{StraightEdge, SweepRules, sweep};

@@ -265,7 +265,7 @@ impl<'a> World<'a> {
     ///
     /// Turn the joints one after the other, base first: joint j then turns everything beyond it rigidly, in the
     /// snapshot's shape, about an axis that the joints before it have only carried along. So a point moves by at
-    /// most sum_j turn_j * (its distance to axis j *in the snapshot*): no larger lever can occur on the way. In a
+    /// most the sum over j of turn j times its distance to axis j *in the snapshot*: no larger lever can occur on the way. In a
     /// pair of links, the joints before the lower link move both and drop out.
     pub fn moves_m(
         &self,

@@ -45,8 +45,8 @@ pub fn point_to_segment_m(point: Vector, a: Vector, b: Vector) -> f64 {
 
 /// Distance of the segment a-b to the solid box of the given half edges around the origin.
 ///
-/// The squared distance of a point of the segment to the box is a sum of three terms max(|x_k| - h_k, 0)^2, each
-/// a quadratic in the segment's parameter between the parameters where x_k = +-h_k. So on each of at most seven
+/// The squared distance of a point of the segment to the box is a sum of three terms `max(|x_k| - h_k, 0)^2`, each
+/// a quadratic in the segment's parameter between the parameters where `x_k = +-h_k`. So on each of at most seven
 /// pieces the minimum has a closed form.
 #[must_use]
 pub fn segment_to_box_m(a: Vector, b: Vector, half: Vector) -> f64 {
