@@ -25,6 +25,7 @@ pub(crate) fn read_buses(top: &mut Table<'_>) -> Vec<Option<Bus>> {
     if tables.is_empty() && !top.had("bus") {
         top.fault("bus", "missing", "at least one table [[bus]]");
     }
+    // Two buses on one interface would each take its lock, and the second would be refused at start: better said here.
     let (mut names, mut interfaces) = (BTreeSet::new(), BTreeSet::new());
     let mut buses = Vec::new();
     for mut table in tables {
@@ -48,6 +49,7 @@ pub(crate) fn read_buses(top: &mut Table<'_>) -> Vec<Option<Bus>> {
     buses
 }
 
+/// The kernel's own rules for interface names, so that opening it can only fail because it is not there.
 fn read_interface(table: &mut Table<'_>) -> Option<String> {
     let expected = "the name of a network interface, 1 to 15 bytes, such as \"can0\"";
     let interface = table.text("interface", expected)?;
@@ -86,6 +88,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
     let tables = top.tables("servo");
     let mut bound_joints = BTreeSet::new();
     let mut nodes = BTreeSet::new();
+    // Buses that carry a servo.
     let mut busy = BTreeSet::new();
     let mut servos = Vec::new();
     for mut table in tables {
@@ -113,6 +116,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
             );
         }
     }
+    // An idle bus would be locked, opened and watched for nothing, and is most often a servo with the wrong bus.
     for (i, bus) in buses.iter().enumerate().filter(|(i, _)| !busy.contains(i)) {
         if let Some(bus) = bus {
             top.book().add(
@@ -129,6 +133,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
 
 fn read_joint(table: &mut Table<'_>, robot: Option<&Robot>, bound: &mut BTreeSet<usize>) -> Option<usize> {
     let name = table.text("joint", "the name of a joint of the robot")?;
+    // Without a robot there is nothing to hold the name against; its own faults say why there is none.
     let robot = robot?;
     let Some(index) = robot.joints.iter().position(|joint| joint.name == name) else {
         let names: Vec<&str> = robot.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -157,6 +162,7 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
     index
 }
 
+/// Nothing here has a default: each of these moves metal, or says how it falls.
 fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -> Option<Servo> {
     let node_id = table.integer("node_id", NODE_ID[0], NODE_ID[1]);
     let protocol = read_protocol(table);
@@ -209,6 +215,7 @@ fn check_counts(table: &Table<'_>, servo: &Servo, robot: &Robot) {
     let Some(joint) = robot.joints.get(servo.joint) else { return };
     let counts_per_rad = servo.sign * servo.gear_ratio * servo.counts_per_rev / TAU;
     for position_rad in joint.limits.position_rad {
+        // The same arithmetic as the codec's; rounding moves it by half a count at most.
         let counts = (position_rad - servo.zero_offset_rad) * counts_per_rad;
         if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts.round()) {
             let value = format!("{:?}", servo.counts_per_rev);

@@ -1,4 +1,6 @@
 //! Settings that only make sense together.
+//!
+//! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
 use crate::bus_load::REFUSED_PERCENT;
 use crate::reader::Book;
 use crate::settings::{Cycle, Settings, Supervision};
@@ -8,6 +10,7 @@ pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision)
     let period_ms = f64::from(cycle.period_us) * 1e-3;
     let gap_ms = f64::from(cycle.tolerated_gap_periods) * period_ms;
     let (watchdog_ms, stall_ms) = (cycle.drive_watchdog_ms, cycle.stall_resume_ms);
+    // A gap that trips the drives cannot be one that they bridge.
     if f64::from(watchdog_ms) <= gap_ms {
         let expected =
             format!("more than the tolerated gap of {gap_ms} ms (tolerated_gap_periods x period_us)");

@@ -10,7 +10,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use taustream_motion::chain::Chain;
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
-/// Poses that a pair must touch in.
+/// Poses that a pair must touch in. A pair that parts in one pose of ten thousand has a chance of about a third
+/// (1/e) to be taken for one that never does; `check` lists every allowed pair, for a person to look at.
 pub(crate) const POSES: usize = 10_000;
 
 const SEED: u64 = 0x7461_7573_7472_6561;
@@ -31,6 +32,7 @@ pub(crate) fn allowed_by_rule(
 
 fn always_touching(chain: &Chain, shapes: &[LinkShape], limits: &[JointLimits]) -> Vec<(usize, usize)> {
     let solid: Vec<(&LinkShape, Segment)> = shapes.iter().filter_map(|s| Some((s, segment(s)?))).collect();
+    // Shapes of one link are rigid with each other, and neighbours are allowed already.
     let mut pairs: Vec<(usize, usize)> = Vec::new();
     for (i, (a, _)) in solid.iter().enumerate() {
         let partners = solid.iter().enumerate().skip(i + 1);
@@ -51,6 +53,7 @@ fn always_touching(chain: &Chain, shapes: &[LinkShape], limits: &[JointLimits]) 
                 None => *segment,
             })
             .collect();
+        // Pairs that have parted once are out; most are out after a few poses, so the rest costs little.
         pairs.retain(|(i, j)| match (placed.get(*i), placed.get(*j)) {
             (Some(a), Some(b)) => distance_m(&a.ends, &b.ends) <= a.radius_m + b.radius_m,
             _ => false,
@@ -108,6 +111,7 @@ pub(crate) fn distance_m(first: &[Point3<f64>; 2], second: &[Point3<f64>; 2]) ->
             // Parallel segments: any point of the first will do to start from.
             let s = if denominator > 0.0 { ((b * f - c * e) / denominator).clamp(0.0, 1.0) } else { 0.0 };
             let t = (b * s + f) / e;
+            // The nearest point of the second line lies beyond an end: take the end, and go back to the first.
             if t < 0.0 {
                 ((-c / a).clamp(0.0, 1.0), 0.0)
             } else if t > 1.0 {

@@ -57,6 +57,7 @@ impl Description {
     pub(crate) fn read(book: &Book, node: Node) -> Option<Self> {
         let mut top = Table::top(book, node)?;
         let name = top.name("name");
+        // Rows are not asked for when a URDF was to give the geometry: one fault says it, not one a joint.
         let from_urdf = refuse_urdf(&mut top);
         let tables = top.tables("joint");
         let count = tables.len();
@@ -67,9 +68,9 @@ impl Description {
             tables.into_iter().map(|table| read_joint(table, from_urdf)).collect();
         let allowed = read_contacts(&mut top, count);
         top.done();
+        check_names(book, &rows);
+        check_kinds(book, &rows);
         let joints: Vec<JointRow> = rows.into_iter().flatten().collect();
-        check_names(book, &joints);
-        check_kinds(book, &joints);
         book.is_clean().then_some(Self { name: name?, joints, allowed_contacts: allowed })
     }
 }
@@ -88,6 +89,7 @@ fn refuse_urdf(top: &mut Table<'_>) -> bool {
     found
 }
 
+/// Every key is read before the first `?`, so that one fault does not hide the next.
 fn read_joint(mut table: Table<'_>, from_urdf: bool) -> Option<JointRow> {
     let name = table.name("name");
     let row = read_row(&mut table, from_urdf);
@@ -131,6 +133,7 @@ fn read_row(table: &mut Table<'_>, from_urdf: bool) -> Option<(RowKind, [f64; 4]
             return None;
         }
         (None, None) => {
+            // A row that is there but is no table was refused as such already.
             if !from_urdf && !table.had("dh") && !table.had("mdh") {
                 table.fault("dh", "missing", &format!("{KEYS} (or mdh, the modified convention)"));
             }
@@ -145,6 +148,7 @@ fn read_row(table: &mut Table<'_>, from_urdf: bool) -> Option<(RowKind, [f64; 4]
     Some((kind, [a_m?, alpha_rad?, d_m?, theta_offset_rad?]))
 }
 
+/// No default: what plans may ask of a joint is the owner's word, not ours.
 fn read_motion(mut table: Table<'_>) -> Option<LimitSet> {
     let velocity_rad_s = table.number("velocity_rad_s", &VELOCITY_RAD_S);
     let acceleration_rad_s2 = table.number("acceleration_rad_s2", &ACCELERATION_RAD_S2);
@@ -157,6 +161,7 @@ fn read_motion(mut table: Table<'_>) -> Option<LimitSet> {
     })
 }
 
+/// The design's ratios: in a_m + v_m |sigma'| <= a_s they leave one whole motion acceleration for slowing down.
 fn default_stop(motion: LimitSet) -> LimitSet {
     LimitSet {
         velocity_rad_s: motion.velocity_rad_s,
@@ -230,9 +235,11 @@ fn pair_of(item: &Node, joints: usize) -> Option<(usize, usize)> {
     (first != second).then_some((first.min(second), first.max(second)))
 }
 
-fn check_names(book: &Book, joints: &[JointRow]) {
-    for (i, joint) in joints.iter().enumerate() {
-        if joints.iter().take(i).any(|other| other.name == joint.name) {
+/// Settings bind servos by joint name: two of one name would leave a joint to chance.
+fn check_names(book: &Book, rows: &[Option<JointRow>]) {
+    for (i, joint) in rows.iter().enumerate() {
+        let Some(joint) = joint else { continue };
+        if rows.iter().take(i).flatten().any(|other| other.name == joint.name) {
             book.add(
                 None,
                 &format!("joint[{i}].name"),
@@ -244,20 +251,15 @@ fn check_names(book: &Book, joints: &[JointRow]) {
 }
 
 /// One arm has one convention: a mixed table is a copying mistake, and a silent one.
-fn check_kinds(book: &Book, joints: &[JointRow]) {
-    let Some(first) = joints.first() else { return };
-    for (i, joint) in joints.iter().enumerate() {
-        if joint.kind != first.kind {
-            let (key, other) = match joint.kind {
-                RowKind::Standard => ("dh", "mdh"),
-                RowKind::Modified => ("mdh", "dh"),
-            };
-            book.add(
-                None,
-                &format!("joint[{i}].{key}"),
-                "a row",
-                &format!("{other}, as in joint[0]: one convention for the whole arm"),
-            );
-        }
+fn check_kinds(book: &Book, rows: &[Option<JointRow>]) {
+    let Some(first) = rows.iter().flatten().next() else { return };
+    for (i, joint) in rows.iter().enumerate() {
+        let Some(joint) = joint.as_ref().filter(|joint| joint.kind != first.kind) else { continue };
+        let (key, other) = match joint.kind {
+            RowKind::Standard => ("dh", "mdh"),
+            RowKind::Modified => ("mdh", "dh"),
+        };
+        let expected = format!("{other}, as in joint {:?}: one convention for the whole arm", first.name);
+        book.add(None, &format!("joint[{i}].{key}"), "a row", &expected);
     }
 }

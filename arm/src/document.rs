@@ -28,6 +28,7 @@ pub(crate) struct Node {
 #[derive(Clone, Debug)]
 pub(crate) enum Value {
     Flag(bool),
+    /// Kept apart from numbers: a node id of 1.5 is a fault, and 64-bit integers lose digits as f64.
     Integer(i64),
     Number(f64),
     Text(String),
@@ -101,6 +102,7 @@ pub(crate) fn read_file(file: &Path, bytes_max: u64, what: &str) -> Result<Vec<u
     if !facts.is_file() {
         return Err(fault("not a regular file", what));
     }
+    // One byte more than allowed tells a file that is too long from one that just fits, whatever its metadata says.
     let mut bytes = Vec::new();
     let mut source = std::fs::File::open(file).map_err(refused)?.take(bytes_max + 1);
     source.read_to_end(&mut bytes).map_err(refused)?;
@@ -120,7 +122,7 @@ pub(crate) fn read_text(file: &Path, what: &str) -> Result<String, Faults> {
     })
 }
 
-/// A path of a file as another file names it: relative to that file's folder.
+/// A path of a file, as another file names it: relative to that file's folder.
 pub(crate) fn beside(file: &Path, named: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(named)
 }
@@ -164,8 +166,10 @@ fn from_table(table: &DeTable<'_>, lines: &Lines) -> Value {
 fn from_value(value: &DeValue<'_>, lines: &Lines) -> Value {
     match value {
         DeValue::String(text) => Value::Text(text.to_string()),
+        // An integer beyond 64 bits is beyond every bound too: infinity makes the walker say so.
         DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
             .map_or(Value::Number(f64::INFINITY), Value::Integer),
+        // The parser let only floats through; should one not read back, it is refused like any NaN.
         DeValue::Float(float) => Value::Number(float.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(flag) => Value::Flag(*flag),
         DeValue::Datetime(date) => Value::Other(format!("the date {date}")),
@@ -194,6 +198,7 @@ pub(crate) fn parse_json(file: &Path, text: &str) -> Result<Node, Faults> {
             Some(key) => Err(Faults(vec![Fault::new(file, &key, "stands there twice", "each key once")])),
         },
         Err(e) => {
+            // The trail is left as it was when the reader gave up, and so names the value that is no JSON.
             let key = trail.keys.borrow().concat();
             let key = key.trim_start_matches('.');
             let expected = format!("JSON with finite numbers ({e})");
@@ -226,6 +231,7 @@ struct Trail {
     twice: RefCell<Option<String>>,
 }
 
+/// Reads one value with everything below it; nesting is bounded by the parser (128 levels).
 struct NodeSeed<'t> {
     trail: &'t Trail,
 }
@@ -276,6 +282,7 @@ impl<'de> Visitor<'de> for NodeSeed<'_> {
         let mut seen = std::collections::BTreeSet::new();
         while let Some(key) = source.next_key::<String>()? {
             self.trail.keys.borrow_mut().push(format!(".{}", key_shown(&key)));
+            // Reading goes on: a later syntax fault matters more.
             if !seen.insert(key.clone()) {
                 let path = self.trail.keys.borrow().concat();
                 self.trail.twice.borrow_mut().get_or_insert(path.trim_start_matches('.').to_owned());

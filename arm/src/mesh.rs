@@ -62,9 +62,11 @@ type Soup = (Vec<[f32; 3]>, Vec<[usize; 3]>);
 /// A binary file's length follows from its count, and that decides the format: the customary test, whether it begins
 /// with `solid`, takes many binary files for text.
 fn read_stl(mut bytes: Vec<u8>) -> Result<Soup, Refusal> {
+    // Checked against the length before anything is allocated: the count is any number up to four thousand million.
     let count = bytes.get(80..STL_HEADER_BYTES).and_then(|c| c.try_into().ok()).map_or(0, u32::from_le_bytes);
     let binary_bytes = STL_HEADER_BYTES as u64 + u64::from(count) * STL_TRIANGLE_BYTES as u64;
     if bytes.len() as u64 == binary_bytes {
+        // The reader looks for `solid` itself; the header of a binary file means nothing.
         bytes.iter_mut().take(5).for_each(|b| *b = b' ');
     } else if !bytes.starts_with(b"solid ") {
         let value = format!("is {} bytes long, and its header means {binary_bytes}", bytes.len());
@@ -88,7 +90,7 @@ fn read_obj(bytes: &[u8]) -> Result<Soup, Refusal> {
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    // Faces of more corners become fans, which cover at least the face, also a hollow one. Materials are other files;
+    // Points and lines have no inside. Faces of more corners become fans, which cover at least the face, also a hollow one. Materials are other files;
     // none is opened.
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
@@ -105,6 +107,7 @@ fn read_obj(bytes: &[u8]) -> Result<Soup, Refusal> {
 }
 
 fn check(corners: Vec<[f32; 3]>, triangles: Vec<[usize; 3]>, scale: f64) -> Result<Mesh, Refusal> {
+    // An obstacle without triangles would be no obstacle at all, and nobody would notice.
     if triangles.is_empty() {
         return Err(("has no triangles".to_owned(), "a mesh of at least one triangle".to_owned()));
     }
@@ -133,6 +136,7 @@ fn check(corners: Vec<[f32; 3]>, triangles: Vec<[usize; 3]>, scale: f64) -> Resu
     Ok(Mesh { vertices_m, triangles: checked })
 }
 
+/// The triangle with small indices; `None` when a corner does not exist or the area is next to nothing.
 fn check_triangle(vertices_m: &[Point3<f64>], triangle: [usize; 3]) -> Option<[u32; 3]> {
     let [a, b, c] = triangle;
     let (pa, pb, pc) = (vertices_m.get(a)?, vertices_m.get(b)?, vertices_m.get(c)?);

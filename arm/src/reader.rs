@@ -14,6 +14,7 @@ const FAULTS_MAX: usize = 100;
 pub(crate) struct Book {
     file: PathBuf,
     faults: RefCell<Vec<Fault>>,
+    /// How many were left out.
     further: RefCell<usize>,
 }
 
@@ -40,6 +41,7 @@ impl Book {
             *self.further.borrow_mut() += 1;
         }
     }
+    /// True while no fault was noted: only then may something be built of what was read.
     pub(crate) fn is_clean(&self) -> bool {
         self.faults.borrow().is_empty()
     }
@@ -79,6 +81,7 @@ impl Bounds {
         Self { low, high, low_excluded: true, unit }
     }
     fn hold(&self, number: f64) -> bool {
+        // NaN fails every comparison, so it is out of any bounds.
         let low_kept = if self.low_excluded { number > self.low } else { number >= self.low };
         number.is_finite() && low_kept && number <= self.high
     }
@@ -186,6 +189,7 @@ impl<'b> Table<'b> {
     }
     /// The value of a key, if it stands there.
     pub(crate) fn take(&mut self, key: &'static str) -> Option<Node> {
+        // The order of what is left does not matter: it can only be unknown keys.
         let at = self.entries.iter().position(|entry| entry.key == key);
         let node = at.map(|at| self.entries.swap_remove(at).node);
         let line = node.as_ref().and_then(|node| node.line);
@@ -200,6 +204,7 @@ impl<'b> Table<'b> {
         }
         node
     }
+    /// The number of a key; its absence is a fault.
     pub(crate) fn number(&mut self, key: &'static str, bounds: &Bounds) -> Option<f64> {
         let node = self.need(key, &bounds.words())?;
         number_of(self.book, &self.path_of(key), &node, bounds)
@@ -211,10 +216,12 @@ impl<'b> Table<'b> {
             Some(node) => number_of(self.book, &self.path_of(key), &node, bounds),
         }
     }
+    /// Exactly `N` numbers; their absence is a fault.
     pub(crate) fn numbers<const N: usize>(&mut self, key: &'static str, bounds: &Bounds) -> Option<[f64; N]> {
         let node = self.need(key, &format!("a list of {N} numbers"))?;
         numbers_of(self.book, &self.path_of(key), &node, N, bounds)?.try_into().ok()
     }
+    /// Exactly `N` numbers, or the default when the key is absent; `None` only after a fault.
     pub(crate) fn numbers_or<const N: usize>(
         &mut self,
         key: &'static str,
@@ -239,6 +246,7 @@ impl<'b> Table<'b> {
         );
         None
     }
+    /// The integer of a key; its absence is a fault, and so is a number with a point.
     pub(crate) fn integer(&mut self, key: &'static str, low: i64, high: i64) -> Option<i64> {
         let node = self.need(key, &format!("an integer from {low} to {high}"))?;
         self.integer_of(key, &node, low, high)
@@ -258,6 +266,7 @@ impl<'b> Table<'b> {
         }
         self.refuse(key, node, &format!("an integer from {low} to {high}"))
     }
+    /// True or false; never taken from a number or a word.
     pub(crate) fn flag(&mut self, key: &'static str) -> Option<bool> {
         let node = self.need(key, "true or false")?;
         if let Value::Flag(flag) = node.value {
@@ -265,6 +274,7 @@ impl<'b> Table<'b> {
         }
         self.refuse(key, &node, "true or false")
     }
+    /// A text that is not empty; its absence is a fault.
     pub(crate) fn text(&mut self, key: &'static str, expected: &str) -> Option<String> {
         let node = self.need(key, expected)?;
         self.text_of(key, &node, expected)
