@@ -161,7 +161,7 @@ fn read_motion(mut table: Table<'_>) -> Option<LimitSet> {
     })
 }
 
-/// The design's ratios: in a_m + v_m |sigma'| <= a_s they leave one whole motion acceleration for slowing down.
+/// The design's ratios: where `a_m + v_m |sigma'| <= a_s`, they leave one whole motion acceleration for slowing down.
 fn default_stop(motion: LimitSet) -> LimitSet {
     LimitSet {
         velocity_rad_s: motion.velocity_rad_s,
