@@ -14,8 +14,13 @@ use crate::limits::{LimitViolation, POSITION_TOLERANCE_RAD, Peaks, Quantity, TOL
 use crate::stroke::{Phi, power};
 use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
 
-/// Most evaluations of one stroke that a proof may take.
-const WORK_MAX: usize = 4_000_000;
+/// Most evaluations that a proof may take, of one stroke each; an interval counts as [`INTERVAL_WORK`] more. The densest
+/// messages, at their limits, need about half.
+const WORK_MAX: usize = 5_000_000;
+/// How much of it sharper peaks may take: they are a service, not a part of the proof.
+const PEAK_WORK: usize = 1_000_000;
+/// What it costs to judge an interval, in evaluations of one stroke.
+const INTERVAL_WORK: usize = 8;
 /// Most halvings of one piece: 2^-40 of a day is 80 ns.
 const DEPTH_MAX: u32 = 40;
 /// Reported peaks are at most this much above the true ones, relatively ..
@@ -178,7 +183,7 @@ impl<'a> Proof<'a> {
                 rate_k *= rate;
             }
         }
-        self.work += self.running_count.max(1);
+        self.work += self.running_count + INTERVAL_WORK;
         jet
     }
 
@@ -275,8 +280,7 @@ impl<'a> Proof<'a> {
         if let Some(violation) = fails {
             return Verdict::Fails(violation);
         }
-        // Sharper peaks are a service, not a part of the proof: they get half of the work.
-        if coarse && may_halve && self.work < WORK_MAX / 2 {
+        if coarse && may_halve && self.work < PEAK_WORK {
             return Verdict::Halve;
         }
         for (bound, new) in self.bound.iter_mut().zip(&bounds) {

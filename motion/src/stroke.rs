@@ -96,6 +96,7 @@ impl Phi {
     /// n > 3 leaves a factor of s or of u everywhere. A smaller n counts as [`N_MIN`].
     ///
     /// Real time: at most six squarings, no library call.
+    #[inline]
     #[must_use]
     pub fn at(n: u32, s: f64) -> Self {
         let n = n.max(N_MIN);
@@ -103,23 +104,21 @@ impl Phi {
         let (s2, a, b) = (s * s, m - 1.0, m - 2.0);
         let x = s2 * s2;
         let u = 1.0 - x;
-        // One power serves all four: the rest are factors of u.
-        let p3 = power(u, n - 3);
-        let p2 = p3 * u;
-        let p1 = p2 * u;
+        let u2 = u * u;
         let c = 4.0 * m * s;
-        Self {
-            value: 1.0 - p1 * u,
-            d1: c * s2 * p1,
-            d2: c * s * p2 * (3.0 * u - 4.0 * a * x),
-            d3: c * p3 * (6.0 * u * u + a * x * (16.0 * b * x - 36.0 * u)),
-        }
+        // What does not need the power comes first in each product, so that it is ready when the power is.
+        let (f1, f2) = (c * s2, c * s * (3.0 * u - 4.0 * a * x));
+        let f3 = c * (6.0 * u2 + a * x * (16.0 * b * x - 36.0 * u));
+        // One power serves all four.
+        let p3 = power(u, n - 3);
+        Self { value: 1.0 - p3 * (u2 * u), d1: p3 * u2 * f1, d2: p3 * u * f2, d3: p3 * f3 }
     }
 }
 
 /// base^exponent by repeated squaring, always in the same order, so that every machine gets the same bits.
 ///
 /// Real time: as many steps as the exponent has bits.
+#[inline]
 #[must_use]
 pub fn power(base: f64, exponent: u32) -> f64 {
     let (mut result, mut square, mut left) = (1.0, base, exponent);
@@ -159,8 +158,24 @@ impl Stroke {
         if t_s <= self.start_s {
             return Phi::BEFORE;
         }
-        // Rounding may lift the quotient just above 1; clamp, unlike min, hands a NaN on.
-        Phi::at(self.n, ((t_s - self.start_s) / self.duration_s).clamp(0.0, 1.0))
+        self.running_phi(t_s, 1.0 / self.duration_s)
+    }
+
+    /// What the stroke adds to position, velocity, acceleration and jerk for each radian of delta, while it runs: only
+    /// between its start and its end.
+    #[inline]
+    pub(crate) fn shares(&self, t_s: f64) -> [f64; 4] {
+        let rate = 1.0 / self.duration_s;
+        let phi = self.running_phi(t_s, rate);
+        let rate2 = rate * rate;
+        [phi.value, phi.d1 * rate, phi.d2 * rate2, phi.d3 * (rate2 * rate)]
+    }
+
+    #[inline]
+    fn running_phi(&self, t_s: f64, rate: f64) -> Phi {
+        let s = (t_s - self.start_s) * rate;
+        // Rounding may lift it just above 1; written so that a NaN is handed on, which `min` would not do.
+        Phi::at(self.n, if s > 1.0 { 1.0 } else { s })
     }
 
     /// Checks one stroke of an arm with `joints` joints.

@@ -148,25 +148,64 @@ impl Trajectory {
 
     /// The one sampling loop: `reached_rad` is the pose after the strokes in front of `first`, which have ended.
     fn sample_from(&self, first: usize, reached_rad: &JointArray, t_s: f64) -> Setpoint {
-        let mut setpoint = Setpoint { position_rad: *reached_rad, ..Setpoint::default() };
-        for stroke in self.strokes().get(first..).unwrap_or(&[]) {
-            if t_s <= stroke.start_s {
-                break; // Sorted by start: nothing behind it has begun.
+        let mut reached_rad = *reached_rad;
+        let mut strokes = self.strokes().get(first..).unwrap_or(&[]);
+        let stroke = loop {
+            let [stroke, behind @ ..] = strokes else { return at_rest(&reached_rad) };
+            strokes = behind;
+            if !stroke.has_ended(t_s) {
+                break stroke;
             }
-            if stroke.has_ended(t_s) {
-                add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, 1.0);
-                continue;
-            }
-            let phi = stroke.phi(t_s);
-            let rate = 1.0 / stroke.duration_s;
-            let rate2 = rate * rate;
-            add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, phi.value);
-            add_scaled(&mut setpoint.velocity_rad_s, &stroke.delta_rad, phi.d1 * rate);
-            add_scaled(&mut setpoint.acceleration_rad_s2, &stroke.delta_rad, phi.d2 * rate2);
-            add_scaled(&mut setpoint.jerk_rad_s3, &stroke.delta_rad, phi.d3 * rate2 * rate);
+            add_scaled(&mut reached_rad, &stroke.delta_rad, 1.0);
+        };
+        if t_s <= stroke.start_s {
+            return at_rest(&reached_rad); // Sorted by start: nothing behind it has begun.
         }
+        let alone = strokes.first().is_none_or(|next| t_s <= next.start_s);
+        if alone {
+            // The common case writes the setpoint once: nothing is cleared first only to be added to.
+            return of_stroke(&reached_rad, stroke, t_s);
+        }
+        let mut setpoint = of_stroke(&reached_rad, stroke, t_s);
+        add_running(&mut setpoint, strokes, t_s);
         setpoint
     }
+}
+
+/// What one running stroke does to a pose.
+#[inline(always)]
+fn of_stroke(from_rad: &JointArray, stroke: &Stroke, t_s: f64) -> Setpoint {
+    let [p, v, a, j] = stroke.shares(t_s);
+    let mut position_rad = *from_rad;
+    add_scaled(&mut position_rad, &stroke.delta_rad, p);
+    Setpoint {
+        position_rad,
+        velocity_rad_s: stroke.delta_rad.map(|delta| delta * v),
+        acceleration_rad_s2: stroke.delta_rad.map(|delta| delta * a),
+        jerk_rad_s3: stroke.delta_rad.map(|delta| delta * j),
+    }
+}
+
+/// Adds the strokes behind the first running one, in their order.
+fn add_running(setpoint: &mut Setpoint, strokes: &[Stroke], t_s: f64) {
+    for stroke in strokes {
+        if t_s <= stroke.start_s {
+            break;
+        }
+        if stroke.has_ended(t_s) {
+            add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, 1.0);
+            continue;
+        }
+        let [p, v, a, j] = stroke.shares(t_s);
+        add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, p);
+        add_scaled(&mut setpoint.velocity_rad_s, &stroke.delta_rad, v);
+        add_scaled(&mut setpoint.acceleration_rad_s2, &stroke.delta_rad, a);
+        add_scaled(&mut setpoint.jerk_rad_s3, &stroke.delta_rad, j);
+    }
+}
+
+fn at_rest(position_rad: &JointArray) -> Setpoint {
+    Setpoint { position_rad: *position_rad, ..Setpoint::default() }
 }
 
 /// What rounding can take from a difference of two values of phi.

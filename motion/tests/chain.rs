@@ -48,7 +48,7 @@ const UR5: [Row; 6] = [
     [0.0, 0.0, 0.0823, 0.0],
 ];
 
-/// The AgileX Piper's modified rows (vendor SDK 0.6.2, arms with the 2-degree offset).
+/// The modified rows of the Piper arm (vendor SDK 0.6.2, arms with the 2-degree offset).
 fn piper() -> [Row; 6] {
     let deg = PI / 180.0;
     [
