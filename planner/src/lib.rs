@@ -13,6 +13,7 @@ pub mod pipeline;
 pub mod plan;
 pub mod refine;
 pub mod send;
+pub mod service;
 pub mod shortcut;
 pub mod timing;
 pub mod tree;

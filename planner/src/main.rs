@@ -1,2 +1,71 @@
-//! The planner process.
-fn main() {}
+//! `taustream-planner`: answers replan requests for one arm.
+use anyhow::{Context, Result};
+use clap::Parser;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::io::Write;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use taustream_arm::{Faults, Kind, Scene, Settings, find};
+use taustream_messages::service::Wire;
+use taustream_planner::service::Service;
+
+/// Plans motions for one arm: answers `taustream replan` and hands verified motions to the streamer.
+///
+/// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted goes on to its end.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Example: taustream-planner --settings config/settings/vcan6.toml\n\n\
+    SIGTERM or SIGINT end it. Log lines go to stderr; RUST_LOG=debug shows more."
+)]
+struct Arguments {
+    /// Settings of the arm's controller: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    settings: String,
+    /// Another scene than the settings name: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<String>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+    let settings = match load(&arguments) {
+        Ok(settings) => settings,
+        Err(faults) => {
+            tracing::error!("{faults}");
+            return ExitCode::from(2);
+        }
+    };
+    match run(&settings) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            tracing::error!("{e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn load(arguments: &Arguments) -> Result<Settings, Faults> {
+    let mut settings = Settings::load(&find(Kind::Settings, &arguments.settings)?)?;
+    if let Some(scene) = &arguments.scene {
+        settings.scene = Scene::load(&find(Kind::Scene, scene)?)?;
+    }
+    Ok(settings)
+}
+
+fn run(settings: &Settings) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).context("cannot take signals")?;
+    }
+    let wire = Wire::join(&settings.name, "taustream-planner")?;
+    let mut service = Service::open(&wire, &settings.robot, &settings.scene, &stop)?;
+    let (name, robot, obstacles) = (&settings.name, &settings.robot.name, settings.scene.obstacles.len());
+    writeln!(std::io::stdout(), "taustream-planner ready: arm {name}, {robot}, {obstacles} obstacles")?;
+    std::io::stdout().flush()?;
+    service.serve();
+    Ok(())
+}

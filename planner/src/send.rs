@@ -1,9 +1,25 @@
 //! Hands a trajectory to the streamer and waits for its receipt.
-use std::time::Duration;
+//!
+//! The generation comes from the streamer's newest report, never from memory: a planner that was killed and started
+//! again goes on where the streamer is. Reports are waited for, not taken from the queue, so that one which a dead
+//! streamer left behind is never believed.
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+use std::thread;
+use std::time::{Duration, Instant};
 use taustream_arm::Robot;
-use taustream_messages::Receipt;
-use taustream_messages::service::{ServiceError, Wire};
+use taustream_messages::service::{
+    ReceiptSubscriber, ReportSubscriber, ServiceError, TrajectoryPublisher, Wire,
+};
+use taustream_messages::{CheckedTrajectory, Phase, Receipt, Replaces, Report, TrajectoryMessage};
 use taustream_motion::Trajectory;
+
+/// How often a wait looks for what it waits for.
+const POLL: Duration = Duration::from_millis(2);
+/// A streamer that sends no report for this long is not running.
+pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
+/// Ids stay below 2^53, so that JSON readers with f64 numbers keep them exact.
+const ID_BITS: u32 = 53;
 
 /// A trajectory that was published.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,9 +46,11 @@ pub enum SendError {
         /// Ours.
         ours: String,
     },
-    /// Publishing failed.
-    #[error("the trajectory could not be published: {why}")]
-    Publish {
+    /// Shared memory refused in the middle of it.
+    #[error("the trajectory could not be handed over: cannot {what}: {why}")]
+    Transport {
+        /// What was tried.
+        what: &'static str,
         /// iceoryx2's reason.
         why: String,
     },
@@ -43,10 +61,146 @@ pub enum SendError {
 /// # Errors
 /// When no streamer runs, it drives another robot, or shared memory refuses.
 pub fn send_trajectory(
-    _wire: &Wire,
-    _robot: &Robot,
-    _trajectory: &Trajectory,
-    _timeout: Duration,
+    wire: &Wire,
+    robot: &Robot,
+    trajectory: &Trajectory,
+    timeout: Duration,
 ) -> Result<SentTrajectory, SendError> {
-    todo!("planner")
+    Outbox::open(wire)?.send(robot, trajectory, Replaces::Rest, timeout)
+}
+
+/// The ports through which trajectories go out and answers come back.
+#[derive(Debug)]
+pub struct Outbox<'a> {
+    wire: &'a Wire,
+    trajectories: TrajectoryPublisher,
+    receipts: ReceiptSubscriber,
+    reports: ReportSubscriber,
+}
+
+impl<'a> Outbox<'a> {
+    /// Opens the ports. Nobody needs to listen yet.
+    ///
+    /// # Errors
+    /// When shared memory refuses.
+    pub fn open(wire: &'a Wire) -> Result<Self, SendError> {
+        // The receipt's port first: it must be there before anything that is answered.
+        let (receipts, reports) = (wire.receipt_subscriber()?, wire.report_subscriber()?);
+        Ok(Self { wire, trajectories: wire.trajectory_publisher()?, receipts, reports })
+    }
+
+    /// The newest report that has arrived since the last call, if there is one that makes sense.
+    ///
+    /// # Errors
+    /// When shared memory refuses.
+    pub fn newest_report(&self) -> Result<Option<(Report, Phase)>, SendError> {
+        let mut newest = None;
+        while let Some(sample) = self.reports.receive().map_err(|e| transport("receive reports", &e))? {
+            // Copied out before it is checked.
+            let report = *sample.payload();
+            if let Some((report, phase)) = report.checked() {
+                newest = Some((*report, phase));
+            }
+        }
+        Ok(newest)
+    }
+
+    /// A report that was published after this call, within `timeout`.
+    ///
+    /// # Errors
+    /// `NotRunning` when none comes.
+    pub fn fresh_report(&self, timeout: Duration) -> Result<(Report, Phase), SendError> {
+        self.newest_report()?;
+        let since = Instant::now();
+        loop {
+            if let Some(found) = self.newest_report()? {
+                return Ok(found);
+            }
+            if since.elapsed() > timeout {
+                return Err(self.wire.not_running("taustream-streamer").into());
+            }
+            thread::sleep(POLL);
+        }
+    }
+
+    /// Publishes a trajectory under the next generation, and waits up to `timeout` for its receipt.
+    ///
+    /// # Errors
+    /// When no streamer runs, it drives another robot, or shared memory refuses.
+    pub fn send(
+        &self,
+        robot: &Robot,
+        trajectory: &Trajectory,
+        replaces: Replaces,
+        timeout: Duration,
+    ) -> Result<SentTrajectory, SendError> {
+        let (report, _) = self.fresh_report(REPORT_WITHIN)?;
+        check_robot(robot, &report)?;
+        let (trajectory_id, generation) = (random_id(), report.generation.saturating_add(1));
+        let message = TrajectoryMessage::new(&CheckedTrajectory {
+            trajectory_id,
+            generation,
+            robot_digest: robot.digest,
+            replaces,
+            trajectory: trajectory.clone(),
+        });
+        let heard = self.trajectories.send_copy(*message).map_err(|e| transport("publish it", &e))?;
+        if heard == 0 {
+            return Err(self.wire.not_running("taustream-streamer").into());
+        }
+        let receipt = self.receipt(trajectory_id, timeout)?;
+        Ok(SentTrajectory { trajectory_id, generation, receipt })
+    }
+
+    fn receipt(&self, trajectory_id: u64, timeout: Duration) -> Result<Option<Receipt>, SendError> {
+        let since = Instant::now();
+        loop {
+            while let Some(sample) = self.receipts.receive().map_err(|e| transport("receive receipts", &e))? {
+                let receipt = *sample.payload();
+                if receipt.trajectory_id() == trajectory_id {
+                    return Ok(Some(receipt));
+                }
+            }
+            if since.elapsed() > timeout {
+                return Ok(None);
+            }
+            thread::sleep(POLL);
+        }
+    }
+}
+
+/// Refuses a robot that is not the streamer's.
+///
+/// # Errors
+/// `WrongRobot` with both digests.
+pub fn check_robot(robot: &Robot, report: &Report) -> Result<(), SendError> {
+    if report.robot_digest == robot.digest {
+        return Ok(());
+    }
+    let streamer: String = report.robot_digest.iter().map(|b| format!("{b:02x}")).collect();
+    Err(SendError::WrongRobot { streamer, ours: robot.digest_hex() })
+}
+
+fn transport(what: &'static str, why: &dyn std::fmt::Debug) -> SendError {
+    SendError::Transport { what, why: format!("{why:?}") }
+}
+
+/// A random id from 1 to 2^53 - 1. The standard library's hash keys are the operating system's random numbers.
+fn random_id() -> u64 {
+    let mut hasher = RandomState::new().build_hasher();
+    hasher.write_u32(std::process::id());
+    (hasher.finish() >> (u64::BITS - ID_BITS)).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn ids_are_in_range_and_do_not_repeat() {
+        let ids: BTreeSet<u64> = (0..1_000).map(|_| random_id()).collect();
+        assert_eq!(ids.len(), 1_000);
+        assert!(ids.iter().all(|id| (1..1 << ID_BITS).contains(id)));
+    }
 }

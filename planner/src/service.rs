@@ -1,0 +1,314 @@
+//! The replan service: one request after the other, from the streamer's true state.
+//!
+//! A request is answered from a report that was published after it arrived. At rest the motion starts at the
+//! commanded pose; while a motion runs, `AfterCurrent` plans from its end and waits until it has ended, and `AtOnce`
+//! asks the streamer to cut, whose answer (this version of it: refused) is handed back. A motion whose requester has
+//! gone in the meantime is not sent: nobody waits for the arm to move.
+use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind, Task, plan_until};
+use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
+use crate::timing::stand_still;
+use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::prelude::ipc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+use taustream_arm::{Robot, Scene};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::service::{PlanServer, ServiceError, Wire};
+use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
+use taustream_motion::{JointArray, Trajectory};
+use tracing::{info, warn};
+
+/// How often the service looks for requests: what a user may feel of it is well below the planning time.
+const POLL: Duration = Duration::from_millis(5);
+/// Deadline of a request that states none.
+const DEADLINE_DEFAULT: Duration = Duration::from_millis(2_000);
+/// Longest deadline: others wait meanwhile.
+const DEADLINE_MAX: Duration = Duration::from_secs(60);
+/// How long the streamer may take for a receipt.
+const RECEIPT_WITHIN: Duration = Duration::from_secs(2);
+/// How long the place of a planner that was killed may stay taken in shared memory.
+const TAKE_OVER_WITHIN: Duration = Duration::from_secs(3);
+
+type Request = ActiveRequest<ipc::Service, PlanRequest, (), PlanReply, ()>;
+
+/// The planner of one arm.
+pub struct Service<'a> {
+    robot: &'a Robot,
+    scene: &'a Scene,
+    outbox: Outbox<'a>,
+    server: PlanServer,
+    stop: &'a AtomicBool,
+    seen: Seen,
+    waiting: Option<Waiting>,
+}
+
+/// A proven motion that waits for the end of the one that runs.
+struct Waiting {
+    request: Request,
+    plan: Plan,
+}
+
+/// What is known of the streamer between requests.
+#[derive(Default)]
+struct Seen {
+    at: Option<Instant>,
+    running: Option<bool>,
+}
+
+impl<'a> Service<'a> {
+    /// Opens the ports of an arm. The streamer may come later.
+    ///
+    /// # Errors
+    /// When shared memory refuses, for instance because a planner serves this arm already.
+    pub fn open(
+        wire: &'a Wire,
+        robot: &'a Robot,
+        scene: &'a Scene,
+        stop: &'a AtomicBool,
+    ) -> Result<Self, SendError> {
+        let server = take_server(wire)?;
+        let outbox = Outbox::open(wire)?;
+        Ok(Self { robot, scene, outbox, server, stop, seen: Seen::default(), waiting: None })
+    }
+
+    /// Serves until `stop` is set.
+    pub fn serve(&mut self) {
+        while !self.stop.load(Ordering::Relaxed) {
+            self.turn();
+            thread::sleep(POLL);
+        }
+        if let Some(waiting) = self.waiting.take() {
+            reply(&waiting.request, &failed("the planner was told to end before the running motion did"));
+        }
+    }
+
+    /// Looks at the streamer, at the motion that waits, and at one request.
+    fn turn(&mut self) {
+        match self.outbox.newest_report() {
+            Ok(newest) => {
+                self.seen.note(newest.is_some());
+                self.go_on(newest);
+            }
+            Err(e) => warn!("{e}"),
+        }
+        match self.server.receive() {
+            Ok(Some(request)) => self.take(request),
+            Ok(None) => {}
+            Err(e) => warn!("cannot take a request: {e:?}"),
+        }
+    }
+
+    fn take(&mut self, request: Request) {
+        // Copied out before it is checked.
+        let copy = *request.payload();
+        let answer = match CheckedPlanRequest::try_from(&copy) {
+            Ok(checked) => self.answer(&request, &checked),
+            Err(e) => Answer::Now(failed(&e.to_string())),
+        };
+        match answer {
+            Answer::Now(outcome) => reply(&request, &outcome),
+            Answer::Later(plan) => self.waiting = Some(Waiting { request, plan: *plan }),
+        }
+    }
+
+    fn answer(&self, request: &Request, asked: &CheckedPlanRequest) -> Answer {
+        match self.try_answer(request, asked) {
+            Ok(answer) => answer,
+            Err(reason) => Answer::Now(failed(&reason)),
+        }
+    }
+
+    fn try_answer(&self, request: &Request, asked: &CheckedPlanRequest) -> Result<Answer, String> {
+        let expected = self.robot.joints.len();
+        if asked.joints != expected {
+            let (got, robot) = (asked.joints, &self.robot.name);
+            return Err(format!("the goal has {got} joint values, {robot} has {expected} joints"));
+        }
+        let options = options(asked)?;
+        if self.waiting.is_some() {
+            return Err("another motion waits for the end of the running one; ask again after it".to_owned());
+        }
+        let (report, phase) = self.outbox.fresh_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
+        check_robot(self.robot, &report).map_err(|e| e.to_string())?;
+        match (phase, asked.when) {
+            (Phase::Holding, _) if report.energised == 1 => {
+                let plan = self.plan(report.command_rad, asked, &options)?;
+                Ok(Answer::Now(self.send(request, &plan)))
+            }
+            (Phase::Moving, When::AfterCurrent) => {
+                let plan = self.plan(report.end_rad, asked, &options)?;
+                info!("planned; waiting for the running motion to end");
+                Ok(Answer::Later(Box::new(plan)))
+            }
+            (Phase::Moving, When::AtOnce) => self.ask_for_cut(&report).map(Answer::Now),
+            _ => Err(not_ready(phase)),
+        }
+    }
+
+    /// Plans on a thread of its own: whatever goes wrong there, the service goes on.
+    fn plan(
+        &self,
+        start_rad: JointArray,
+        asked: &CheckedPlanRequest,
+        options: &PlanOptions,
+    ) -> Result<Plan, String> {
+        let task = Task { robot: self.robot, scene: self.scene, start_rad, goal_rad: asked.goal_rad };
+        let result = thread::scope(|scope| {
+            let worker = thread::Builder::new().name("plan".to_owned());
+            let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(self.stop)));
+            handle.map(thread::ScopedJoinHandle::join)
+        });
+        match result {
+            Ok(Ok(planned)) => planned.map_err(|e: PlanError| e.to_string()),
+            Ok(Err(_)) => Err("the planner has a fault and gave up on this goal; see its log".to_owned()),
+            Err(e) => Err(format!("the planner cannot start a thread: {e}")),
+        }
+    }
+
+    fn send(&self, request: &Request, plan: &Plan) -> PlanOutcome {
+        if !request.is_connected() {
+            return failed("whoever asked for the motion is gone; not sent");
+        }
+        match self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN) {
+            Ok(sent) => PlanOutcome::Planned {
+                trajectory_id: sent.trajectory_id,
+                planning_s: plan.planning_s,
+                duration_s: plan.proof.duration_s,
+                clearance_m: plan.proof.clearance_m,
+                strokes: u32::try_from(plan.trajectory.strokes().len()).unwrap_or(u32::MAX),
+                how: plan.how.clone(),
+                receipt: sent.receipt.map(Box::new),
+            },
+            Err(e) => failed(&e.to_string()),
+        }
+    }
+
+    /// Asks the streamer to cut the running motion. The message cannot repeat the begun strokes, which only the
+    /// streamer knows, and moves nothing; so no streamer can take it for a motion, and this one's answer is final.
+    fn ask_for_cut(&self, report: &Report) -> Result<PlanOutcome, String> {
+        let still: Trajectory = stand_still(self.robot.joints.len(), &report.end_rad)
+            .ok_or("the streamer reports an end pose that is no pose")?;
+        let replaces = Replaces::Cut { trajectory_id: report.trajectory_id, at_s: report.trajectory_s };
+        let sent =
+            self.outbox.send(self.robot, &still, replaces, RECEIPT_WITHIN).map_err(|e| e.to_string())?;
+        Ok(PlanOutcome::Planned {
+            trajectory_id: sent.trajectory_id,
+            planning_s: 0.0,
+            duration_s: 0.0,
+            clearance_m: 0.0,
+            strokes: 0,
+            how: "not planned: asked the streamer to cut the running motion".to_owned(),
+            receipt: sent.receipt.map(Box::new),
+        })
+    }
+
+    /// Sends the motion that waits when the arm has come to rest, or gives it up.
+    fn go_on(&mut self, newest: Option<(Report, Phase)>) {
+        let Some(waiting) = self.waiting.take() else { return };
+        let outcome = match newest {
+            _ if !waiting.request.is_connected() => {
+                info!("whoever asked for the waiting motion is gone; dropped");
+                return;
+            }
+            Some((_, Phase::Holding)) => self.send(&waiting.request, &waiting.plan),
+            Some((_, Phase::Moving)) => return self.waiting = Some(waiting),
+            None if self.seen.is_recent() => return self.waiting = Some(waiting),
+            Some((_, phase)) => failed(&format!("the running motion did not end: {}", not_ready(phase))),
+            None => failed("the streamer stopped reporting while a motion waited; start it again"),
+        };
+        reply(&waiting.request, &outcome);
+    }
+}
+
+enum Answer {
+    Now(PlanOutcome),
+    Later(Box<Plan>),
+}
+
+impl Seen {
+    fn note(&mut self, reported: bool) {
+        if reported {
+            self.at = Some(Instant::now());
+        }
+        let running = self.is_recent();
+        if self.running != Some(running) {
+            self.running = Some(running);
+            if running {
+                info!("the streamer reports");
+            } else {
+                info!("waiting for the streamer; start taustream-streamer with the same settings");
+            }
+        }
+    }
+
+    fn is_recent(&self) -> bool {
+        self.at.is_some_and(|at| at.elapsed() <= REPORT_WITHIN)
+    }
+}
+
+fn options(asked: &CheckedPlanRequest) -> Result<PlanOptions, String> {
+    let planner = match asked.planner.as_str() {
+        "" => PlannerKind::default(),
+        name => PlannerKind::from_name(name).ok_or_else(|| {
+            let known = PlannerKind::ALL.map(PlannerKind::name).join(", ");
+            format!("unknown planner `{name}`; use one of {known}")
+        })?,
+    };
+    let deadline = match asked.deadline_ms {
+        0 => DEADLINE_DEFAULT,
+        ms => Duration::from_millis(ms.into()).min(DEADLINE_MAX),
+    };
+    Ok(PlanOptions { seed: asked.seed, deadline, planner })
+}
+
+/// Why an arm in this phase gets no plan, and what to do.
+fn not_ready(phase: Phase) -> String {
+    let hint = match phase {
+        Phase::Disabled | Phase::Locked => "run `taustream enable`",
+        Phase::Fault => "run `taustream clear-fault`, then `taustream enable`",
+        Phase::Paused | Phase::Pausing => "run `taustream resume` or `taustream stop`",
+        Phase::Holding => "its drives are not energised; run `taustream enable`",
+        Phase::Configuring
+        | Phase::Enabling
+        | Phase::Moving
+        | Phase::Stopping
+        | Phase::FastStopping
+        | Phase::Braking
+        | Phase::Disabling => "wait until that has ended and ask again",
+    };
+    format!("the arm is {}; {hint}", phase.word())
+}
+
+fn failed(reason: &str) -> PlanOutcome {
+    PlanOutcome::Failed { reason: reason.to_owned() }
+}
+
+fn reply(request: &Request, outcome: &PlanOutcome) {
+    match outcome {
+        PlanOutcome::Failed { reason } => info!("answered: {reason}"),
+        PlanOutcome::Planned { trajectory_id, planning_s, duration_s, how, receipt, .. } => info!(
+            trajectory_id,
+            planning_s,
+            duration_s,
+            outcome = ?receipt.as_ref().map(|r| r.outcome()),
+            "answered: {how}"
+        ),
+    }
+    // A requester that has gone needs no answer.
+    if let Err(e) = request.send_copy(PlanReply::new(outcome)) {
+        info!("the answer was not taken: {e:?}");
+    }
+}
+
+/// The one place of a planner. That of a killed planner is free again once shared memory has been cleaned up.
+fn take_server(wire: &Wire) -> Result<PlanServer, ServiceError> {
+    let since = Instant::now();
+    loop {
+        match wire.plan_server() {
+            Ok(server) => return Ok(server),
+            Err(e) if since.elapsed() > TAKE_OVER_WITHIN => return Err(e),
+            Err(_) => thread::sleep(Duration::from_millis(100)),
+        }
+    }
+}
