@@ -1,0 +1,172 @@
+//! What users do every day: plan, check, sample, verify, rate.
+mod common;
+use common::{HOME, Scratch, stroke, trajectory};
+use std::fs;
+
+const GOAL: &str = "1.0,-1.2,1.3,-1.6,-1.57,0.4";
+
+fn planned(scratch: &Scratch) -> serde_json::Value {
+    let words = [
+        "plan",
+        "--robot",
+        "ur5",
+        "--scene",
+        "open",
+        "--start",
+        HOME,
+        "--goal",
+        GOAL,
+        "-o",
+        "move.json",
+        "--json",
+    ];
+    scratch.run(&words).json()
+}
+
+#[test]
+fn plan_writes_a_file_that_verifies_and_ends_at_the_goal() {
+    let scratch = Scratch::new();
+    let summary = planned(&scratch);
+    for key in ["duration_s", "strokes", "clearance_m", "planner", "planning_s", "digest", "peak_use"] {
+        assert!(!summary[key].is_null(), "no {key}: {summary}");
+    }
+    assert_eq!(scratch.files().len(), 1, "only the trajectory: {:?}", scratch.files());
+    for peak in summary["peak_use"].as_array().expect("one entry a joint") {
+        for key in ["velocity_percent", "acceleration_percent", "jerk_percent"] {
+            let percent = peak[key].as_f64().expect("a number");
+            assert!((0.0..=100.1).contains(&percent), "{key}: {peak}");
+        }
+    }
+
+    let verify = ["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "move.json", "--json"];
+    let proof = scratch.run(&verify).json();
+    assert_eq!(proof["verified"], true);
+    assert_eq!(proof["duration_s"], summary["duration_s"]);
+
+    let end = scratch.run(&["sample", "move.json", "--at", "86400", "--json"]).json();
+    let end = end["samples"][0]["position_rad"].as_array().expect("positions").clone();
+    let goal: Vec<f64> = GOAL.split(',').map(|q| q.parse().unwrap()).collect();
+    for (q, goal) in end.iter().zip(&goal) {
+        assert!((q.as_f64().expect("a number") - goal).abs() < 1e-9, "{end:?}");
+    }
+}
+
+#[test]
+fn plan_with_one_seed_is_one_file() {
+    let (first, second) = (Scratch::new(), Scratch::new());
+    planned(&first);
+    planned(&second);
+    let read = |s: &Scratch| fs::read_to_string(s.dir.join("move.json")).unwrap();
+    assert_eq!(read(&first), read(&second));
+}
+
+#[test]
+fn plan_to_stdout_is_the_file_and_nothing_else() {
+    let scratch = Scratch::new();
+    let words = ["plan", "--robot", "ur5", "--scene", "open", "--start", HOME, "--goal", GOAL, "-o", "-"];
+    let ran = scratch.run(&words);
+    let file: serde_json::Value = serde_json::from_str(ran.done()).expect("stdout is the trajectory file");
+    assert_eq!(file["version"], 1);
+    assert!(ran.err.contains("duration"), "the summary is on stderr: {}", ran.err);
+    assert!(scratch.files().is_empty());
+}
+
+#[test]
+fn sample_prints_the_contract_table_on_the_grid_with_the_end() {
+    let scratch = Scratch::new();
+    scratch.write("move.json", &trajectory(&stroke("10", "0.25", "0.5")));
+    let ran = scratch.run(&["sample", "move.json", "--rate-hz", "10"]);
+    let lines: Vec<&str> = ran.done().lines().collect();
+    let header = "t_s,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,v1_rad_s,v2_rad_s,v3_rad_s,v4_rad_s,v5_rad_s,v6_rad_s,\
+        a1_rad_s2,a2_rad_s2,a3_rad_s2,a4_rad_s2,a5_rad_s2,a6_rad_s2,j1_rad_s3,j2_rad_s3,j3_rad_s3,j4_rad_s3,j5_rad_s3,j6_rad_s3";
+    assert_eq!(lines.first(), Some(&header));
+    // 0, 0.1, .., 4.2 and the end at 4.25.
+    assert_eq!(lines.len(), 1 + 43 + 1);
+    let row = |i: usize| -> Vec<f64> { lines[i].split(',').map(|v| v.parse().expect("a number")).collect() };
+    assert_eq!(row(1)[..3], [0.0, 0.0, -1.57]);
+    assert_eq!(row(44)[..3], [4.25, 0.5, -1.57]);
+    assert!(row(44)[7..].iter().all(|v| *v == 0.0), "at rest at the end: {}", lines[44]);
+
+    // Goal: an independent formula of the stroke gives the same numbers.
+    let s: f64 = (2.0 - 0.25) / 4.0;
+    let phi = 1.0 - (1.0 - s.powi(4)).powi(10);
+    assert!((row(21)[1] - 0.5 * phi).abs() < 1e-12, "{} against {}", row(21)[1], 0.5 * phi);
+}
+
+#[test]
+fn sample_at_times_gives_one_line_each_in_their_order() {
+    let scratch = Scratch::new();
+    scratch.write("move.json", &trajectory(&stroke("10", "0", "0.5")));
+    let ran = scratch.run(&["sample", "move.json", "--at", "4,-1,2"]);
+    let times: Vec<&str> = ran.done().lines().skip(1).filter_map(|l| l.split(',').next()).collect();
+    assert_eq!(times, ["4", "-1", "2"]);
+}
+
+#[test]
+fn cost_counts_the_papers_481_poses_and_its_parts_add_up() {
+    let scratch = Scratch::new();
+    let strokes: Vec<String> = (0..4).map(|i| stroke("10", &(4 * i).to_string(), "0.25")).collect();
+    scratch.write("move.json", &trajectory(&strokes.join(",")));
+    scratch.write("balls.toml", "[[sphere]]\nname = \"ball\"\ncenter_m = [0.4, 0.4, 0.4]\nradius_m = 0.18\n");
+    let cost = |weights: &str| {
+        let words = [
+            "cost",
+            "--robot",
+            "ur5",
+            "--scene",
+            "balls.toml",
+            "--trajectory",
+            "move.json",
+            "--weights",
+            weights,
+            "--json",
+        ];
+        scratch.run(&words).json()
+    };
+    let c = cost("7,300,1.2e7");
+    assert_eq!(c["poses"], 481);
+    let number = |key: &str| c[key].as_f64().expect("a number");
+    assert!((number("joint_travel_rad") - 1.0).abs() < 1e-9, "{c}");
+    let sum = 7.0 * number("path_length_m") + 300.0 * number("joint_travel_rad") + 1.2e7 * number("penalty");
+    assert!((number("cost") - sum).abs() <= 1e-9 * sum, "{c}");
+    assert_eq!(cost("0,1,0")["cost"], c["joint_travel_rad"]);
+}
+
+#[test]
+fn check_says_aloud_what_may_touch_and_how_long_a_pause_takes() {
+    let scratch = Scratch::new();
+    let text = scratch.run(&["check", "vcan6"]);
+    for word in [
+        "MAY TOUCH",
+        "link3-link5",
+        "a pause or stop from full speed takes",
+        "VIRTUAL",
+        "MAY FALL",
+        "wrist_3",
+    ] {
+        assert!(text.done().contains(word), "no `{word}`: {}", text.out);
+    }
+    let json = scratch.run(&["check", "vcan6", "--json"]).json();
+    assert_eq!(json["servos"].as_array().map(Vec::len), Some(6));
+    assert!(json["robot"]["pause_s"].as_f64().is_some_and(|s| s > 0.0 && s < 5.0), "{json}");
+    for shipped in ["ur5", "open", "pillars", "shelf"] {
+        scratch.run(&["check", shipped]).done();
+    }
+}
+
+#[test]
+fn completions_and_help_are_there_for_every_command() {
+    let scratch = Scratch::new();
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(scratch.run(&["completions", shell]).done().contains("clear-fault"), "{shell}");
+    }
+    let help = scratch.run(&["--help"]);
+    assert!(help.done().contains("Exit codes"), "{}", help.out);
+    for command in [
+        "plan", "sample", "cost", "verify", "check", "replan", "run", "enable", "speed", "stop", "status",
+        "demo",
+    ] {
+        assert!(scratch.run(&[command, "--help"]).done().contains("--json"), "{command}");
+    }
+    assert!(scratch.run(&["--version"]).done().starts_with("taustream "));
+}
