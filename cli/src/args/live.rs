@@ -10,7 +10,7 @@ use taustream_planner::PlannerKind;
 #[derive(Args, Debug)]
 pub(crate) struct CommandArgs {
     /// How long to wait until the arm has done it, s; 0 returns as soon as the streamer has agreed.
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = waiting_s)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0, value_parser = waiting_s)]
     pub(crate) wait_s: f64,
 }
 
@@ -58,10 +58,10 @@ pub(crate) struct ReplanArgs {
     #[arg(long)]
     pub(crate) after_current: bool,
     /// How long planning may take, ms.
-    #[arg(long, value_name = "MS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: u32,
     /// Seed of every random choice.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
     /// Which planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
@@ -113,7 +113,7 @@ pub(crate) struct DemoArgs {
     #[arg(long, value_name = "LINK", default_value = "auto")]
     pub(crate) link: LinkChoice,
     /// Give up after this long, s.
-    #[arg(long, value_name = "S", default_value_t = 110.0, value_parser = waiting_s)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 110.0, value_parser = waiting_s)]
     pub(crate) limit_s: f64,
 }
 

@@ -37,10 +37,10 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
     /// Seed of every random choice.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
     /// How long planning may take, ms.
-    #[arg(long, value_name = "MS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: u32,
     /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.
     #[arg(short, long, value_name = "FILE")]
@@ -65,7 +65,13 @@ pub(crate) struct SampleArgs {
     #[arg(value_name = "FILE")]
     pub(crate) trajectory: PathBuf,
     /// Samples a second, Hz.
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0, conflicts_with = "at")]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        default_value_t = 1000.0,
+        conflicts_with = "at"
+    )]
     pub(crate) rate_hz: f64,
     /// Sample at these times instead, s. Before the start and after the end the arm rests.
     #[arg(long, value_name = "S,..", allow_hyphen_values = true)]
@@ -89,7 +95,7 @@ pub(crate) struct CostArgs {
     #[command(flatten)]
     pub(crate) motion: MotionArgs,
     /// Equal time steps a stroke.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = waypoints)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 120, value_parser = waypoints)]
     pub(crate) waypoints_per_segment: usize,
     /// How much the paper's obstacles grow, m.
     #[arg(long, value_name = "M", default_value_t = 0.1, allow_hyphen_values = true)]
@@ -136,10 +142,10 @@ pub(crate) enum BenchName {
     /// Wake-up lateness and time of the streamer's cycle, beside bare loops in alternating slices of one run.
     Cycle {
         /// How long to measure, s.
-        #[arg(long, value_name = "S", default_value_t = 20.0)]
+        #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 20.0)]
         seconds: f64,
         /// Alternating slices a loop.
-        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+        #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
         slices: u32,
         /// What carries the frames.
         #[arg(long, value_name = "LINK", default_value = "auto")]

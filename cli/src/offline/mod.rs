@@ -1,5 +1,4 @@
 //! Commands that need files only.
-pub(crate) mod bus_load;
 pub(crate) mod check;
 pub(crate) mod cost;
 pub(crate) mod plan;

@@ -11,7 +11,7 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The shipped configuration.
-pub fn config() -> PathBuf {
+pub(crate) fn config() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../config")
         .canonicalize()
@@ -19,12 +19,12 @@ pub fn config() -> PathBuf {
 }
 
 /// A directory that goes with the test.
-pub struct Scratch {
-    pub dir: PathBuf,
+pub(crate) struct Scratch {
+    pub(crate) dir: PathBuf,
 }
 
 impl Scratch {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let dir = std::env::temp_dir().join(format!("taustream-cli-{}-{number}", std::process::id()));
@@ -33,21 +33,21 @@ impl Scratch {
     }
 
     /// Writes a file; its name.
-    pub fn write(&self, name: &str, text: &str) -> PathBuf {
+    pub(crate) fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.dir.join(name);
         fs::write(&path, text).expect("a file in the scratch directory");
         path
     }
 
     /// A shipped file with one text replaced, which must be there; its name.
-    pub fn edited(&self, shipped: &str, name: &str, from: &str, to: &str) -> PathBuf {
+    pub(crate) fn edited(&self, shipped: &str, name: &str, from: &str, to: &str) -> PathBuf {
         let text = fs::read_to_string(config().join(shipped)).expect("a shipped file");
         assert!(text.contains(from), "{shipped} has no `{from}`: the test edits nothing");
         self.write(name, &text.replacen(from, to, 1))
     }
 
     /// Settings of an arm that nobody else has: vcan6 under another name.
-    pub fn settings(&self, arm: &str) -> PathBuf {
+    pub(crate) fn settings(&self, arm: &str) -> PathBuf {
         let text = fs::read_to_string(config().join("settings/vcan6.toml")).expect("shipped settings");
         let dir = config();
         let text = text
@@ -56,13 +56,13 @@ impl Scratch {
         self.write("settings.toml", &text)
     }
 
-    pub fn files(&self) -> BTreeSet<String> {
+    pub(crate) fn files(&self) -> BTreeSet<String> {
         let entries = fs::read_dir(&self.dir).expect("the scratch directory");
         entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
     }
 
     /// Runs `taustream` there.
-    pub fn run(&self, words: &[&str]) -> Ran {
+    pub(crate) fn run(&self, words: &[&str]) -> Ran {
         let output = Command::new(env!("CARGO_BIN_EXE_taustream"))
             .args(words)
             .current_dir(&self.dir)
@@ -81,15 +81,15 @@ impl Drop for Scratch {
 }
 
 /// What a run said.
-pub struct Ran {
-    pub words: String,
-    pub code: Option<i32>,
-    pub out: String,
-    pub err: String,
+pub(crate) struct Ran {
+    pub(crate) words: String,
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) err: String,
 }
 
 impl Ran {
-    pub fn of(words: &[&str], output: Output) -> Self {
+    pub(crate) fn of(words: &[&str], output: Output) -> Self {
         Self {
             words: words.join(" "),
             code: output.status.code(),
@@ -100,7 +100,7 @@ impl Ran {
 
     /// Asserts a clear refusal: this code, these words on stderr, nothing on stdout, no panic.
     #[track_caller]
-    pub fn refused(&self, code: i32, expected: &[&str]) {
+    pub(crate) fn refused(&self, code: i32, expected: &[&str]) {
         let Self { words, out, err, .. } = self;
         assert_eq!(self.code, Some(code), "`{words}` said: {err}{out}");
         assert_eq!(out, "", "`{words}` wrote to stdout");
@@ -114,27 +114,27 @@ impl Ran {
 
     /// Asserts that all went well; what it said on stdout.
     #[track_caller]
-    pub fn done(&self) -> &str {
+    pub(crate) fn done(&self) -> &str {
         assert_eq!(self.code, Some(0), "`{}` said: {}{}", self.words, self.err, self.out);
         &self.out
     }
 
     /// Like [`Self::done`], as JSON.
     #[track_caller]
-    pub fn json(&self) -> serde_json::Value {
+    pub(crate) fn json(&self) -> serde_json::Value {
         serde_json::from_str(self.done()).unwrap_or_else(|e| panic!("`{}`: {e}: {}", self.words, self.out))
     }
 }
 
 /// A pose of the UR5 that is free of everything.
-pub const HOME: &str = "0,-1.57,1.57,-1.57,-1.57,0";
+pub(crate) const HOME: &str = "0,-1.57,1.57,-1.57,-1.57,0";
 
 /// One stroke of a six-joint arm: `n`, and how far the first joint goes.
-pub fn stroke(n: &str, start_s: &str, delta: &str) -> String {
+pub(crate) fn stroke(n: &str, start_s: &str, delta: &str) -> String {
     format!(r#"{{"start_s":{start_s},"duration_s":4,"n":{n},"delta_rad":[{delta},0,0,0,0,0]}}"#)
 }
 
 /// A trajectory file from HOME with these strokes.
-pub fn trajectory(strokes: &str) -> String {
+pub(crate) fn trajectory(strokes: &str) -> String {
     format!(r#"{{"version":1,"robot":"ur5","joints":6,"base_rad":[{HOME}],"strokes":[{strokes}]}}"#)
 }
