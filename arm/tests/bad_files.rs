@@ -246,10 +246,10 @@ const SETTINGS_CASES: &[Case] = &[
     (Settings, "drive_timeout_s = 5.0", "drive_timeout_s = nan", "supervision.drive_timeout_s", "finite"),
     (
         Settings,
+        "base_tolerance_rad = 5e-7",
         "base_tolerance_rad = 0.001",
-        "base_tolerance_rad = 1.0",
         "supervision.base_tolerance_rad",
-        "from 0 to 0.1 rad",
+        "from 0 to 0.000001 rad",
     ),
     (
         Settings,
