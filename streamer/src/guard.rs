@@ -284,6 +284,8 @@ fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) ->
     let stop = &limits.stop;
     let beyond = |value: f64, limit: f64| value.abs() > limit * (1.0 + SLACK) + RATE_SLACK;
     for (quantity, value, limit) in [
+        (Quantity::Velocity, v, stop.velocity_rad_s),
+        (Quantity::Acceleration, a, stop.acceleration_rad_s2),
         (Quantity::Velocity, seen.velocity_rad_s, stop.velocity_rad_s),
         (Quantity::Acceleration, seen.acceleration_rad_s2, stop.acceleration_rad_s2),
         (Quantity::Jerk, seen.jerk_rad_s3, stop.jerk_rad_s3),

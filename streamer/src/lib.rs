@@ -8,6 +8,7 @@
 //! This is not a safety function: its stops are best effort by software over a bus.
 #![deny(unsafe_code)]
 
+pub mod approach;
 pub mod buses;
 pub mod check;
 pub mod cycle;

@@ -17,6 +17,7 @@ use std::sync::mpsc::Receiver;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use taustream_arm::{Settings, TrajectoryFile};
+use taustream_motion::JointArray;
 
 /// How often the queue is emptied.
 const INTERVAL: Duration = Duration::from_millis(20);
@@ -110,7 +111,9 @@ impl Log {
                 self.candidates.push(candidate);
             }
             match record {
-                Record::Accepted { tick, trajectory_id } => self.accepted(tick, trajectory_id)?,
+                Record::Accepted { tick, trajectory_id, start_offset_rad } => {
+                    self.accepted(tick, trajectory_id, &start_offset_rad)?;
+                }
                 Record::Transition(transition) => self.line(&phase_line(&transition))?,
                 Record::Cycle(cycle) => self.line(&self.cycle_line(&cycle))?,
                 Record::Lost(count) => self.line(&json!({ "event": "lost", "records": count }))?,
@@ -119,17 +122,19 @@ impl Log {
         Ok(())
     }
 
-    fn accepted(&mut self, tick: u64, trajectory_id: u64) -> io::Result<()> {
+    fn accepted(&mut self, tick: u64, trajectory_id: u64, offset_rad: &JointArray) -> io::Result<()> {
         let found = self.candidates.iter().position(|c| c.trajectory_id == trajectory_id);
         let Some(candidate) = found.map(|at| self.candidates.swap_remove(at)) else {
             return self.line(&json!({
                 "event": "trajectory", "tick": tick, "trajectory_id": trajectory_id, "generation": null, "file": null,
+                "start_offset_rad": offset_rad.get(..self.joints),
             }));
         };
         let file: Value = serde_json::from_str(&candidate.file.to_json())?;
         self.line(&json!({
             "event": "trajectory", "tick": tick, "trajectory_id": trajectory_id,
             "generation": candidate.generation, "file": file,
+            "start_offset_rad": offset_rad.get(..self.joints),
         }))
     }
 

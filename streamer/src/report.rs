@@ -84,6 +84,8 @@ pub enum Record {
         tick: u64,
         /// The trajectory.
         trajectory_id: u64,
+        /// The held pose less the trajectory's base, let go smoothly at the start, rad.
+        start_offset_rad: JointArray,
     },
     /// The phase changed.
     Transition(Transition),
@@ -193,7 +195,7 @@ impl Reporter {
         let _ = self.queues.timings.push(timing);
         self.write_notes(facts, &orders.transitions);
         if self.recording {
-            self.write_records(facts, command, supervisor.phase(), &orders.transitions);
+            self.write_records(facts, command, track, judged);
         }
         let changed = orders.transitions[0].is_some() || facts.verdict.is_some();
         if changed || facts.tick.number >= self.next_tick {
@@ -233,15 +235,16 @@ impl Reporter {
         &mut self,
         facts: &Facts,
         command: &GuardedCommand,
-        phase: Phase,
-        transitions: &[Option<Transition>; TRANSITIONS_MAX],
+        track: &Track,
+        (supervisor, orders): (&Supervisor, &Orders),
     ) {
         if let Some(verdict) = facts.verdict
             && let Decision::Accepted { tick } = verdict.decision
         {
-            self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id });
+            let start_offset_rad = *track.start_offset_rad();
+            self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id, start_offset_rad });
         }
-        for transition in transitions.iter().flatten() {
+        for transition in orders.transitions.iter().flatten() {
             self.record(Record::Transition(*transition));
         }
         if facts.live {
@@ -249,7 +252,7 @@ impl Reporter {
                 tick: facts.tick.number,
                 time_ns: facts.tick.woke.0,
                 syncs: facts.buses.map(|b| b.syncs),
-                phase,
+                phase: supervisor.phase(),
                 trajectory_id: facts.trajectory_id,
                 s: if facts.trajectory_id == 0 { 0.0 } else { facts.trajectory_s },
                 sigma: facts.scale.sigma,

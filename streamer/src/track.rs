@@ -3,6 +3,7 @@
 //! Everything is counted from the last setpoint that left. A cycle that was skipped, or whose frames were
 //! refused, therefore costs nothing but a longer step, up to the gap that the drives bridge. Beyond it the drives
 //! have stopped by themselves: trajectory time stays where the last setpoint was, and sigma starts from 0.
+use crate::approach::Approach;
 use crate::facts::{Decision, Facts, Verdict};
 use crate::intake::Boxed;
 use taustream_arm::settings::{Cycle, Supervision};
@@ -43,6 +44,8 @@ struct Mark {
     s: f64,
     /// Periods on the scale's time axis.
     axis: u64,
+    /// Periods since the approach began.
+    approach: u64,
     position_rad: JointArray,
 }
 
@@ -57,6 +60,7 @@ pub struct Track {
     scale: TimeScale,
     running: Option<Boxed>,
     cursor: Cursor,
+    approach: Approach,
     starting: bool,
     restart: bool,
     newest_generation: u64,
@@ -73,7 +77,8 @@ impl Track {
         cycle: &Cycle,
         supervision: &Supervision,
     ) -> Self {
-        let ramp_s = ramp_duration_s(limits, joints);
+        // Clamped to what a stop may take; settings without room for a stop were refused before.
+        let ramp_s = TimeScale::settled(0.0, ramp_duration_s(limits, joints)).ramp_duration_s();
         Self {
             joints,
             period_s: f64::from(cycle.period_us) * 1e-6,
@@ -83,6 +88,7 @@ impl Track {
             scale: TimeScale::settled(0.0, ramp_s),
             running: None,
             cursor: Cursor::default(),
+            approach: Approach::default(),
             starting: false,
             restart: true,
             newest_generation: 0,
@@ -114,6 +120,8 @@ impl Track {
         self.cursor = Cursor::at_start(&offer.trajectory);
         self.scale = TimeScale::settled(sigma, self.ramp_s);
         (self.sent.s, self.sent.axis) = (0.0, 0);
+        self.approach = Approach::new(&self.sent.position_rad, offer.trajectory.base_rad(), self.ramp_s);
+        self.sent.approach = 0;
         (self.starting, self.restart) = (true, true);
         self.running.replace(offer)
     }
@@ -128,7 +136,6 @@ impl Track {
         let base = offer.trajectory.base_rad().iter().zip(&self.sent.position_rad);
         for (joint, (base_rad, held_rad)) in base.enumerate().take(self.joints) {
             let by_rad = (base_rad - held_rad).abs();
-            // The difference reaches the drives as a step: the tolerance is below what an encoder sees.
             if by_rad.is_nan() || by_rad > self.base_tolerance_rad {
                 return Decision::NotAtBase { joint, by_rad };
             }
@@ -154,6 +161,9 @@ impl Track {
                 self.scale = TimeScale::settled(0.0, self.ramp_s);
                 (self.sent.axis, self.next.axis) = (0, 0);
                 (facts.frozen, restart) = (true, true);
+                let reached_rad = running.trajectory.sample(self.sent.s).position_rad;
+                self.approach = Approach::new(&self.sent.position_rad, &reached_rad, self.ramp_s);
+                (self.sent.approach, self.next.approach) = (0, 0);
             } else {
                 let step = if self.starting { 0 } else { periods };
                 self.next.axis = self.sent.axis + step;
@@ -161,15 +171,25 @@ impl Track {
                 let end_s = running.trajectory.duration_s();
                 self.next.s = (self.sent.s + self.advance_s(from_s, to_s, step)).min(end_s);
                 facts.scale = self.scale.sample(to_s);
-                facts.end_reached = self.next.s >= end_s;
+                self.next.approach = self.sent.approach + step;
+                let approach_s = self.seconds(self.next.approach);
                 setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), facts.scale);
+                self.approach.add_to(&mut setpoint, approach_s);
+                facts.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
                 self.next.position_rad = setpoint.position_rad;
             }
             let now_s = self.seconds(self.next.axis);
-            facts.at_rest = self.scale.wished() <= 0.0 && self.scale.is_settled(now_s);
+            let approached = self.approach.has_ended(self.seconds(self.next.approach));
+            facts.at_rest = self.scale.wished() <= 0.0 && self.scale.is_settled(now_s) && approached;
         }
         facts.trajectory_s = self.next.s;
         Wanted { setpoint, periods, restart, live }
+    }
+
+    /// How far the pose that was held is from the base of the trajectory that runs, rad.
+    #[must_use]
+    pub fn start_offset_rad(&self) -> &JointArray {
+        self.approach.offset_rad()
     }
 
     /// Notes what left: `position_rad` is what the guard let pass.

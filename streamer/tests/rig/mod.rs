@@ -1,0 +1,384 @@
+//! A streamer without threads, clocks or buses: the shipped cycle over scripted drives, tick by tick.
+#![expect(clippy::disallowed_types, reason = "one thread; nothing here is real-time")]
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use taustream_arm::Settings;
+use taustream_drivers::link::Sent;
+use taustream_drivers::{
+    CanFrame, CanId, CanLink, DriveState, DriveWish, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
+    ServoStatus,
+};
+use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_streamer::buses::{Bus, Buses};
+use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
+use taustream_streamer::facts::{Asked, Cause, Decision, Verdict};
+use taustream_streamer::intake::{self, Desk, Leave};
+use taustream_streamer::report::{CycleRecord, Readers, Record};
+use taustream_streamer::tick::Tick;
+use taustream_streamer::words::Answer;
+
+pub const PERIOD_NS: u64 = 1_000_000;
+pub const JOINTS: usize = 6;
+/// Where the scripted arm stands at first.
+pub const HOME_RAD: JointArray = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0];
+
+/// What the scripted drives do, and what reached them.
+#[derive(Debug)]
+pub struct World {
+    pub states: [DriveState; MAX_JOINTS],
+    /// Overrides the state machine below.
+    pub forced: [Option<DriveState>; MAX_JOINTS],
+    pub error_code: u32,
+    pub warning: Option<usize>,
+    pub silent: Option<usize>,
+    /// Added to the measured position of a joint.
+    pub offset_rad: JointArray,
+    pub link_fault: Option<LinkFault>,
+    /// Frames that the link takes before it fails.
+    pub link_takes: usize,
+    /// Handed to the cycle beside the answers.
+    pub error_frame: Option<u32>,
+    pub wish: Option<DriveWish>,
+    pub clears: u32,
+    /// Commands that arrived while energised, newest last, with their tick.
+    pub arrived: Vec<(u64, JointArray)>,
+    pub tick: u64,
+    pending: JointArray,
+    pub pipeline: [JointArray; 3],
+    steps: u32,
+}
+
+impl World {
+    fn advance(&mut self, wish: DriveWish) {
+        self.steps = if self.wish == Some(wish) { self.steps + 1 } else { 0 };
+        self.wish = Some(wish);
+        for (joint, state) in self.states.iter_mut().enumerate().take(JOINTS) {
+            let steady = self.steps >= 5;
+            *state = match (self.forced[joint], wish) {
+                (Some(forced), _) => forced,
+                (None, DriveWish::TorqueOff) => DriveState::Disabled,
+                (None, DriveWish::Disabled) if steady => DriveState::Disabled,
+                (None, DriveWish::Disabled) if *state == DriveState::Enabled => DriveState::Disabling,
+                (None, DriveWish::Enabled) if steady => DriveState::Enabled,
+                (None, DriveWish::Enabled) if *state == DriveState::Disabled => DriveState::Enabling,
+                (None, _) => *state,
+            };
+        }
+    }
+}
+
+type Shared = Arc<Mutex<World>>;
+
+struct FakeDriver {
+    world: Shared,
+    joints: Vec<usize>,
+    received: [Option<Nanos>; MAX_JOINTS],
+    position_rad: JointArray,
+}
+
+impl ServoDriver for FakeDriver {
+    fn encode(
+        &mut self,
+        _now: Nanos,
+        wish: DriveWish,
+        commands: &[JointCommand; MAX_JOINTS],
+        out: &mut FrameBatch,
+    ) {
+        let mut world = self.world.lock().unwrap();
+        world.advance(wish);
+        world.pending = commands.map(|c| c.position_rad);
+        out.push(CanFrame::classic(CanId::standard(0x080), &[]));
+        for joint in 0..JOINTS {
+            out.push(CanFrame::classic(CanId::standard(0x201 + u16::try_from(joint).unwrap()), &[0; 6]));
+        }
+    }
+    fn decode(&mut self, now: Nanos, _frame: &CanFrame) {
+        let world = self.world.lock().unwrap();
+        for joint in 0..JOINTS {
+            if world.silent != Some(joint) {
+                self.received[joint] = Some(now);
+                self.position_rad[joint] = world.pipeline[2][joint] + world.offset_rad[joint];
+            }
+        }
+    }
+    fn joints(&self) -> &[usize] {
+        &self.joints
+    }
+    fn status(&self, joint: usize) -> ServoStatus {
+        let world = self.world.lock().unwrap();
+        ServoStatus {
+            state: world.states[joint],
+            position_rad: self.received[joint].map_or(f64::NAN, |_| self.position_rad[joint]),
+            velocity_rad_s: f64::NAN,
+            received: self.received[joint],
+            status_word: 0x1237,
+            error_code: world.error_code,
+            refused_object: 0,
+            warning: world.warning == Some(joint),
+        }
+    }
+    fn clear_faults(&mut self) {
+        self.world.lock().unwrap().clears += 1;
+    }
+    fn explain(&self, error_code: u32) -> String {
+        format!("{error_code:#x}")
+    }
+}
+
+struct FakeLink(Shared);
+
+impl CanLink for FakeLink {
+    fn send(&mut self, frames: &[CanFrame]) -> Sent {
+        let mut world = self.0.lock().unwrap();
+        if let Some(fault) = world.link_fault {
+            return Sent { count: world.link_takes.min(frames.len()), fault: Some(fault) };
+        }
+        let pending = world.pending;
+        // De-energised drives stay where they are, whatever is commanded.
+        let energised = world.wish == Some(DriveWish::Enabled);
+        let next = if energised { pending } else { world.pipeline[0] };
+        world.pipeline.rotate_right(1);
+        world.pipeline[0] = next;
+        if energised {
+            let tick = world.tick;
+            world.arrived.push((tick, pending));
+        }
+        Sent { count: frames.len(), fault: None }
+    }
+    fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
+        into.clear();
+        let world = self.0.lock().unwrap();
+        if let Some(class) = world.error_frame {
+            into.push(CanFrame::classic(CanId::from_raw(0x2000_0000 | class), &[0, 0x20, 0, 0, 0, 0, 0, 0]));
+        }
+        if world.link_fault.is_none() {
+            into.push(CanFrame::classic(CanId::standard(0x181), &[0; 6]));
+        }
+        world.link_fault.filter(|_| world.link_takes == 0)
+    }
+    fn describe(&self) -> String {
+        "scripted".to_owned()
+    }
+}
+
+/// The streamer's cycle with its scripted surroundings.
+pub struct Rig {
+    pub core: Core,
+    pub desk: Desk,
+    pub world: Shared,
+    pub settings: Settings,
+    pub readers: Readers,
+    pub tick: u64,
+    pub cycles: Vec<CycleRecord>,
+    pub phases: Vec<(Phase, Phase)>,
+    sequence: u64,
+    generation: u64,
+    last: Next,
+}
+
+/// The shipped settings of six servos.
+pub fn shipped_settings() -> Settings {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
+    Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+impl Rig {
+    pub fn new() -> Self {
+        Self::with(shipped_settings())
+    }
+
+    pub fn with(settings: Settings) -> Self {
+        let world = World {
+            states: [DriveState::Disabled; MAX_JOINTS],
+            forced: [None; MAX_JOINTS],
+            error_code: 0,
+            warning: None,
+            silent: None,
+            offset_rad: [0.0; MAX_JOINTS],
+            link_fault: None,
+            link_takes: 0,
+            error_frame: None,
+            wish: None,
+            clears: 0,
+            arrived: Vec::new(),
+            tick: 0,
+            pending: HOME_RAD,
+            pipeline: [HOME_RAD; 3],
+            steps: 0,
+        };
+        let world = Arc::new(Mutex::new(world));
+        let driver = FakeDriver {
+            world: Arc::clone(&world),
+            joints: (0..JOINTS).collect(),
+            received: [None; MAX_JOINTS],
+            position_rad: HOME_RAD,
+        };
+        let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver));
+        let (queues, desk) = intake::pair();
+        let core = Core::new(&settings, Buses::new(vec![bus]).unwrap(), queues, true);
+        let readers = core.readers();
+        Self {
+            core,
+            desk,
+            world,
+            settings,
+            readers,
+            tick: 0,
+            cycles: Vec::new(),
+            phases: Vec::new(),
+            sequence: 0,
+            generation: 0,
+            last: Next::Go,
+        }
+    }
+
+    /// Runs one cycle `periods` after the one before.
+    pub fn step_after(&mut self, periods: u64) -> Next {
+        self.tick += periods;
+        self.world.lock().unwrap().tick = self.tick;
+        let time = Nanos(self.tick * PERIOD_NS);
+        let tick =
+            Tick { number: self.tick, deadline: time, woke: time, skipped: periods - 1, last_cycle_ns: 1 };
+        self.last = run_cycle(&mut self.core, tick, &mut NoProbe);
+        while let Some(record) = self.readers.records.pop() {
+            match record {
+                Record::Cycle(cycle) => self.cycles.push(cycle),
+                Record::Transition(t) => self.phases.push((t.from, t.to)),
+                Record::Accepted { .. } => {}
+                Record::Lost(n) => panic!("{n} records lost"),
+            }
+        }
+        while self.readers.timings.pop().is_some() {}
+        while self.readers.reports.pop().is_some() {}
+        while self.readers.notes.pop().is_some() {}
+        self.last
+    }
+
+    pub fn run(&mut self, ticks: u64) {
+        for _ in 0..ticks {
+            self.step_after(1);
+        }
+    }
+
+    /// Runs until a phase is reached; fails after `ticks`.
+    pub fn run_until(&mut self, phase: Phase, ticks: u64) {
+        for _ in 0..ticks {
+            if self.phase() == phase {
+                return;
+            }
+            self.step_after(1);
+        }
+        panic!("{:?} instead of {phase:?} after {ticks} ticks, cause {:?}", self.phase(), self.cause());
+    }
+
+    pub fn phase(&self) -> Phase {
+        self.core.supervisor().phase()
+    }
+
+    pub fn cause(&self) -> Option<Cause> {
+        self.core.supervisor().cause()
+    }
+
+    /// Changes the script.
+    pub fn script(&self, change: impl FnOnce(&mut World)) {
+        change(&mut self.world.lock().unwrap());
+    }
+
+    /// Asks, runs one cycle, and returns the answer.
+    pub fn ask(&mut self, command: Command) -> Answer {
+        self.sequence += 1;
+        assert!(self.desk.ask(Asked { sequence: self.sequence, command }));
+        self.step_after(1);
+        let answer = self.desk.answer().expect("every command is answered in its cycle");
+        assert_eq!(answer.sequence, self.sequence);
+        answer
+    }
+
+    pub fn accept(&mut self, command: Command) {
+        let answer = self.ask(command);
+        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(|j| j.to_string()));
+    }
+
+    /// Offers a trajectory, runs one cycle, and returns the verdict.
+    pub fn offer(&mut self, trajectory: Trajectory) -> Decision {
+        self.generation += 1;
+        let generation = self.generation;
+        self.offer_as(trajectory, generation)
+    }
+
+    pub fn offer_as(&mut self, trajectory: Trajectory, generation: u64) -> Decision {
+        let mut empty = self.desk.empty_box().expect("boxes go round");
+        *empty = CheckedTrajectory {
+            trajectory_id: 1000 + generation,
+            generation,
+            robot_digest: self.settings.robot.digest,
+            replaces: Replaces::Rest,
+            trajectory,
+        };
+        self.desk.offer(empty);
+        self.step_after(1);
+        let Verdict { decision, .. } =
+            self.desk.verdict().expect("every trajectory is answered in its cycle");
+        decision
+    }
+
+    /// From start to holding.
+    pub fn enable(&mut self) {
+        self.run_until(Phase::Disabled, 20);
+        self.run(40);
+        self.accept(Command::Enable);
+        self.run_until(Phase::Holding, 50);
+    }
+
+    /// From start into a motion.
+    pub fn move_it(&mut self) -> Trajectory {
+        self.enable();
+        let trajectory = swing(&HOME_RAD, 1.0);
+        assert!(matches!(self.offer(trajectory.clone()), Decision::Accepted { .. }));
+        assert_eq!(self.phase(), Phase::Moving);
+        trajectory
+    }
+
+    pub fn leave(&mut self, leave: Leave) {
+        self.desk.leaver().ask(leave);
+    }
+
+    /// The largest |velocity|, |acceleration| and |jerk| over their stop limits, by plain differences of what arrived.
+    /// Independent of the guard: uniform steps only, and every gap is reported as a failure.
+    pub fn worst_use_of_stop_limits(&self) -> [f64; 3] {
+        let world = self.world.lock().unwrap();
+        let limits = self.settings.robot.limits();
+        let dt = 1e-3;
+        let mut worst = [0.0_f64; 3];
+        for window in world.arrived.windows(4) {
+            assert!(window.windows(2).all(|w| w[1].0 == w[0].0 + 1), "a gap at tick {}", window[0].0);
+            for joint in 0..JOINTS {
+                let q: Vec<f64> = window.iter().map(|(_, p)| p[joint]).collect();
+                let values = [
+                    (q[3] - q[2]) / dt,
+                    (q[3] - 2.0 * q[2] + q[1]) / (dt * dt),
+                    (q[3] - 3.0 * q[2] + 3.0 * q[1] - q[0]) / (dt * dt * dt),
+                ];
+                let stop = limits[joint].stop;
+                let most = [stop.velocity_rad_s, stop.acceleration_rad_s2, stop.jerk_rad_s3];
+                for (w, (value, limit)) in worst.iter_mut().zip(values.iter().zip(most)) {
+                    *w = w.max(value.abs() / limit);
+                }
+            }
+        }
+        assert!(world.arrived.len() > 100, "nothing was looked at");
+        worst
+    }
+}
+
+/// Three overlapping strokes to and fro, `size` rad for the first joint; close to the motion limits at 1.
+pub fn swing(base_rad: &JointArray, size: f64) -> Trajectory {
+    let stroke = |start_s: f64, sign: f64| Stroke {
+        start_s,
+        duration_s: 1.05,
+        n: 6,
+        delta_rad: [1.0, 0.3, -0.5, 0.4, -0.2, 0.6, 0.0, 0.0].map(|d| d * size * sign),
+    };
+    Trajectory::new(JOINTS, *base_rad, &[stroke(0.0, 1.0), stroke(0.7, -0.8), stroke(1.65, 0.7)]).unwrap()
+}
