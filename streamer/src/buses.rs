@@ -67,6 +67,10 @@ impl Buses {
         links.join(", ")
     }
 
+    pub(crate) fn links_mut(&mut self) -> impl Iterator<Item = &mut dyn CanLink> {
+        self.0.iter_mut().map(|bus| &mut *bus.link as &mut dyn CanLink)
+    }
+
     /// Writes every bus's frames.
     ///
     /// Real time: no allocation.

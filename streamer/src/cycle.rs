@@ -12,7 +12,7 @@ use crate::supervise::{Orders, Supervisor};
 use crate::tick::Tick;
 use crate::track::Track;
 use taustream_arm::Settings;
-use taustream_drivers::DriveWish;
+use taustream_drivers::{CanLink, DriveWish};
 
 /// A stage of the cycle, named when it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,6 +120,11 @@ impl Core {
     #[must_use]
     pub fn supervisor(&self) -> &Supervisor {
         &self.supervisor
+    }
+
+    /// The links, for the bench's bare loop.
+    pub(crate) fn links_mut(&mut self) -> impl Iterator<Item = &mut dyn CanLink> {
+        self.buses.links_mut()
     }
 
     /// Carries out what the judgement asks of the other stages.

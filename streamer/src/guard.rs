@@ -313,7 +313,8 @@ fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) ->
 
 /// How far a joint still goes in the positive direction under the hardest braking: jerk -j down to acceleration
 /// `-a_max`, then constant. No motion inside the limits turns round earlier, so no verified motion fails this check
-/// (a brake that ends at rest swings out a little farther when the joint was about to turn round).
+/// (a brake, which must also end without acceleration, swings out by up to `a_max^3 / (24 j^2)` farther: 3 mrad for a
+/// joint of 30 rad/s^2 and 600 rad/s^3).
 fn reach_rad(v: f64, a: f64, a_max: f64, j: f64) -> f64 {
     let square = a * a + 2.0 * j * v;
     if square <= 0.0 || j <= 0.0 || a_max <= 0.0 {
