@@ -1,0 +1,169 @@
+//! What the planner's tests share: shipped files, random scenes, and an independent check of motions.
+//!
+//! The check knows nothing of the planner: its own matrices from the Denavit-Hartenberg rows, its own point-to-segment
+//! distances, dense samples. It sees spheres and capsules only.
+#![expect(dead_code, reason = "every test binary includes this file and uses a part of it")]
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use std::path::{Path, PathBuf};
+use taustream_arm::{Obstacle, Robot, Scene, Settings, Shape};
+use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
+use taustream_planner::draw::Draw;
+
+pub(crate) fn config(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config").join(name)
+}
+
+pub(crate) fn ur5() -> Robot {
+    Robot::load(&config("robots/ur5.toml")).expect("shipped")
+}
+
+pub(crate) fn scene(name: &str) -> Scene {
+    Scene::load(&config(&format!("scenes/{name}.toml"))).expect("shipped")
+}
+
+pub(crate) fn vcan6() -> Settings {
+    Settings::load(&config("settings/vcan6.toml")).expect("shipped")
+}
+
+pub(crate) fn pose(values: [f64; 6]) -> JointArray {
+    let mut pose = [0.0; MAX_JOINTS];
+    pose[..6].copy_from_slice(&values);
+    pose
+}
+
+pub(crate) fn sphere(name: &str, center_m: [f64; 3], radius_m: f64) -> Obstacle {
+    let [x, y, z] = center_m;
+    let pose = Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity());
+    Obstacle { name: name.to_owned(), pose, shape: Shape::Sphere { radius_m } }
+}
+
+/// Two to five spheres round the arm, none of them at its base.
+pub(crate) fn random_spheres(draw: &mut Draw) -> Scene {
+    let mut obstacles = Vec::new();
+    let count = 2 + draw.index(4);
+    while obstacles.len() < count {
+        let center_m = [draw.within(-0.8, 0.8), draw.within(-0.8, 0.8), draw.within(0.0, 0.9)];
+        let radius_m = draw.within(0.05, 0.18);
+        if center_m[0].hypot(center_m[1]) > 0.25 + radius_m {
+            obstacles.push(sphere(&format!("sphere{}", obstacles.len()), center_m, radius_m));
+        }
+    }
+    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles }
+}
+
+/// UR5 rows (a, alpha, d) in m and rad, from the data sheet and not from the shipped file.
+const UR5: [[f64; 3]; 6] = [
+    [0.0, std::f64::consts::FRAC_PI_2, 0.089_159],
+    [-0.425, 0.0, 0.0],
+    [-0.392_25, 0.0, 0.0],
+    [0.0, std::f64::consts::FRAC_PI_2, 0.109_15],
+    [0.0, -std::f64::consts::FRAC_PI_2, 0.094_65],
+    [0.0, 0.0, 0.082_3],
+];
+const UR5_RADIUS_M: f64 = 0.06;
+
+type Matrix = [[f64; 4]; 4];
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut c = [[0.0; 4]; 4];
+    for (i, row) in c.iter_mut().enumerate() {
+        for (j, cell) in row.iter_mut().enumerate() {
+            *cell = (0..4).map(|k| a[i][k] * b[k][j]).sum();
+        }
+    }
+    c
+}
+
+/// Origins of the seven frames of a UR5.
+pub(crate) fn ur5_origins_m(q: &JointArray) -> Vec<[f64; 3]> {
+    let mut frame: Matrix =
+        [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    let mut origins = vec![[0.0; 3]];
+    for (angle, [a, alpha, d]) in q.iter().zip(UR5) {
+        let ((st, ct), (sa, ca)) = (angle.sin_cos(), alpha.sin_cos());
+        let row = [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0.0, sa, ca, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        frame = product(&frame, &row);
+        origins.push([frame[0][3], frame[1][3], frame[2][3]]);
+    }
+    origins
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn point_to_segment_m(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    let (ab, ap) = (minus(b, a), minus(p, a));
+    let t = if dot(ab, ab) > 0.0 { (dot(ab, ap) / dot(ab, ab)).clamp(0.0, 1.0) } else { 0.0 };
+    let d = minus(ap, [ab[0] * t, ab[1] * t, ab[2] * t]);
+    dot(d, d).sqrt()
+}
+
+/// Segment to segment by many points of one: above the truth by at most half of their spacing.
+fn segments_m(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
+    let along = minus(b, a);
+    (0..=64)
+        .map(|i| {
+            let t = f64::from(i) / 64.0;
+            point_to_segment_m([a[0] + along[0] * t, a[1] + along[1] * t, a[2] + along[2] * t], c, d)
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Least distances of a UR5 in a pose: to spheres, and between links 1-3, 1-4, .. that may not touch.
+pub(crate) fn ur5_distances_m(robot: &Robot, scene: &Scene, q: &JointArray) -> (f64, f64) {
+    let o = ur5_origins_m(q);
+    let (mut spheres_m, mut links_m) = (f64::INFINITY, f64::INFINITY);
+    for obstacle in &scene.obstacles {
+        let Shape::Sphere { radius_m } = obstacle.shape else { panic!("spheres only") };
+        let c = obstacle.pose.translation.vector;
+        for link in o.windows(2) {
+            let d = point_to_segment_m([c.x, c.y, c.z], link[0], link[1]);
+            spheres_m = spheres_m.min(d - radius_m - UR5_RADIUS_M);
+        }
+    }
+    for a in 1..=6 {
+        for b in a + 1..=6 {
+            if !robot.may_touch(a, b) {
+                links_m = links_m.min(segments_m(o[a - 1], o[a], o[b - 1], o[b]) - 2.0 * UR5_RADIUS_M);
+            }
+        }
+    }
+    (spheres_m, links_m)
+}
+
+/// Least distances of a whole motion at dense samples, first differences of positions against velocity limits, and
+/// whether it ends where it should.
+pub(crate) fn assert_safe(robot: &Robot, scene: &Scene, motion: &Trajectory, goal: &JointArray, who: &str) {
+    const STEP_S: f64 = 1e-3;
+    let steps = (motion.duration_s() / STEP_S).ceil();
+    assert!(steps > 0.0, "{who}: a motion takes time");
+    let at = |i: f64| motion.sample(i * STEP_S).position_rad;
+    let mut i = 0.0;
+    while i <= steps {
+        let q = at(i);
+        let (spheres_m, links_m) = ur5_distances_m(robot, scene, &q);
+        assert!(spheres_m > scene.margin_m, "{who}: {spheres_m} m from a sphere at {} s", i * STEP_S);
+        assert!(links_m > 0.0, "{who}: links {links_m} m apart at {} s", i * STEP_S);
+        let next = at(i + 1.0);
+        for (j, joint) in robot.joints.iter().enumerate() {
+            let speed = (next[j] - q[j]).abs() / STEP_S;
+            assert!(
+                speed <= joint.limits.motion.velocity_rad_s * (1.0 + 1e-6),
+                "{who}: joint {j} at {speed}"
+            );
+        }
+        i += 1.0;
+    }
+    for (j, (end, goal)) in motion.end_rad().iter().zip(goal).enumerate() {
+        assert!((end - goal).abs() < 1e-9, "{who}: joint {j} ends at {end}, not at {goal}");
+    }
+}

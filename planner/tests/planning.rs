@@ -1,0 +1,186 @@
+//! Planning: what it returns is safe by an independent check, what it cannot do it says, and seeds decide.
+mod common;
+use common::{assert_safe, pose, random_spheres, scene, sphere, ur5, ur5_distances_m};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use taustream_arm::{Robot, Scene};
+use taustream_motion::JointArray;
+use taustream_planner::draw::Draw;
+use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan, verify};
+
+fn options(seed: u64, deadline_ms: u64, planner: PlannerKind) -> PlanOptions {
+    PlanOptions { seed, deadline: Duration::from_millis(deadline_ms), planner }
+}
+
+/// A pose that the independent check finds free, away from the edge of the margin.
+fn free_pose(robot: &Robot, scene: &Scene, draw: &mut Draw) -> JointArray {
+    loop {
+        let q = pose(std::array::from_fn(|_| draw.within(-3.1, 3.1)));
+        let (spheres_m, links_m) = ur5_distances_m(robot, scene, &q);
+        if spheres_m > scene.margin_m + 0.01 && links_m > 0.01 {
+            return q;
+        }
+    }
+}
+
+/// Goal: no planner returns a motion that an independent dense sampler finds in collision or too fast.
+#[test]
+fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
+    let robot = ur5();
+    let (mut found, mut round) = (0, 0);
+    for seed in 0..24 {
+        let mut draw = Draw::new(seed, 100);
+        let scene = random_spheres(&mut draw);
+        let (start, goal) = (free_pose(&robot, &scene, &mut draw), free_pose(&robot, &scene, &mut draw));
+        let kind = PlannerKind::ALL[usize::try_from(seed).expect("small") % 4];
+        let Ok(plan) = plan(&robot, &scene, &start, &goal, &options(seed, 600, kind)) else { continue };
+        found += 1;
+        round += usize::from(!plan.how.starts_with("straight"));
+        assert_safe(&robot, &scene, &plan.trajectory, &goal, &format!("seed {seed}, {}", plan.how));
+        let proof = verify(&robot, &scene, &plan.trajectory).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        assert_eq!(proof, plan.proof, "seed {seed}: the proof is a function of the motion");
+    }
+    // Random poses of a UR5 in +-pi are often in parts that do not hang together.
+    assert!(found >= 10 && round >= 4, "{found} found, {round} of them round something");
+}
+
+#[test]
+fn independent_check_sees_a_motion_through_a_sphere() {
+    let robot = ur5();
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+    let through = plan(&robot, &free, &start, &goal, &options(0, 500, PlannerKind::Straight)).expect("free");
+    let pillar = Scene { obstacles: vec![sphere("ball", [-0.7, 0.0, 0.3], 0.05)], ..free };
+    let caught = std::panic::catch_unwind(|| {
+        assert_safe(&robot, &pillar, &through.trajectory, &goal, "planted");
+    });
+    assert!(caught.is_err(), "the checker itself must fail on a planted fault");
+}
+
+#[test]
+fn planning_one_seed_gives_one_answer_on_any_thread() {
+    let (robot, scene) = (ur5(), scene("pillars"));
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    // Only a run that the clock did not cut promises the same answer; a busy machine may need some tries for one.
+    let run = || -> Plan {
+        for _ in 0..20 {
+            let options = options(7, 700, PlannerKind::RrtConnect);
+            let plan = plan(&robot, &scene, &start, &goal, &options).expect("found");
+            if !plan.how.contains("cut short") {
+                return plan;
+            }
+        }
+        panic!("the clock cut in twenty times");
+    };
+    let first = run();
+    let (second, third) = std::thread::scope(|s| {
+        let (a, b) = (s.spawn(run), s.spawn(run));
+        (a.join().expect("no panic"), b.join().expect("no panic"))
+    });
+    for other in [second, third] {
+        assert_eq!((&first.trajectory, &first.how), (&other.trajectory, &other.how));
+    }
+    let other_seed = plan(&robot, &scene, &start, &goal, &options(8, 700, PlannerKind::RrtConnect));
+    assert_ne!(first.trajectory, other_seed.expect("found").trajectory, "another seed, another motion");
+}
+
+/// A goal inside a cage of spheres: every way in is shut, the goal itself is free.
+#[test]
+fn planning_to_an_unreachable_goal_fails_within_the_deadline_and_says_what_was_tried() {
+    let robot = ur5();
+    let mut draw = Draw::new(3, 0);
+    let open = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+    let goal = free_pose(&robot, &open, &mut draw);
+    let start = free_pose(&robot, &open, &mut draw);
+    let elbow = common::ur5_origins_m(&goal)[3];
+    // Six balls round the elbow's end, each a centimetre from the links beside it, hold the arm where it is.
+    let mut obstacles = Vec::new();
+    for (i, axis) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
+        for sign in [-1.0, 1.0] {
+            for reach_m in [0.2, 0.3, 0.4] {
+                let center_m = std::array::from_fn(|k| elbow[k] + sign * reach_m * axis[k]);
+                let mut ball = sphere(&format!("ball{i}"), center_m, 1e-3);
+                let (gap_m, _) =
+                    ur5_distances_m(&robot, &Scene { obstacles: vec![ball.clone()], ..open.clone() }, &goal);
+                if gap_m > 0.005 {
+                    ball.shape = taustream_arm::Shape::Sphere { radius_m: gap_m - 0.002 };
+                    obstacles.push(ball);
+                }
+            }
+        }
+    }
+    let caged = Scene { obstacles, ..open };
+    let (start_gap_m, _) = ur5_distances_m(&robot, &caged, &start);
+    assert!(caged.obstacles.len() >= 6 && start_gap_m > 0.0, "start {start_gap_m} m");
+    let began = Instant::now();
+    let result = plan(&robot, &caged, &start, &goal, &options(1, 400, PlannerKind::Auto));
+    let took = began.elapsed();
+    let Err(PlanError::NotFound { tried, .. }) = result else { panic!("{result:?}") };
+    assert!(tried.contains("straight line (blocked") && tried.contains("RRT-Connect"), "{tried}");
+    // Machines differ; ten times the deadline is not a matter of load any more.
+    assert!(took < Duration::from_secs(4), "took {took:?}");
+}
+
+#[test]
+fn planning_bad_poses_are_told_apart_with_their_offenders() {
+    let (robot, scene) = (ur5(), scene("pillars"));
+    let home = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let try_goal =
+        |goal| plan(&robot, &scene, &home, &goal, &options(0, 200, PlannerKind::Auto)).unwrap_err();
+    let try_start =
+        |start| plan(&robot, &scene, &start, &home, &options(0, 200, PlannerKind::Auto)).unwrap_err();
+
+    let far = pose([0.0, -1.57, 4.0, -1.57, -1.57, 0.0]);
+    let error = try_goal(far);
+    assert!(
+        matches!(&error, PlanError::OutsideLimits { which: PoseOf::Goal, joint: 2, name, by_rad, .. }
+            if name == "elbow" && (by_rad - 0.8584).abs() < 1e-9),
+        "{error:?}"
+    );
+    assert!(error.to_string().contains("joint 3 (elbow)") && error.to_string().contains("0.8584"), "{error}");
+    assert!(matches!(try_start(far), PlanError::OutsideLimits { which: PoseOf::Start, .. }));
+
+    let into_pillar = pose([0.0, -0.7, 0.7, -1.57, -1.57, 0.0]);
+    let error = try_goal(into_pillar);
+    assert!(error.to_string().contains("front_pillar"), "{error}");
+    assert!(matches!(error, PlanError::InCollision { which: PoseOf::Goal, .. }));
+    assert!(matches!(try_start(into_pillar), PlanError::InCollision { which: PoseOf::Start, .. }));
+
+    let mut nan = home;
+    nan[4] = f64::NAN;
+    assert!(matches!(try_goal(nan), PlanError::BadPose { which: PoseOf::Goal, joint: 4, .. }));
+    let mut seventh = home;
+    seventh[6] = 0.1;
+    assert!(matches!(try_goal(seventh), PlanError::BadPose { joint: 6, joints: 6, .. }));
+}
+
+#[test]
+fn planning_to_where_the_arm_is_gives_a_motion_that_stays() {
+    let (robot, scene) = (ur5(), scene("open"));
+    let home = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let plan = plan(&robot, &scene, &home, &home, &options(0, 200, PlannerKind::Auto)).expect("there");
+    assert_eq!((plan.trajectory.base_rad(), plan.trajectory.end_rad()), (&home, home));
+    assert_eq!(plan.how, "already there");
+}
+
+#[test]
+fn planning_without_any_time_fails_clearly() {
+    let (robot, scene) = (ur5(), scene("pillars"));
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    for kind in PlannerKind::ALL {
+        let error = plan(&robot, &scene, &start, &goal, &options(0, 0, kind)).unwrap_err();
+        assert!(matches!(error, PlanError::NotFound { cut_short: true, .. }), "{kind:?}: {error}");
+        assert!(error.to_string().contains("deadline"), "{error}");
+    }
+}
+
+#[test]
+fn planner_names_are_read_as_they_are_written() {
+    for kind in PlannerKind::ALL {
+        assert_eq!(PlannerKind::from_name(kind.name()), Some(kind));
+    }
+    assert_eq!(PlannerKind::from_name("teleport"), None);
+}
