@@ -117,3 +117,71 @@ impl Checker {
         self.results.try_recv().ok()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use taustream_messages::trajectory::Doctored;
+    use taustream_motion::{Stroke, Trajectory};
+
+    const BASE_RAD: [f64; MAX_JOINTS] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0];
+
+    fn robot() -> Robot {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
+        Robot::load(&file).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    fn message(duration_s: f64, replaces: Replaces) -> Box<TrajectoryMessage> {
+        let delta_rad = [0.5, 0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0];
+        let stroke = Stroke { start_s: 0.0, duration_s, n: 6, delta_rad };
+        let trajectory = Trajectory::new(6, BASE_RAD, &[stroke]).unwrap();
+        let robot_digest = robot().digest;
+        let checked =
+            CheckedTrajectory { trajectory_id: 7, generation: 1, robot_digest, replaces, trajectory };
+        TrajectoryMessage::new(&checked)
+    }
+
+    #[test]
+    fn check_of_a_sound_trajectory_lets_it_through_bit_by_bit() {
+        let checked = Rules::of(&robot()).check(&message(2.0, Replaces::Rest)).unwrap();
+        assert_eq!(message(2.0, Replaces::Rest), TrajectoryMessage::new(&checked));
+    }
+
+    #[test]
+    fn check_of_each_doctored_message_is_refused_with_its_reason() {
+        let rules = Rules::of(&robot());
+        let table: [(Doctored, &str); 12] = [
+            (Doctored::Layout(99), "layout version 99"),
+            (Doctored::Joints(9), "joint_count is 9"),
+            (Doctored::Joints(7), "wrong joint count: 7 for an arm of 6"),
+            (Doctored::StrokeCount(600), "stroke_count is 600"),
+            (Doctored::Exponent(3), "n is 3"),
+            (Doctored::Delta(f64::NAN), "delta_rad is not finite"),
+            (Doctored::Duration(0.0), "duration_s is 0"),
+            (Doctored::Start(-1.0), "start_s is -1"),
+            (Doctored::Base(f64::INFINITY), "base_rad of joint 0"),
+            (Doctored::Base(9.0), "limit of joint 1"),
+            (Doctored::Replaces(7), "replaces code 7"),
+            (Doctored::Digest(1), "wrong robot"),
+        ];
+        for (how, words) in table {
+            let spoiled = message(2.0, Replaces::Rest).doctored(how);
+            let sentence = rules.check(&spoiled).unwrap_err().to_string();
+            assert!(sentence.contains(words), "{how:?}: {sentence}");
+        }
+    }
+
+    #[test]
+    fn check_of_a_motion_too_fast_names_joint_time_and_limit() {
+        let refused = Rules::of(&robot()).check(&message(0.3, Replaces::Rest));
+        assert!(matches!(refused, Err(Rejection::Limit { joint: 0, .. })), "{refused:?}");
+    }
+
+    #[test]
+    fn check_of_a_cut_is_refused_as_unsupported() {
+        let cut = Replaces::Cut { trajectory_id: 3, at_s: 0.5 };
+        let refused = Rules::of(&robot()).check(&message(2.0, cut));
+        assert!(matches!(refused, Err(Rejection::CutUnsupported { .. })), "{refused:?}");
+    }
+}

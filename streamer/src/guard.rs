@@ -331,3 +331,123 @@ fn reach_rad(v: f64, a: f64, a_max: f64, j: f64) -> f64 {
     };
     distance.max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tick::Tick;
+    use taustream_motion::LimitSet;
+
+    const PERIOD_S: f64 = 1e-3;
+
+    fn limits() -> [JointLimits; MAX_JOINTS] {
+        let motion = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
+        let stop = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 30.0, jerk_rad_s3: 600.0 };
+        [JointLimits { position_rad: [-3.0, 3.0], motion, stop }; MAX_JOINTS]
+    }
+
+    /// Feeds one joint's positions with rates that belong to them, and returns the first trip.
+    fn first_trip(motion: impl Fn(f64) -> JointState, ticks: u32) -> Option<(u32, Trip)> {
+        let mut guard = Guard::new(limits(), 6, 1_000);
+        (0..ticks).find_map(|tick| {
+            let state = motion(f64::from(tick) * PERIOD_S);
+            let mut facts = Facts::begin(Tick::default());
+            let mut setpoint = Setpoint::default();
+            setpoint.position_rad[2] = state.position_rad;
+            setpoint.velocity_rad_s[2] = state.velocity_rad_s;
+            setpoint.acceleration_rad_s2[2] = state.acceleration_rad_s2;
+            guard.limit(&Wanted { setpoint, periods: 1, restart: tick == 0, live: true }, &mut facts);
+            guard.commit(&facts);
+            facts.trip.map(|trip| (tick, trip))
+        })
+    }
+
+    /// A sine from rest: position 1 - cos, so velocity and acceleration begin at 0 and at its peak.
+    fn wave(amplitude_rad: f64, rate: f64) -> impl Fn(f64) -> JointState {
+        // A cubic start hides the step of the acceleration: amplitude grows with (1 - e^-t)^4.
+        move |t| {
+            let ease = |t: f64| {
+                let g = 1.0 - (-t * 2.0).exp();
+                amplitude_rad * g * g * g * g * (rate * t).sin()
+            };
+            let h = 1e-4;
+            JointState {
+                position_rad: ease(t),
+                velocity_rad_s: (ease(t + h) - ease(t - h)) / (2.0 * h),
+                acceleration_rad_s2: (ease(t + h) - 2.0 * ease(t) + ease(t - h)) / (h * h),
+            }
+        }
+    }
+
+    #[test]
+    fn guard_on_a_smooth_motion_inside_the_limits_never_trips() {
+        assert_eq!(first_trip(wave(0.5, 4.0), 5_000), None);
+    }
+
+    #[test]
+    fn guard_on_each_planted_fault_names_kind_and_joint() {
+        let smooth = wave(0.5, 4.0);
+        type Spoil = fn(JointState) -> JointState;
+        let table: [(Spoil, fn(TripKind) -> bool); 5] = [
+            (|s| JointState { position_rad: f64::NAN, ..s }, |k| k == TripKind::NotFinite),
+            (|s| JointState { acceleration_rad_s2: f64::INFINITY, ..s }, |k| k == TripKind::NotFinite),
+            (
+                |s| JointState { position_rad: s.position_rad + 1e-5, ..s },
+                |k| k == TripKind::Limit(Quantity::Jerk),
+            ),
+            (
+                |s| JointState { velocity_rad_s: s.velocity_rad_s + 0.1, ..s },
+                |k| k == TripKind::Inconsistent(Quantity::Velocity),
+            ),
+            (
+                |s| JointState { acceleration_rad_s2: s.acceleration_rad_s2 - 3.0, ..s },
+                |k| k == TripKind::Inconsistent(Quantity::Acceleration),
+            ),
+        ];
+        for (row, (spoil, expected)) in table.into_iter().enumerate() {
+            let doctored = |t: f64| if t > 1.0 { spoil(smooth(t)) } else { smooth(t) };
+            let (tick, trip) = first_trip(doctored, 5_000).unwrap_or_else(|| panic!("row {row} passed"));
+            assert_eq!((tick, trip.joint), (1_001, 2), "row {row}: {trip:?}");
+            assert!(expected(trip.kind), "row {row}: {trip:?}");
+        }
+    }
+
+    #[test]
+    fn guard_on_too_much_of_each_quantity_trips() {
+        for (amplitude_rad, rate, what) in [(2.9, 1.6, "velocity"), (0.3, 12.0, "rates"), (4.0, 0.5, "range")]
+        {
+            let (_, trip) = first_trip(wave(amplitude_rad, rate), 20_000).unwrap_or_else(|| panic!("{what}"));
+            let stopped_early = trip.kind == TripKind::CannotStop;
+            assert!(stopped_early || matches!(trip.kind, TripKind::Limit(_)), "{what}: {trip:?}");
+        }
+    }
+
+    /// Independent: small steps of the hardest braking instead of the closed form.
+    #[test]
+    fn guard_reach_agrees_with_stepping_through_the_hardest_braking() {
+        let (a_max, j) = (30.0, 600.0);
+        let mut reached = 0;
+        for seed in 0..2_000_u32 {
+            let part = |k: u32| f64::from(seed.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) / 65_536.0;
+            let (v0, a0) = (part(3) * 6.0 - 3.0, part(17) * 60.0 - 30.0);
+            let (mut q, mut v, mut a, mut farthest) = (0.0_f64, v0, a0, 0.0_f64);
+            let dt = 1e-6;
+            for _ in 0..400_000 {
+                a = (a - j * dt).max(-a_max);
+                v += a * dt;
+                q += v * dt;
+                farthest = farthest.max(q);
+                if v < 0.0 && a < 0.0 {
+                    break;
+                }
+            }
+            let closed = reach_rad(v0, a0, a_max, j);
+            reached += u32::from(closed > 0.0);
+            assert!(
+                (closed - farthest).abs() < 1e-4,
+                "seed {seed}: v {v0}, a {a0}: {closed} against {farthest}"
+            );
+        }
+        assert!(reached > 500, "only {reached} moved on");
+    }
+}
