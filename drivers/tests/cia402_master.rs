@@ -1,11 +1,16 @@
 //! The CiA 402 master against scripted drives and against frames written out by hand.
-mod cia402_bench;
+#![expect(clippy::panic, clippy::unwrap_used, reason = "a test ends by panicking")]
+mod cia402_suite;
 
-use cia402_bench::{
-    Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, frame, hex, settings,
+use cia402_suite::{
+    Bench, CountingAllocator, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON,
+    frame, hex, settings,
 };
 use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, counts_from_rad};
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Every frame that node 1 is sent from the first look to NMT start, written out from can-protocols 1.2 to 1.5.
 const BRING_UP_OF_NODE_1: &str = "
@@ -55,7 +60,8 @@ fn bring_up_of_one_node_sends_the_golden_frames() {
     let mut seen: Vec<String> =
         bench.drives[0].seen.iter().filter(|f| f.id().raw() != 0x201).map(hex).collect();
     // The statusword is looked at again for as long as the bus is listened to.
-    seen.dedup();
+    let looks = seen.iter().take_while(|line| line.contains(" 40 41 60 ")).count();
+    seen.drain(1..looks);
     let golden: Vec<&str> = BRING_UP_OF_NODE_1.trim().lines().collect();
     assert_eq!(seen, golden);
 }
@@ -190,7 +196,7 @@ fn listen_finds_an_energised_drive_and_leaves_it_untouched() {
 fn listen_holds_back_the_reset_while_another_master_sends_sync() {
     let mut bench = Bench::new(1);
     for _ in 0..1_000 {
-        bench.driver.decode(bench.now, &frame(0x080, &[]));
+        bench.decode(&frame(0x080, &[]));
         bench.step();
         assert!(bench.sent.iter().all(|f| f.id().raw() != 0x000), "NMT on a bus with another master");
     }
@@ -203,7 +209,7 @@ fn listen_wakes_a_node_in_nmt_stopped_without_a_reset() {
     let mut bench = Bench::new(1);
     bench.drives[0].nmt = 0x04;
     bench.steps(50);
-    bench.driver.decode(bench.now, &frame(0x701, &[0x04]));
+    bench.decode(&frame(0x701, &[0x04]));
     bench.step();
     assert!(bench.sent.iter().any(|f| hex(f) == "000 80 01"));
     bench.until(DriveState::Disabled, 3_000);
@@ -406,7 +412,7 @@ fn enabled_drive_that_does_not_follow_is_a_fault_but_stays_energised() {
 fn fault_reports_its_emergency_code_and_is_reset_by_one_edge() {
     let mut bench = Bench::enabled(2);
     bench.drives[0].status = FAULT;
-    bench.driver.decode(bench.now, &frame(0x081, &[0x11, 0x86, 0x21, 0, 0, 0, 0, 0]));
+    bench.decode(&frame(0x081, &[0x11, 0x86, 0x21, 0, 0, 0, 0, 0]));
     bench.steps(3);
     let status = bench.status(0);
     assert_eq!((status.state, status.error_code), (DriveState::Fault, 0x8611));
@@ -479,7 +485,7 @@ fn restart_of_a_drive_in_use_is_a_fault_and_is_configured_again_only_when_disabl
     let mut out = Vec::new();
     bench.drives[0].boot(&mut out);
     bench.drives[0].status = SWITCH_ON_DISABLED;
-    bench.driver.decode(bench.now, &out[0]);
+    bench.decode(&out[0]);
     let seen = bench.drives[0].seen.len();
     bench.steps(1_000);
     assert_eq!(bench.status(0).state, DriveState::Fault);

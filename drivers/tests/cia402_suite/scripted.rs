@@ -1,53 +1,47 @@
-//! A scripted CiA 402 drive and a bench that runs the master against such drives.
+//! A scripted CiA 402 drive.
 //!
 //! Written from the protocol tables alone, with bytes as bytes: it shares no encoder with the code under test.
-#![allow(dead_code, clippy::allow_attributes, reason = "each test program uses its part of the bench")]
 use std::collections::BTreeMap;
-use std::path::Path;
-use taustream_arm::Settings;
-use taustream_drivers::codec::cia402::Cia402Driver;
-use taustream_drivers::{
-    CanFrame, CanId, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
-};
+use taustream_drivers::{CanFrame, CanId};
 
 /// Statuswords of the table, with bits 4, 9 and so on as drives have them.
-pub const SWITCH_ON_DISABLED: u16 = 0x0250;
-pub const READY: u16 = 0x0231;
-pub const SWITCHED_ON: u16 = 0x0233;
-pub const ENABLED: u16 = 0x0237;
-pub const QUICK_STOP: u16 = 0x0217;
-pub const FAULT: u16 = 0x0218;
-pub const FOLLOWS: u16 = 0x1000;
+pub(crate) const SWITCH_ON_DISABLED: u16 = 0x0250;
+pub(crate) const READY: u16 = 0x0231;
+pub(crate) const SWITCHED_ON: u16 = 0x0233;
+pub(crate) const ENABLED: u16 = 0x0237;
+pub(crate) const QUICK_STOP: u16 = 0x0217;
+pub(crate) const FAULT: u16 = 0x0218;
+pub(crate) const FOLLOWS: u16 = 0x1000;
 
-pub fn frame(id: u16, bytes: &[u8]) -> CanFrame {
+pub(crate) fn frame(id: u16, bytes: &[u8]) -> CanFrame {
     CanFrame::classic(CanId::standard(id), bytes)
 }
 
-pub fn hex(frame: &CanFrame) -> String {
+pub(crate) fn hex(frame: &CanFrame) -> String {
     let bytes: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
     format!("{:03X} {}", frame.id().raw(), bytes.join(" ")).trim_end().to_owned()
 }
 
 /// One drive that does what its script says and notes what it was sent.
-pub struct Scripted {
-    pub id: u8,
+pub(crate) struct Scripted {
+    pub(crate) id: u8,
     /// 0x7F pre-operational, 0x05 operational, 0x04 stopped.
-    pub nmt: u8,
-    pub status: u16,
-    pub position: i32,
+    pub(crate) nmt: u8,
+    pub(crate) status: u16,
+    pub(crate) position: i32,
     /// Width and value of objects that can be read.
-    pub objects: BTreeMap<(u16, u8), (usize, u32)>,
+    pub(crate) objects: BTreeMap<(u16, u8), (usize, u32)>,
     /// Objects that are refused, with the abort code.
-    pub refused: BTreeMap<(u16, u8), u32>,
+    pub(crate) refused: BTreeMap<(u16, u8), u32>,
     /// Sends and takes nothing.
-    pub silent: bool,
+    pub(crate) silent: bool,
     /// Follows the controlword through the state machine; otherwise `status` is the test's.
-    pub obeys: bool,
+    pub(crate) obeys: bool,
     /// Answers reads of four-byte objects by segments.
-    pub segments: bool,
-    pub control: u16,
-    pub target: i32,
-    pub seen: Vec<CanFrame>,
+    pub(crate) segments: bool,
+    pub(crate) control: u16,
+    pub(crate) target: i32,
+    pub(crate) seen: Vec<CanFrame>,
     latched: Option<(u16, i32)>,
     segment: Option<u32>,
     heartbeat_ms: u64,
@@ -55,7 +49,7 @@ pub struct Scripted {
 }
 
 impl Scripted {
-    pub fn new(id: u8) -> Self {
+    pub(crate) fn new(id: u8) -> Self {
         let mut objects = BTreeMap::new();
         objects.insert((0x1000, 0), (4, 0x0002_0192));
         objects.insert((0x1018, 1), (4, 0x0000_0539));
@@ -86,7 +80,7 @@ impl Scripted {
         base + u16::from(self.id)
     }
 
-    pub fn take(&mut self, sent: &CanFrame, out: &mut Vec<CanFrame>) {
+    pub(crate) fn take(&mut self, sent: &CanFrame, out: &mut Vec<CanFrame>) {
         if self.silent {
             return;
         }
@@ -113,13 +107,13 @@ impl Scripted {
         }
     }
 
-    pub fn boot(&mut self, out: &mut Vec<CanFrame>) {
+    pub(crate) fn boot(&mut self, out: &mut Vec<CanFrame>) {
         self.nmt = 0x7F;
         self.heartbeat_ms = 0;
         out.push(frame(self.me(0x700), &[0x00]));
     }
 
-    pub fn tick(&mut self, ms: u64, out: &mut Vec<CanFrame>) {
+    pub(crate) fn tick(&mut self, ms: u64, out: &mut Vec<CanFrame>) {
         if self.heartbeat_ms > 0 && ms.is_multiple_of(self.heartbeat_ms) && !self.silent {
             out.push(frame(self.me(0x700), &[self.nmt]));
         }
@@ -196,121 +190,5 @@ impl Scripted {
             (0x6064, 0) => Some((4, self.position.cast_unsigned())),
             other => self.objects.get(&other).copied(),
         }
-    }
-}
-
-/// A master and its scripted drives; one step is one cycle of 1 ms.
-pub struct Bench {
-    pub settings: Settings,
-    pub driver: Cia402Driver,
-    pub drives: Vec<Scripted>,
-    pub now: Nanos,
-    pub ms: u64,
-    pub wish: DriveWish,
-    pub commands: [JointCommand; 8],
-    /// Frames of the newest cycle.
-    pub sent: Vec<CanFrame>,
-}
-
-/// The shipped settings with this many servos.
-pub fn settings(servos: usize) -> Settings {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
-    let mut settings = Settings::load(&file).unwrap();
-    settings.servos.truncate(servos);
-    settings
-}
-
-impl Bench {
-    /// Drives with the node ids of the shipped settings.
-    pub fn new(servos: usize) -> Self {
-        Self::with(settings(servos))
-    }
-
-    pub fn with(settings: Settings) -> Self {
-        let driver = Cia402Driver::new(&settings, 0).unwrap();
-        let drives = settings.servos.iter().map(|servo| Scripted::new(servo.node_id)).collect();
-        Self {
-            settings,
-            driver,
-            drives,
-            now: Nanos(7_000_000_000),
-            ms: 0,
-            wish: DriveWish::Disabled,
-            commands: [JointCommand::default(); 8],
-            sent: Vec::new(),
-        }
-    }
-
-    pub fn step(&mut self) {
-        let mut batch = FrameBatch::new();
-        self.driver.encode(self.now, self.wish, &self.commands, &mut batch);
-        self.sent = batch.frames().to_vec();
-        let mut replies = Vec::new();
-        for drive in &mut self.drives {
-            for frame in &self.sent {
-                drive.take(frame, &mut replies);
-            }
-            drive.tick(self.ms, &mut replies);
-        }
-        for reply in &replies {
-            self.driver.decode(self.now, reply);
-        }
-        self.now.0 += 1_000_000;
-        self.ms += 1;
-    }
-
-    pub fn steps(&mut self, count: u64) {
-        for _ in 0..count {
-            self.step();
-        }
-    }
-
-    pub fn status(&self, joint: usize) -> ServoStatus {
-        self.driver.status(joint)
-    }
-
-    pub fn states(&self) -> Vec<DriveState> {
-        (0..self.drives.len()).map(|joint| self.status(joint).state).collect()
-    }
-
-    /// Steps until every drive is in the state; fails after `most` cycles.
-    pub fn until(&mut self, state: DriveState, most: u64) {
-        for _ in 0..most {
-            if self.states().iter().all(|other| *other == state) {
-                return;
-            }
-            self.step();
-        }
-        let codes: Vec<String> = (0..self.drives.len())
-            .map(|joint| format!("{:X?}", (self.status(joint).error_code, self.status(joint).refused_object)))
-            .collect();
-        panic!("not {state:?} after {most} cycles but {:?}, codes {codes:?}", self.states());
-    }
-
-    /// Sets the commands to where the joints are, as the streamer does before it enables.
-    pub fn hold(&mut self) {
-        for joint in 0..self.drives.len() {
-            self.commands[joint].position_rad = self.status(joint).position_rad;
-        }
-    }
-
-    /// All drives up, configured and energised.
-    pub fn enabled(servos: usize) -> Self {
-        let mut bench = Self::new(servos);
-        bench.until(DriveState::Disabled, 2_000);
-        bench.hold();
-        bench.wish = DriveWish::Enabled;
-        bench.step();
-        bench.until(DriveState::Enabled, 100);
-        bench
-    }
-
-    /// Controlword and target of the newest cycle's RPDO to a drive.
-    pub fn rpdo(&self, drive: usize) -> Option<(u16, i32)> {
-        let id = u32::from(self.drives[drive].me(0x200));
-        let frame = self.sent.iter().find(|frame| frame.id().raw() == id)?;
-        let data = frame.data();
-        let target = i32::from_le_bytes(data[2..6].try_into().unwrap());
-        Some((u16::from_le_bytes([data[0], data[1]]), target))
     }
 }

@@ -1,0 +1,181 @@
+//! What must hold whatever the drives say: random statusword walks, random frames.
+use super::{Bench, Draw, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON};
+use taustream_drivers::codec::cia402::counts_from_rad;
+use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+
+/// What one setpoint is judged by.
+#[derive(Clone, Copy)]
+struct Setpoint {
+    wish: DriveWish,
+    /// The newest statusword and position that the master was given.
+    heard: (u16, i32),
+    /// The encoded command; none when it was no number.
+    command: Option<i32>,
+    /// Most counts between command and position for energising.
+    near: i32,
+    /// Target before this one.
+    before: i32,
+    control: u16,
+    target: i32,
+}
+
+/// The rules for what may be sent to a drive; the first broken one.
+fn judge(s: Setpoint) -> Result<(), &'static str> {
+    let state = s.heard.0 & 0x6F;
+    if ![0x00, 0x02, 0x06, 0x07, 0x0F, 0x80].contains(&s.control) {
+        return Err("a controlword that the table does not have");
+    }
+    if s.wish == DriveWish::TorqueOff && s.control != 0x00 && s.control != 0x80 {
+        return Err("torque off was wished");
+    }
+    if s.control == 0x0F {
+        if s.wish != DriveWish::Enabled {
+            return Err("enable without the wish");
+        }
+        if state != 0x23 && state != 0x27 {
+            return Err("enable to a drive that is not switched on");
+        }
+        if s.target != s.command.unwrap_or(s.before) {
+            return Err("an energised target that is not the command");
+        }
+        let far = s.command.is_none_or(|command| command.abs_diff(s.heard.1) > s.near.unsigned_abs());
+        if state == 0x23 && far {
+            return Err("energised far from the command");
+        }
+    } else if s.target != s.heard.1 && Some(s.target) != s.command && s.target != s.before {
+        return Err("a target that is neither command nor position");
+    }
+    Ok(())
+}
+
+const GOOD: Setpoint = Setpoint {
+    wish: DriveWish::Enabled,
+    heard: (SWITCHED_ON, 100),
+    command: Some(110),
+    near: 50,
+    before: 90,
+    control: 0x0F,
+    target: 110,
+};
+
+#[test]
+fn judge_of_setpoints_finds_every_planted_fault() {
+    assert_eq!(judge(GOOD), Ok(()));
+    let planted = [
+        Setpoint { heard: (READY, 100), ..GOOD },
+        Setpoint { heard: (FAULT, 100), ..GOOD },
+        Setpoint { wish: DriveWish::Disabled, ..GOOD },
+        Setpoint { wish: DriveWish::TorqueOff, ..GOOD },
+        Setpoint { wish: DriveWish::TorqueOff, control: 0x02, ..GOOD },
+        Setpoint { control: 0x1F, ..GOOD },
+        Setpoint { target: 111, ..GOOD },
+        Setpoint { heard: (SWITCHED_ON, 161), ..GOOD },
+        Setpoint { command: None, ..GOOD },
+        Setpoint { control: 0x06, target: 7, ..GOOD },
+    ];
+    for (number, setpoint) in planted.into_iter().enumerate() {
+        assert!(judge(setpoint).is_err(), "planted fault {number} passed");
+    }
+}
+
+#[test]
+fn random_statuswords_wishes_and_commands_never_break_the_rules_of_setpoints() {
+    let (mut judged, mut enables, mut reached) = (0, 0, 0);
+    for seed in 0..400 {
+        let mut draw = Draw::from_seed(seed);
+        let mut bench = Bench::new(2);
+        bench.until(DriveState::Disabled, 2_000);
+        bench.hold();
+        let mut before: Vec<i32> = (0..2).map(|drive| bench.rpdo(drive).unwrap().1).collect();
+        for cycle in 0..400 {
+            stir(&mut bench, &mut draw);
+            let heard = bench.heard.clone();
+            bench.step();
+            reached += usize::from(bench.status(0).state == DriveState::Enabled);
+            for drive in 0..2 {
+                let Some((control, target)) = bench.rpdo(drive) else { continue };
+                let servo = &bench.settings.servos[drive];
+                let position_rad = bench.commands[drive].position_rad;
+                let command = position_rad.is_finite().then(|| counts_from_rad(servo, position_rad));
+                // 0.05 rad, the shipped position_jump_rad_max, and one count for rounding.
+                let near = counts_from_rad(servo, servo.zero_offset_rad + 0.05).abs() + 1;
+                let Some(heard) = heard[drive] else { panic!("setpoints before feedback") };
+                let (wish, before_it) = (bench.wish, before[drive]);
+                let setpoint = Setpoint { wish, heard, command, near, before: before_it, control, target };
+                if let Err(rule) = judge(setpoint) {
+                    panic!("seed {seed}, cycle {cycle}, drive {drive}: {rule}: {control:#06x} to {heard:?}");
+                }
+                before[drive] = target;
+                judged += 1;
+                enables += usize::from(control == 0x0F);
+            }
+        }
+    }
+    assert!(judged > 100_000 && enables > 5_000 && reached > 2_000, "{judged} {enables} {reached}");
+}
+
+/// Changes something of the world, seldom enough that sequences get somewhere.
+fn stir(bench: &mut Bench, draw: &mut Draw) {
+    let words =
+        [SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED, ENABLED | FOLLOWS, QUICK_STOP, FAULT, 0x021F];
+    for drive in &mut bench.drives {
+        if draw.chance(0.02) {
+            drive.obeys = draw.chance(0.7);
+            drive.status = if draw.chance(0.9) { words[draw.below(8)] } else { (draw.next() >> 48) as u16 };
+        }
+        if draw.chance(0.01) {
+            drive.silent = draw.chance(0.2);
+        }
+        drive.position = drive.position.wrapping_add(draw.below(2_001) as i32 - 1_000);
+    }
+    if draw.chance(0.05) {
+        bench.wish = [DriveWish::Disabled, DriveWish::Enabled, DriveWish::Enabled, DriveWish::TorqueOff]
+            [draw.below(4)];
+    }
+    if draw.chance(0.02) {
+        bench.driver.clear_faults();
+    }
+    if draw.chance(0.1) {
+        bench.hold();
+    }
+    let command = &mut bench.commands[draw.below(2)];
+    if draw.chance(0.05) {
+        command.position_rad = [f64::NAN, 1e9, f64::NEG_INFINITY, 0.3][draw.below(4)];
+    } else {
+        command.position_rad += draw.within(-0.01, 0.01);
+    }
+}
+
+#[test]
+fn random_frames_in_any_stage_never_panic_nor_break_the_frame_rules_and_the_master_recovers() {
+    for seed in 0..150 {
+        let mut draw = Draw::from_seed(seed);
+        let mut bench = Bench::new(3);
+        bench.steps(draw.below(400) as u64);
+        for _ in 0..300 {
+            for _ in 0..draw.below(8) {
+                let any = draw.frame();
+                bench.decode(&any);
+            }
+            bench.step();
+            // SYNC, three setpoints, NMT and SDO a node, the master's heartbeat.
+            assert!(bench.sent.len() <= 1 + 3 + 3 * 2 + 1, "seed {seed}: {} frames", bench.sent.len());
+            for (place, sent) in bench.sent.iter().enumerate() {
+                let id = sent.id().raw();
+                assert!(id != 0x080 || place == 0, "seed {seed}: SYNC is not first");
+                assert!(
+                    !(0x201..=0x203).contains(&id) || sent.data()[0] & 0x0F != 0x0F,
+                    "seed {seed}: enabled"
+                );
+                let same = bench.sent.iter().filter(|other| other.id() == sent.id()).count();
+                assert!(id == 0 || same == 1, "seed {seed}: {id:03X} twice in a cycle");
+            }
+        }
+        bench.driver.clear_faults();
+        for _ in 0..3 {
+            bench.steps(3_000);
+            bench.driver.clear_faults();
+        }
+        assert_eq!(bench.states(), [DriveState::Disabled; 3], "seed {seed}: the noise left a mark");
+    }
+}
