@@ -1,7 +1,5 @@
 //! CAN frames, classic and FD, in one fixed-size type.
 
-/// Flag of a 29-bit id in [`CanId`] (as in linux/can.h).
-const EXTENDED: u32 = 0x8000_0000;
 /// Flag of a remote request in [`CanId`].
 const REMOTE: u32 = 0x4000_0000;
 /// Flag of an error frame in [`CanId`].
@@ -30,10 +28,11 @@ impl CanId {
     pub const fn raw(self) -> u32 {
         self.0
     }
-    /// The 11-bit id of a standard data frame; `None` for extended, remote and error frames.
+    /// The 11-bit id of a standard data frame; `None` for extended, remote and error frames, and for an id that no
+    /// kernel gives (more than 11 bits without the flag): its low bits must not pass for somebody's id.
     #[must_use]
     pub const fn as_standard_data(self) -> Option<u16> {
-        if self.0 & (EXTENDED | REMOTE | ERROR) == 0 { Some((self.0 & STANDARD_MAX) as u16) } else { None }
+        if self.0 <= STANDARD_MAX { Some((self.0 & STANDARD_MAX) as u16) } else { None }
     }
     /// True for an error frame of the kernel.
     #[must_use]

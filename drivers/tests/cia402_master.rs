@@ -316,16 +316,16 @@ fn enabled_drives_get_the_encoded_commands_and_keep_the_last_when_one_is_no_numb
     let expected: Vec<i32> = (0..6)
         .map(|joint| counts_from_rad(&bench.settings.servos[joint], bench.commands[joint].position_rad))
         .collect();
-    for joint in 0..6 {
-        assert_eq!(bench.rpdo(joint), Some((0x000F, expected[joint])), "joint {joint}");
+    for (joint, counts) in expected.iter().enumerate() {
+        assert_eq!(bench.rpdo(joint), Some((0x000F, *counts)), "joint {joint}");
     }
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for command in &mut bench.commands {
             command.position_rad = bad;
         }
         bench.step();
-        for joint in 0..6 {
-            assert_eq!(bench.rpdo(joint), Some((0x000F, expected[joint])), "joint {joint}, {bad}");
+        for (joint, counts) in expected.iter().enumerate() {
+            assert_eq!(bench.rpdo(joint), Some((0x000F, *counts)), "joint {joint}, {bad}");
         }
     }
 }

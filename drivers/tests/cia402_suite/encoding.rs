@@ -53,7 +53,7 @@ fn encoding_there_and_back_gives_the_same_counts() {
         let mut draw = Draw::from_seed(seed);
         let sign = if draw.chance(0.5) { 1.0 } else { -1.0 };
         let any = servo(sign, draw.within(1.0, 200.0), draw.within(500.0, 2e6), draw.within(-7.0, 7.0));
-        let counts = (draw.next() >> 34) as i32 - (1 << 29);
+        let counts = i32::from(draw.word() >> 2) * (1 << 15) + i32::from(draw.word()) - (1 << 28);
         let rad = rad_from_counts(&any, counts);
         assert_eq!(counts_from_rad(&any, rad), counts, "seed {seed}");
         let step_rad = TAU / (any.gear_ratio * any.counts_per_rev);

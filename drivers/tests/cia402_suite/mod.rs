@@ -177,6 +177,9 @@ impl Draw {
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         z ^ (z >> 31)
     }
+    pub(crate) fn word(&mut self) -> u16 {
+        u16::try_from(self.next() >> 48).unwrap()
+    }
     pub(crate) fn below(&mut self, count: u64) -> usize {
         usize::try_from(self.next() % count).unwrap()
     }
@@ -190,7 +193,7 @@ impl Draw {
     pub(crate) fn frame(&mut self) -> CanFrame {
         let bases = [0x000, 0x080, 0x180, 0x200, 0x280, 0x580, 0x580, 0x580, 0x600, 0x700, 0x700, 0x7FF];
         let node = u16::try_from(self.below(5)).unwrap();
-        let id = if self.chance(0.9) { bases[self.below(12)] + node } else { self.next() as u16 };
+        let id = if self.chance(0.9) { bases[self.below(12)] + node } else { self.word() };
         let mut bytes = self.next().to_le_bytes();
         if self.chance(0.5) {
             bytes[0] = [0x43, 0x4B, 0x4F, 0x60, 0x80, 0x41, 0x00, 0x05, 0x7F, 0x37][self.below(10)];
@@ -201,7 +204,10 @@ impl Draw {
         let len = if self.chance(0.7) { [1, 6, 8][self.below(3)] } else { self.below(9) };
         match self.below(20) {
             0 => CanFrame::fd(CanId::standard(id), &bytes),
-            1 => CanFrame::classic(CanId::from_raw(self.next() as u32), &bytes[..len]),
+            1 => CanFrame::classic(
+                CanId::from_raw(u32::from(self.word()) << 16 | u32::from(self.word())),
+                &bytes[..len],
+            ),
             _ => CanFrame::classic(CanId::standard(id), &bytes[..len]),
         }
     }

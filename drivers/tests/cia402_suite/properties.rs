@@ -121,12 +121,12 @@ fn stir(bench: &mut Bench, draw: &mut Draw) {
     for drive in &mut bench.drives {
         if draw.chance(0.02) {
             drive.obeys = draw.chance(0.7);
-            drive.status = if draw.chance(0.9) { words[draw.below(8)] } else { (draw.next() >> 48) as u16 };
+            drive.status = if draw.chance(0.9) { words[draw.below(8)] } else { draw.word() };
         }
         if draw.chance(0.01) {
             drive.silent = draw.chance(0.2);
         }
-        drive.position = drive.position.wrapping_add(draw.below(2_001) as i32 - 1_000);
+        drive.position = drive.position.wrapping_add(i32::from(draw.word() >> 5) - 1_024);
     }
     if draw.chance(0.05) {
         bench.wish = [DriveWish::Disabled, DriveWish::Enabled, DriveWish::Enabled, DriveWish::TorqueOff]
