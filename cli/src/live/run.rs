@@ -156,6 +156,6 @@ fn check_ready(
 fn explain(error: SendError) -> Failure {
     match error {
         SendError::Service(error) => Failure::Service(error),
-        SendError::WrongRobot { .. } | SendError::Publish { .. } => Failure::Refused(error.to_string()),
+        SendError::WrongRobot { .. } | SendError::Transport { .. } => Failure::Refused(error.to_string()),
     }
 }
