@@ -321,3 +321,89 @@ fn axes(robot: &Robot) -> Vec<Axis> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::Draw;
+    use std::path::{Path, PathBuf};
+
+    fn ur5() -> Robot {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
+        Robot::load(&file).expect("shipped")
+    }
+
+    fn ends_m(world: &World, q: &JointArray, body: usize) -> [nalgebra::Vector3<f64>; 2] {
+        // The ends of a link's capsule are the origins of its two frames.
+        let frames = world.robot.chain.frames(q);
+        let frame = world.links[body].frame;
+        [frames[frame - 1].translation.vector, frames[frame].translation.vector]
+    }
+
+    /// Goal: no point of a link moves further than `moves_m` says, alone and against another link.
+    /// Method: random poses and turns; the link's ends by plain kinematics. Shrunk by a tenth the bound must fail, or
+    /// it would be too weak to show anything.
+    #[test]
+    fn moves_bound_holds_for_random_turns_and_fails_when_shrunk() {
+        let robot = ur5();
+        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+        let world = World::new(&robot, &scene).expect("builds");
+        let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
+        let mut broken_when_shrunk = 0;
+        for seed in 0..5_000 {
+            let mut draw = Draw::new(seed, 0);
+            let mut q = [0.0; MAX_JOINTS];
+            let (mut turn, mut there) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+            for j in 0..6 {
+                q[j] = draw.within(-3.0, 3.0);
+                // Often one joint alone, by a little: there the bound is nearly exact.
+                turn[j] = if draw.unit() < 0.5 { 0.0 } else { draw.within(0.0, 0.3) };
+                there[j] = q[j] + turn[j] * if draw.unit() < 0.5 { 1.0 } else { draw.within(-1.0, 1.0) };
+            }
+            world.place(&q, &mut snapshot);
+            world.moves_m(&snapshot, &turn, &mut moves_m);
+            for body in 0..world.links.len() {
+                for (before, after) in ends_m(&world, &q, body).iter().zip(ends_m(&world, &there, body)) {
+                    let moved_m = (after - before).norm();
+                    let bound_m = moves_m[body][0];
+                    assert!(
+                        moved_m <= bound_m + 1e-12,
+                        "seed {seed}, link {body}: {moved_m} above {bound_m}"
+                    );
+                    // The radius stands for points that turn about the link's own axis.
+                    let radius_m: f64 = turn.iter().map(|t| t * 0.06).sum();
+                    broken_when_shrunk += u32::from(moved_m > 0.9 * (bound_m - radius_m));
+                }
+                let frame = world.links[body].frame;
+                let relative = |q: &JointArray| {
+                    let frames = world.robot.chain.frames(q);
+                    (frames[1].inverse() * frames[frame]).translation.vector
+                };
+                let moved_m = (relative(&there) - relative(&q)).norm();
+                let bound_m = moves_m[body].get(1).copied().unwrap_or(0.0);
+                assert!(moved_m <= bound_m + 1e-12, "seed {seed}, link {body} seen from link 1: {moved_m}");
+            }
+        }
+        assert!(broken_when_shrunk > 100, "the bound is so weak that a tenth less still holds");
+    }
+
+    #[test]
+    fn reach_is_an_upper_bound_of_every_lever() {
+        let robot = ur5();
+        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+        let world = World::new(&robot, &scene).expect("builds");
+        let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
+        for seed in 0..2_000 {
+            let mut draw = Draw::new(seed, 1);
+            let q = std::array::from_fn(|j| if j < 6 { draw.within(-3.1, 3.1) } else { 0.0 });
+            world.place(&q, &mut snapshot);
+            for joint in 0..6 {
+                let mut turn = [0.0; MAX_JOINTS];
+                turn[joint] = 1.0;
+                world.moves_m(&snapshot, &turn, &mut moves_m);
+                let lever_m = moves_m.iter().map(|m| m[0]).fold(0.0, f64::max);
+                assert!(lever_m <= world.reach_m()[joint], "seed {seed}, joint {joint}: {lever_m}");
+            }
+        }
+    }
+}

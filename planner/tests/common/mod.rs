@@ -3,6 +3,7 @@
 //! The check knows nothing of the planner: its own matrices from the Denavit-Hartenberg rows, its own point-to-segment
 //! distances, dense samples. It sees spheres and capsules only.
 #![expect(dead_code, reason = "every test binary includes this file and uses a part of it")]
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
 use taustream_arm::{Obstacle, Robot, Scene, Settings, Shape};
