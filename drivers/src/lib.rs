@@ -9,6 +9,7 @@ pub mod codec;
 pub mod frame;
 pub mod link;
 pub mod servo;
+pub mod sim;
 
 pub use frame::{CanFrame, CanId, FrameBatch};
 pub use link::{CanLink, LinkFault};

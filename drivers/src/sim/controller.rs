@@ -1,0 +1,204 @@
+//! The position-velocity-torque cascade of a simulated drive, and where its setpoint comes from.
+//!
+//! Between two setpoints the reference runs along a straight line over the interpolation period (0x60C2), its slope
+//! fed forward to the velocity loop. A step of the setpoint is thus at most a fast reference, and speed and torque
+//! limits and the inertia stand between it and the joint. Link side, SI units; nothing here knows counts or frames.
+use super::plant::PlantParameters;
+use crate::servo::Nanos;
+
+/// How the loops are tuned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoopParameters {
+    /// Gain of the position loop.
+    pub position_gain_1_s: f64,
+    /// Bandwidth of the velocity loop; its gain is this times the inertia.
+    pub velocity_bandwidth_rad_s: f64,
+    /// Integral time of the velocity loop.
+    pub integral_time_s: f64,
+    /// First-order lag of the torque (current loop).
+    pub torque_lag_s: f64,
+}
+
+/// Lag of the velocity that is fed forward: late SYNCs make the reference a staircase, which this smooths.
+const FEED_FORWARD_LAG_S: f64 = 1e-3;
+
+/// What the motor is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mode {
+    /// Not energised.
+    Released,
+    /// Following the line to the newest setpoint.
+    Following,
+    /// Coming to rest with this deceleration, then holding.
+    Slowing(f64),
+}
+
+/// A straight line in time.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    from_rad: f64,
+    to_rad: f64,
+    begins: Nanos,
+    duration_s: f64,
+}
+
+impl Line {
+    const fn resting(at_rad: f64) -> Self {
+        Self { from_rad: at_rad, to_rad: at_rad, begins: Nanos(0), duration_s: 1.0 }
+    }
+    /// The angle; after its end it rests.
+    fn at(&self, now: Nanos) -> f64 {
+        let share = (now.since_s(self.begins) / self.duration_s).min(1.0);
+        self.from_rad + share * (self.to_rad - self.from_rad)
+    }
+}
+
+/// What drives may add to the setpoint (0x60B1, 0x60B2).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Offsets {
+    pub(crate) velocity_rad_s: f64,
+    pub(crate) torque_nm: f64,
+}
+
+/// The cascade of one joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Controller {
+    loops: LoopParameters,
+    mode: Mode,
+    line: Line,
+    reference_rad: f64,
+    reference_rad_s: f64,
+    feed_forward_rad_s: f64,
+    integral_nm: f64,
+    torque_nm: f64,
+    pub(crate) offsets: Offsets,
+}
+
+impl Controller {
+    /// Released.
+    pub(crate) fn new(loops: LoopParameters) -> Self {
+        Self {
+            loops,
+            mode: Mode::Released,
+            line: Line::resting(0.0),
+            reference_rad: 0.0,
+            reference_rad_s: 0.0,
+            feed_forward_rad_s: 0.0,
+            integral_nm: 0.0,
+            torque_nm: 0.0,
+            offsets: Offsets::default(),
+        }
+    }
+
+    /// Starts to hold the angle where the joint is.
+    pub(crate) fn energise(&mut self, position_rad: f64) {
+        *self = Self { mode: Mode::Following, offsets: self.offsets, ..Self::new(self.loops) };
+        self.reference_rad = position_rad;
+        self.line = Line::resting(position_rad);
+    }
+
+    /// Follows setpoints again after a stop, from where the reference came to rest.
+    pub(crate) fn follow(&mut self) {
+        if self.mode != Mode::Released {
+            self.mode = Mode::Following;
+            self.line = Line::resting(self.reference_rad);
+        }
+    }
+
+    /// No torque any more.
+    pub(crate) fn release(&mut self) {
+        self.mode = Mode::Released;
+        self.torque_nm = 0.0;
+    }
+
+    /// Brings the joint to rest, from how it moves now: the reference may be anywhere after a step of the setpoint.
+    pub(crate) fn slow_down(&mut self, deceleration_rad_s2: f64, measured: (f64, f64)) {
+        if self.mode == Mode::Following {
+            (self.reference_rad, self.reference_rad_s) = measured;
+        }
+        if self.mode != Mode::Released {
+            self.mode = Mode::Slowing(deceleration_rad_s2);
+        }
+    }
+
+    /// A setpoint to be reached one interpolation period from now.
+    pub(crate) fn set_target(&mut self, now: Nanos, to_rad: f64, period_s: f64) {
+        if self.mode == Mode::Following {
+            self.line = Line { from_rad: self.reference_rad, to_rad, begins: now, duration_s: period_s };
+        }
+    }
+
+    /// True when setpoints are followed.
+    pub(crate) fn is_following(&self) -> bool {
+        self.mode == Mode::Following
+    }
+
+    /// True when a ramp has brought the reference to rest.
+    #[expect(clippy::float_cmp, reason = "the ramp ends on exactly 0")]
+    pub(crate) fn has_stopped(&self) -> bool {
+        matches!(self.mode, Mode::Slowing(_)) && self.reference_rad_s == 0.0
+    }
+
+    /// The reference angle.
+    pub(crate) const fn reference_rad(&self) -> f64 {
+        self.reference_rad
+    }
+    /// The torque that the motor is given.
+    pub(crate) const fn torque_nm(&self) -> f64 {
+        self.torque_nm
+    }
+
+    /// The torque for the next `dt_s`, from the angle as the encoder sees it and the velocity.
+    pub(crate) fn step(
+        &mut self,
+        now: Nanos,
+        dt_s: f64,
+        measured: (f64, f64),
+        plant: &PlantParameters,
+    ) -> f64 {
+        if self.mode == Mode::Released {
+            return 0.0;
+        }
+        self.move_reference(now, dt_s);
+        let (position_rad, velocity_rad_s) = measured;
+        let loops = self.loops;
+        let smooth = dt_s / (FEED_FORWARD_LAG_S + dt_s);
+        self.feed_forward_rad_s += smooth * (self.reference_rad_s - self.feed_forward_rad_s);
+
+        let wanted_rad_s = loops.position_gain_1_s * (self.reference_rad - position_rad)
+            + self.feed_forward_rad_s
+            + self.offsets.velocity_rad_s;
+        let wanted_rad_s = wanted_rad_s.clamp(-plant.speed_rad_s_max, plant.speed_rad_s_max);
+
+        let gain_nm_s = plant.inertia_kg_m2 * loops.velocity_bandwidth_rad_s;
+        let error_nm = gain_nm_s * (wanted_rad_s - velocity_rad_s);
+        let asked_nm = error_nm + self.integral_nm + self.offsets.torque_nm;
+        let given_nm = asked_nm.clamp(-plant.torque_nm_max, plant.torque_nm_max);
+        // A saturated integrator stands still unless the error unwinds it.
+        let over_nm = asked_nm - given_nm;
+        if over_nm * error_nm <= 0.0 {
+            self.integral_nm += error_nm * dt_s / loops.integral_time_s;
+        }
+        self.torque_nm += dt_s / (loops.torque_lag_s + dt_s) * (given_nm - self.torque_nm);
+        self.torque_nm
+    }
+
+    fn move_reference(&mut self, now: Nanos, dt_s: f64) {
+        match self.mode {
+            Mode::Released => {}
+            Mode::Following => {
+                let next_rad = self.line.at(now);
+                // The slope of the step that ends now: the line's own, also where one line meets the next.
+                self.reference_rad_s = (next_rad - self.reference_rad) / dt_s;
+                self.reference_rad = next_rad;
+            }
+            Mode::Slowing(deceleration_rad_s2) => {
+                let less_rad_s = deceleration_rad_s2 * dt_s;
+                let speed_rad_s = (self.reference_rad_s.abs() - less_rad_s).max(0.0);
+                self.reference_rad_s =
+                    if speed_rad_s > 0.0 { speed_rad_s.copysign(self.reference_rad_s) } else { 0.0 };
+                self.reference_rad += dt_s * self.reference_rad_s;
+            }
+        }
+    }
+}

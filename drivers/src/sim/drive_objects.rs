@@ -1,0 +1,209 @@
+//! A simulated drive's dictionary as SDO and PDOs meet it: rules that tie objects together, and live values.
+use super::dictionary::{AbortCode, Bytes, Dictionary};
+use super::drive::{Drive, DriveParameters};
+use super::drive_motion::{counts, reaction_code};
+use super::objects::{Access, CONSUMERS, HISTORY};
+use super::pdo::{self, Pdos};
+use super::power::PowerState;
+use super::sdo_server::Objects;
+use crate::codec::object::{RPDO_COMMUNICATION, TPDO_MAPPING};
+use crate::codec::{Address, words};
+use crate::frame::CanFrame;
+use std::f64::consts::TAU;
+
+/// "save", least significant byte first.
+const SAVE: i64 = 0x6576_6173;
+/// "load", least significant byte first.
+const LOAD: i64 = 0x6461_6F6C;
+
+/// An SDO request at work on a drive.
+pub(super) struct Session<'a> {
+    pub(super) drive: &'a mut Drive,
+    /// Where emergencies go that a write provokes.
+    pub(super) out: &'a mut Vec<CanFrame>,
+}
+
+impl Objects for Session<'_> {
+    fn read(&mut self, address: Address) -> Result<Bytes, AbortCode> {
+        self.drive.publish();
+        self.drive.publish_history();
+        if address.index == 0x1003 && address.sub > self.drive.errors.count() {
+            return Err(words::ABORT_NO_SUBINDEX);
+        }
+        self.drive.dictionary.read(address)
+    }
+
+    fn write(&mut self, address: Address, bytes: &[u8], sized: bool) -> Result<(), AbortCode> {
+        let drive = &mut *self.drive;
+        let value = drive.dictionary.check_write(address, bytes, sized)?;
+        if drive.refuse_writes != 0 {
+            return Err(drive.refuse_writes);
+        }
+        pdo::check_write(&drive.dictionary, address, value)?;
+        drive.check_write(address, value)?;
+        if !matches!(address.index, 0x1003 | 0x1010 | 0x1011 | 0x2002) {
+            drive.dictionary.set(address.index, address.sub, value);
+        }
+        drive.written(address, value, self.out);
+        Ok(())
+    }
+}
+
+impl DriveParameters {
+    /// Encoder counts a radian of the link, with the sign of the motor's direction.
+    #[must_use]
+    pub fn counts_per_rad(&self) -> f64 {
+        self.sign * self.gear_ratio * self.counts_per_rev / TAU
+    }
+}
+
+impl Drive {
+    /// The dictionary with the values that this drive is shipped with.
+    pub(super) fn shipped(parameters: &DriveParameters) -> Dictionary {
+        let mut dictionary = Dictionary::new(parameters.node_id);
+        let per_rad = parameters.counts_per_rad();
+        let limits = parameters.soft_limit_rad.map(|angle_rad| {
+            register((angle_rad - parameters.zero_offset_rad) * per_rad, i32::MIN, i32::MAX)
+        });
+        let window = parameters.following_window_rad * per_rad.abs();
+        // Fractions of a revolution are given over a thousand revolutions.
+        let thousand = |value: f64| register(value * 1000.0, 1, i32::MAX);
+        for (index, sub, value) in [
+            (0x2000, 1, i64::from(parameters.watchdog_ms)),
+            (0x2000, 2, reaction_code(parameters.watchdog_reaction)),
+            (0x6065, 0, register(window, 0, i32::MAX)),
+            (0x6066, 0, i64::from(parameters.following_timeout_ms)),
+            (0x6076, 0, register(parameters.plant.torque_nm_max * 1000.0, 0, i32::MAX)),
+            (0x607D, 1, limits[0].min(limits[1])),
+            (0x607D, 2, limits[0].max(limits[1])),
+            (0x6084, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
+            (0x6085, 0, register(parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
+            (0x608F, 1, thousand(parameters.counts_per_rev)),
+            (0x608F, 2, 1000),
+            (0x6091, 1, thousand(parameters.gear_ratio)),
+            (0x6091, 2, 1000),
+        ] {
+            dictionary.ship(Address::new(index, sub), value);
+        }
+        dictionary
+    }
+
+    /// Writes the live values into the dictionary, as they are now.
+    pub(super) fn publish(&mut self) {
+        let ahead_s = self.moved.map_or(0.0, |moved| self.now.since_s(moved));
+        let per_rad = self.parameters.counts_per_rad();
+        let torque = 1000.0 * self.controller.torque_nm() / self.parameters.plant.torque_nm_max;
+        let velocity = register(self.plant.velocity_rad_s * per_rad, i32::MIN, i32::MAX);
+        let demand = counts(self, self.controller.reference_rad());
+        for (index, value) in [
+            (0x1001, i64::from(self.errors.register())),
+            (0x603F, i64::from(self.errors.code())),
+            (0x6041, i64::from(self.statusword())),
+            (0x6061, self.dictionary.get(0x6060, 0)),
+            (0x6062, i64::from(demand)),
+            (0x6064, i64::from(self.counts(ahead_s))),
+            (0x606C, velocity),
+            (0x6077, register(torque * self.parameters.sign, i32::from(i16::MIN), i32::from(i16::MAX))),
+            (0x60F4, self.following_error()),
+        ] {
+            self.dictionary.set(index, 0, value);
+        }
+    }
+
+    /// The statusword.
+    #[must_use]
+    pub fn statusword(&self) -> u16 {
+        let state = self.power.state();
+        let powered = matches!(
+            state,
+            PowerState::SwitchedOn
+                | PowerState::OperationEnabled
+                | PowerState::QuickStopActive
+                | PowerState::FaultReactionActive
+        );
+        let bit = |on: bool, at: u16| u16::from(on) << at;
+        state.status_bits()
+            | bit(powered, 4)
+            | bit(self.warning || self.held, 7)
+            | bit(true, 9)
+            | bit(self.limited, 11)
+            | bit(self.follows_target(), 12)
+            | bit(self.astray.is_some(), 13)
+    }
+
+    /// Takes the heartbeats to watch from the dictionary.
+    pub(super) fn watch_heartbeats(&mut self) {
+        for sub in 1..=CONSUMERS {
+            self.consumers.set(usize::from(sub - 1), self.dictionary.get(0x1016, sub));
+        }
+    }
+
+    fn publish_history(&mut self) {
+        self.dictionary.set(0x1003, 0, i64::from(self.errors.count()));
+        for sub in 1..=HISTORY {
+            self.dictionary.set(0x1003, sub, i64::from(self.errors.entry(sub)));
+        }
+    }
+
+    /// Rules beyond one object's range.
+    fn check_write(&self, address: Address, value: i64) -> Result<(), AbortCode> {
+        let energised = self.power.is_energised();
+        match address.index {
+            0x1010 if value != SAVE => Err(words::ABORT_STORE),
+            0x1011 if value != LOAD => Err(words::ABORT_STORE),
+            0x1010 | 0x1011 if energised => Err(words::ABORT_DEVICE_STATE),
+            // CiA 301: one node may be watched by one entry only.
+            0x1016 if self.watched_elsewhere(address.sub, value) => Err(words::ABORT_INCOMPATIBLE),
+            // CiA 301: 1 is reserved, and the counter changes only while the SYNC period is 0.
+            0x1019 if value == 1 => Err(words::ABORT_RANGE),
+            0x1019 if self.dictionary.get(0x1006, 0) != 0 => Err(words::ABORT_DEVICE_STATE),
+            // Changing the mode of a moving motor would take its setpoint away.
+            0x6060 if energised && value != self.dictionary.get(0x6060, 0) => Err(words::ABORT_DEVICE_STATE),
+            _ => Ok(()),
+        }
+    }
+
+    fn watched_elsewhere(&self, sub: u8, entry: i64) -> bool {
+        let active = |entry: i64| entry & 0xFFFF != 0 && entry >> 16 != 0;
+        (1..=CONSUMERS).filter(|other| *other != sub).any(|other| {
+            let theirs = self.dictionary.get(0x1016, other);
+            active(theirs) && active(entry) && theirs >> 16 == entry >> 16
+        })
+    }
+
+    /// What a written object sets in motion.
+    fn written(&mut self, address: Address, value: i64, out: &mut Vec<CanFrame>) {
+        match address.index {
+            0x1003 => self.errors.clear_history(),
+            0x1010 => self.dictionary.store(),
+            0x1011 => self.dictionary.restore(),
+            0x1016 => self.watch_heartbeats(),
+            RPDO_COMMUNICATION..=0x17FF | 0x1800..TPDO_MAPPING | TPDO_MAPPING..=0x1AFF => {
+                self.pdos = Pdos::compile(&self.dictionary);
+            }
+            0x2002 => self.fail(u16::try_from(value).unwrap_or(0x1000), out),
+            0x6040 | 0x607A | 0x60B0..=0x60B2 => self.commanded(self.now, out),
+            _ => {}
+        }
+    }
+}
+
+impl Dictionary {
+    /// Takes a value from an RPDO; one that an SDO could not write either is ignored.
+    pub(super) fn take(&mut self, address: Address, value: i64) {
+        let fits = self.spec(address).is_ok_and(|spec| {
+            let listed = spec.choices.is_empty() || spec.choices.contains(&value);
+            spec.access == Access::ReadWrite && listed && (spec.low..=spec.high).contains(&value)
+        });
+        if fits {
+            self.set(address.index, address.sub, value);
+        }
+    }
+}
+
+/// A computed value as a register holds it: whole, and at the ends of its range when beyond.
+fn register(value: f64, low: i32, high: i32) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "clamped to 32 bits")]
+    let whole = value.round().clamp(f64::from(low), f64::from(high)) as i64;
+    whole
+}

@@ -1,0 +1,29 @@
+//! Simulated servos: CiA 402 drives with an object dictionary, a motor and gravity, behind a real link.
+//!
+//! [`Drive`] is one drive, [`Rig`] the drives of an arm with faults on request, [`serve`] runs a rig on links. All but
+//! the last are pure: frames and time in, frames out.
+//!
+//! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; links have no bit
+//! rate; of the modes of operation there is only cyclic synchronous position.
+mod controller;
+mod dictionary;
+mod drive;
+mod drive_motion;
+mod drive_objects;
+pub mod faults;
+mod network;
+mod objects;
+mod pdo;
+mod plant;
+mod power;
+pub mod rig;
+mod sdo_server;
+pub mod serve;
+pub mod settings;
+
+pub use controller::LoopParameters;
+pub use drive::{Disturbance, Drive, DriveParameters, WatchdogReaction};
+pub use faults::{FaultOrder, Order};
+pub use plant::PlantParameters;
+pub use power::PowerState;
+pub use rig::Rig;

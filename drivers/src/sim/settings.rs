@@ -1,0 +1,264 @@
+//! The `[simulator]` section of a settings file: what the simulated drives and their mechanics are made of.
+//!
+//! Every key has a default, because nothing here moves metal. A key for joints takes one value for all of them or one
+//! a joint, base to tip. Every fault of the section is reported at once.
+use super::controller::LoopParameters;
+use super::drive::{DriveParameters, WatchdogReaction};
+use super::plant::PlantParameters;
+use std::cell::RefCell;
+use std::path::Path;
+use taustream_arm::{Fault, Faults, Servo, Settings};
+use toml::{Table, Value};
+
+/// One drive and the joint that it moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveSetup {
+    /// The joint's name.
+    pub joint: String,
+    /// Index of its bus in [`Settings::buses`].
+    pub bus: usize,
+    /// The drive.
+    pub parameters: DriveParameters,
+}
+
+/// Drives of all joints, base to tip, as the settings describe them. `start_rad` replaces the section's key.
+///
+/// # Errors
+/// Every fault of the section at once.
+pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<DriveSetup>, Faults> {
+    let empty = Table::new();
+    let table = settings.simulator.as_ref().unwrap_or(&empty);
+    let joints = settings.robot.joints.len();
+    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let mut setups: Vec<DriveSetup> =
+        settings.servos.iter().map(|servo| section.setup(settings, servo)).collect();
+    setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
+    section.unknown_keys();
+    let faults = section.faults.into_inner();
+    if !faults.is_empty() {
+        return Err(Faults(faults));
+    }
+    for (setup, start_rad) in setups.iter_mut().zip(start_rad.unwrap_or(&[])) {
+        setup.parameters.start_rad = *start_rad;
+    }
+    Ok(setups)
+}
+
+/// Every key, for unknown ones to be found, and for their neighbours to be told.
+const KEYS: [&str; 23] = [
+    "start_rad",
+    "inertia_kg_m2",
+    "viscous_nm_s_rad",
+    "coulomb_nm",
+    "gravity_nm",
+    "gravity_level_rad",
+    "torque_nm_max",
+    "speed_rad_s_max",
+    "brake",
+    "brake_delay_ms",
+    "position_gain_1_s",
+    "velocity_bandwidth_rad_s",
+    "integral_time_ms",
+    "torque_lag_ms",
+    "following_window_rad",
+    "following_timeout_ms",
+    "soft_limit_margin_rad",
+    "slow_rad_s2",
+    "quick_stop_rad_s2",
+    "watchdog_ms",
+    "watchdog_reaction",
+    "boot_ms",
+    "step_us",
+];
+
+/// The section while it is being read.
+struct Section<'a> {
+    table: &'a Table,
+    file: &'a Path,
+    joints: usize,
+    faults: RefCell<Vec<Fault>>,
+}
+
+impl Section<'_> {
+    fn setup(&self, settings: &Settings, servo: &Servo) -> DriveSetup {
+        let joint = settings.robot.joints.get(servo.joint);
+        let limits = joint.map(|joint| joint.limits).unwrap_or_default();
+        let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
+        let at = servo.joint;
+        let [low_rad, high_rad] = limits.position_rad;
+        let margin_rad = self.number("soft_limit_margin_rad", at, 0.02, 0.0..=3.0);
+        let plant = self.plant(at, servo, &limits);
+        let parameters = DriveParameters {
+            node_id: servo.node_id,
+            sign: servo.sign,
+            gear_ratio: servo.gear_ratio,
+            counts_per_rev: servo.counts_per_rev,
+            zero_offset_rad: servo.zero_offset_rad,
+            start_rad: self.number("start_rad", at, 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad),
+            plant,
+            loops: self.loops(at),
+            following_window_rad: self.number("following_window_rad", at, 0.3, 1e-6..=100.0),
+            following_timeout_ms: self.whole("following_timeout_ms", at, 50, 0..=65_535),
+            soft_limit_rad: [low_rad - margin_rad, high_rad + margin_rad],
+            slow_rad_s2: self.number(
+                "slow_rad_s2",
+                at,
+                limits.motion.acceleration_rad_s2.max(1e-3),
+                1e-3..=1e4,
+            ),
+            quick_rad_s2: self.number(
+                "quick_stop_rad_s2",
+                at,
+                limits.stop.acceleration_rad_s2.max(1e-3),
+                1e-3..=1e4,
+            ),
+            watchdog_ms: self.whole("watchdog_ms", at, settings.cycle.drive_watchdog_ms, 0..=65_535),
+            watchdog_reaction: self.reaction(),
+            boot_s: self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3,
+            step_ns: u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000,
+        };
+        DriveSetup { joint: name, bus: servo.bus, parameters }
+    }
+
+    /// Mechanics; torque and speed that the motor has by default suffice for the joint's stop limits.
+    fn plant(&self, at: usize, servo: &Servo, limits: &taustream_motion::JointLimits) -> PlantParameters {
+        let inertia_kg_m2 = self.number("inertia_kg_m2", at, 1.0, 1e-4..=1e4);
+        let viscous_nm_s_rad = self.number("viscous_nm_s_rad", at, 1.0, 0.0..=1e4);
+        let coulomb_nm = self.number("coulomb_nm", at, 1.0, 0.0..=1e4);
+        let gravity_nm = self.number("gravity_nm", at, 10.0, -1e4..=1e4);
+        let speed_rad_s = limits.motion.velocity_rad_s.max(1e-3);
+        let load_nm = gravity_nm.abs() + coulomb_nm + viscous_nm_s_rad * speed_rad_s;
+        let enough_nm = 1.5 * (load_nm + inertia_kg_m2 * limits.stop.acceleration_rad_s2);
+        PlantParameters {
+            inertia_kg_m2,
+            viscous_nm_s_rad,
+            coulomb_nm,
+            gravity_nm,
+            gravity_level_rad: self.number("gravity_level_rad", at, 0.0, -100.0..=100.0),
+            torque_nm_max: self.number("torque_nm_max", at, enough_nm.max(1e-3), 1e-3..=1e6),
+            speed_rad_s_max: self.number("speed_rad_s_max", at, 1.25 * speed_rad_s, 1e-3..=1e3),
+            brake: self.flag("brake", at, servo.limp_is_safe),
+            brake_delay_s: self.number("brake_delay_ms", at, 20.0, 0.0..=5000.0) * 1e-3,
+        }
+    }
+
+    /// Control loops. The bounds keep the fastest of them stable at the largest step of the mechanics.
+    fn loops(&self, at: usize) -> LoopParameters {
+        LoopParameters {
+            position_gain_1_s: self.number("position_gain_1_s", at, 60.0, 1.0..=150.0),
+            velocity_bandwidth_rad_s: self.number("velocity_bandwidth_rad_s", at, 400.0, 10.0..=600.0),
+            integral_time_s: self.number("integral_time_ms", at, 20.0, 5.0..=1000.0) * 1e-3,
+            torque_lag_s: self.number("torque_lag_ms", at, 0.3, 0.0..=0.5) * 1e-3,
+        }
+    }
+
+    fn reaction(&self) -> WatchdogReaction {
+        const KEY: &str = "watchdog_reaction";
+        match self.table.get(KEY) {
+            None => WatchdogReaction::Fault,
+            Some(Value::String(word)) if word == "fault" => WatchdogReaction::Fault,
+            Some(Value::String(word)) if word == "hold" => WatchdogReaction::Hold,
+            Some(Value::String(word)) if word == "limp" => WatchdogReaction::Limp,
+            Some(other) => {
+                self.fault(KEY, &other.to_string(), "\"fault\", \"hold\" or \"limp\"");
+                WatchdogReaction::Fault
+            }
+        }
+    }
+
+    /// A joint's number, or `default`.
+    fn number(
+        &self,
+        key: &'static str,
+        at: usize,
+        default: f64,
+        range: std::ops::RangeInclusive<f64>,
+    ) -> f64 {
+        let Some(value) = self.of_joint(key, at) else { return default };
+        #[expect(clippy::cast_precision_loss, reason = "no range reaches 2^53")]
+        let number = match value {
+            Value::Float(number) => Some(*number),
+            Value::Integer(number) => Some(*number as f64),
+            Value::String(_) | Value::Boolean(_) | Value::Datetime(_) | Value::Array(_) | Value::Table(_) => {
+                None
+            }
+        };
+        number.filter(|number| range.contains(number)).unwrap_or_else(|| {
+            let expected = format!("a number from {} to {}", range.start(), range.end());
+            self.fault(&self.path(key, at), &value.to_string(), &expected);
+            default
+        })
+    }
+
+    /// A joint's whole number, or `default`.
+    fn whole<T>(&self, key: &'static str, at: usize, default: u32, range: std::ops::RangeInclusive<u32>) -> T
+    where
+        T: TryFrom<u32> + Default,
+    {
+        let number = match self.of_joint(key, at) {
+            None => default.min(*range.end()),
+            Some(value) => {
+                let number = value.as_integer().and_then(|number| u32::try_from(number).ok());
+                number.filter(|number| range.contains(number)).unwrap_or_else(|| {
+                    let expected = format!("a whole number from {} to {}", range.start(), range.end());
+                    self.fault(&self.path(key, at), &value.to_string(), &expected);
+                    default
+                })
+            }
+        };
+        T::try_from(number).unwrap_or_default()
+    }
+
+    fn flag(&self, key: &'static str, at: usize, default: bool) -> bool {
+        match self.of_joint(key, at) {
+            None => default,
+            Some(Value::Boolean(flag)) => *flag,
+            Some(other) => {
+                self.fault(&self.path(key, at), &other.to_string(), "true or false");
+                default
+            }
+        }
+    }
+
+    /// The value of a key for joint `at`; a list of another length than the arm is a fault, reported once.
+    fn of_joint(&self, key: &'static str, at: usize) -> Option<&Value> {
+        match self.table.get(key)? {
+            Value::Array(list) if list.len() == self.joints => list.get(at),
+            Value::Array(list) => {
+                if at == 0 {
+                    let expected = format!("one value for all joints, or {}", self.joints);
+                    self.fault(key, &format!("a list of {}", list.len()), &expected);
+                }
+                None
+            }
+            single => Some(single),
+        }
+    }
+
+    fn path(&self, key: &str, at: usize) -> String {
+        if matches!(self.table.get(key), Some(Value::Array(_))) { format!("{key}[{at}]") } else { key.into() }
+    }
+
+    fn unknown_keys(&self) {
+        for (key, value) in self.table {
+            if !KEYS.contains(&key.as_str()) {
+                self.fault(key, &value.to_string(), &format!("one of the keys {}", KEYS.join(", ")));
+            }
+        }
+    }
+
+    /// Notes a fault, once: a value for all joints is read for each of them.
+    fn fault(&self, key: &str, value: &str, expected: &str) {
+        let fault = Fault {
+            file: self.file.to_path_buf(),
+            line: None,
+            key: format!("simulator.{key}"),
+            value: value.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let mut faults = self.faults.borrow_mut();
+        if !faults.contains(&fault) {
+            faults.push(fault);
+        }
+    }
+}
