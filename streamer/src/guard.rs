@@ -340,9 +340,12 @@ mod tests {
 
     const PERIOD_S: f64 = 1e-3;
 
+    type Spoil = fn(JointState) -> JointState;
+    type Expected = fn(TripKind) -> bool;
+
     fn limits() -> [JointLimits; MAX_JOINTS] {
-        let motion = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
-        let stop = LimitSet { velocity_rad_s: 3.14, acceleration_rad_s2: 30.0, jerk_rad_s3: 600.0 };
+        let motion = LimitSet { velocity_rad_s: 3.2, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
+        let stop = LimitSet { velocity_rad_s: 3.2, acceleration_rad_s2: 30.0, jerk_rad_s3: 600.0 };
         [JointLimits { position_rad: [-3.0, 3.0], motion, stop }; MAX_JOINTS]
     }
 
@@ -387,8 +390,7 @@ mod tests {
     #[test]
     fn guard_on_each_planted_fault_names_kind_and_joint() {
         let smooth = wave(0.5, 4.0);
-        type Spoil = fn(JointState) -> JointState;
-        let table: [(Spoil, fn(TripKind) -> bool); 5] = [
+        let table: [(Spoil, Expected); 5] = [
             (|s| JointState { position_rad: f64::NAN, ..s }, |k| k == TripKind::NotFinite),
             (|s| JointState { acceleration_rad_s2: f64::INFINITY, ..s }, |k| k == TripKind::NotFinite),
             (

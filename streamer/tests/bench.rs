@@ -1,5 +1,5 @@
 //! The bench measures something, on a link without system calls and on the local one. No times are asserted.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+#![expect(clippy::panic, reason = "helpers of tests fail by panicking")]
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::link::LinkChoice;
