@@ -18,6 +18,8 @@ use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 const SAME_RAD: f64 = 1e-12;
 /// Independent searches; the best path of them is kept.
 const SEARCHES: u64 = 3;
+/// Where a searched path comes from, for users.
+const SEARCHED: &str = "RRT-Connect with shortcuts";
 /// What a corner costs in comparing paths: about what a stop there would (s).
 const CORNER_S: f64 = 0.3;
 
@@ -91,30 +93,38 @@ impl<'a> Pipeline<'a> {
                 self.straight(&line);
             }
             PlannerKind::Auto => {
-                if !self.straight(&line)
-                    && let Some(path) = self.search(&line)
-                {
-                    self.propose(&path, "shortcuts");
-                    if let Some(refined) = self.refine(&path) {
-                        self.round(&refined);
-                    }
-                    self.round(&path);
+                if !self.straight(&line) {
+                    self.around(&line);
                 }
             }
             PlannerKind::RrtConnect => {
                 if let Some(path) = self.search(&line) {
-                    self.propose(&path, "shortcuts");
-                    self.round(&path);
+                    self.propose(&path, SEARCHED);
+                    self.round(&path, SEARCHED);
                 }
             }
             PlannerKind::Ibfoa => {
-                if let Some(refined) = self.refine(&line) {
+                if let Some(refined) = self.refine(&line, self.budget.refinements, "the straight line") {
                     self.propose(&refined, "IBFOA");
-                    self.round(&refined);
+                    self.round(&refined, "IBFOA");
                 }
             }
         }
         self.finish()
+    }
+
+    /// A path round what blocks the straight line: searched, and refined from both, since a refinement stays near
+    /// where it starts.
+    fn around(&mut self, line: &[JointArray]) {
+        let Some(path) = self.search(line) else { return };
+        self.propose(&path, SEARCHED);
+        let each = self.budget.refinements / 2;
+        let from_path = self.refine(&path, each, "that");
+        let from_line = self.refine(line, each, "the straight line");
+        for refined in [from_path, from_line].into_iter().flatten() {
+            self.round(&refined, "IBFOA");
+        }
+        self.round(&path, SEARCHED);
     }
 
     fn path<'p>(&'p self, corners_rad: &'p [JointArray]) -> Path<'p> {
@@ -185,15 +195,15 @@ impl<'a> Pipeline<'a> {
     }
 
     /// IBFOA around a path; only a path whose every edge is proven comes back.
-    fn refine(&mut self, path: &[JointArray]) -> Option<Vec<JointArray>> {
-        let (mut corners, found) = refine(&self.space, path, self.budget.refinements, self.options.seed)?;
+    fn refine(&mut self, path: &[JointArray], evaluations_max: usize, from: &str) -> Option<Vec<JointArray>> {
+        let (mut corners, found) = refine(&self.space, path, evaluations_max, self.options.seed)?;
         let free = corners.windows(2).all(|p| {
             let [a, b] = p else { return false };
             self.space.is_edge_free(a, b)
         });
         let evaluations = found.progress.evaluations;
         let verdict = if free { "" } else { ", collides" };
-        self.tried.push(format!("IBFOA ({evaluations} evaluations{verdict})"));
+        self.tried.push(format!("IBFOA from {from} ({evaluations} evaluations{verdict})"));
         if !free {
             return None;
         }
@@ -212,8 +222,11 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Rounds the corners of a path as far as that is free and saves time, and proves the motion.
-    fn round(&mut self, path: &[JointArray]) {
+    fn round(&mut self, path: &[JointArray], source: &str) {
         let corners = path.len().saturating_sub(2);
+        if corners == 0 {
+            return self.propose(path, source);
+        }
         let mut left = self.budget.timings;
         let mut best: Option<Timed> = None;
         let mut attempt = |waits: &[f64], best: &mut Option<Timed>| {
@@ -243,7 +256,7 @@ impl<'a> Pipeline<'a> {
             }
         }
         if let Some(timed) = best {
-            self.prove(path, timed, "corners rounded");
+            self.prove(path, timed, &format!("{source}, {corners} corners rounded"));
         }
     }
 
@@ -285,10 +298,13 @@ impl<'a> Pipeline<'a> {
         let tried = self.tried.join(", ");
         match (self.best, self.violation) {
             (Some((trajectory, proof, last)), _) => {
-                let mut how =
-                    if tried.is_empty() || tried == last { last } else { format!("{tried}, {last}") };
+                // What won comes first: messages hold 240 bytes.
+                let mut how = last;
                 if cut {
-                    how.push_str("; cut short by the deadline");
+                    how.push_str(", cut short by the deadline");
+                }
+                if !tried.is_empty() && tried != how {
+                    how = format!("{how} (tried: {tried})");
                 }
                 Ok(Plan { trajectory, how, proof, planning_s: work.elapsed_s() })
             }

@@ -302,12 +302,15 @@ fn reply(request: &Request, outcome: &PlanOutcome) {
 }
 
 /// The one place of a planner. That of a killed planner is free again once shared memory has been cleaned up.
-fn take_server(wire: &Wire) -> Result<PlanServer, ServiceError> {
+fn take_server(wire: &Wire) -> Result<PlanServer, SendError> {
     let since = Instant::now();
     loop {
         match wire.plan_server() {
             Ok(server) => return Ok(server),
-            Err(e) if since.elapsed() > TAKE_OVER_WITHIN => return Err(e),
+            Err(ServiceError::Refused { arm, why, .. }) if since.elapsed() > TAKE_OVER_WITHIN => {
+                return Err(SendError::Served { arm, why });
+            }
+            Err(e) if since.elapsed() > TAKE_OVER_WITHIN => return Err(e.into()),
             Err(_) => thread::sleep(Duration::from_millis(100)),
         }
     }

@@ -1,4 +1,5 @@
 //! The demo's moves: each needs a way round, and each is found.
+#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{config, pose, vcan6};
 use std::time::{Duration, Instant};

@@ -1,4 +1,5 @@
 //! The paper's cost against an independent program (`paper_cost.py`, plain Python) and by hand.
+#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{pose, sphere, ur5};
 use std::path::PathBuf;

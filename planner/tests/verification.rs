@@ -1,4 +1,5 @@
 //! The proof: doctored motions are refused with the offender, and nothing slips through between samples.
+#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{pose, scene, sphere, ur5};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};

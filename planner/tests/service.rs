@@ -1,0 +1,285 @@
+//! The replan service over real shared memory, with a streamer played by the test.
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
+mod common;
+use common::{pose, scene, ur5};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+use taustream_arm::{Robot, Scene};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::service::Wire;
+use taustream_messages::{
+    CheckedTrajectory, LAYOUT_VERSION, Outcome, Phase, PlanRequest, Receipt, Rejection, Replaces, Report,
+};
+use taustream_motion::JointArray;
+use taustream_planner::send::{SendError, send_trajectory};
+use taustream_planner::service::Service;
+
+const HOME: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
+const AWAY: [f64; 6] = [0.4, -1.4, 1.4, -1.57, -1.57, 0.0];
+const THERE: [f64; 6] = [-0.4, -1.5, 1.5, -1.57, -1.57, 0.0];
+
+/// What the played streamer shows, and what it saw.
+struct Played {
+    phase: AtomicU32,
+    generation: AtomicU64,
+    accepted: AtomicU64,
+    cuts: AtomicU64,
+    mute: AtomicBool,
+    end: AtomicBool,
+}
+
+impl Played {
+    fn new(phase: Phase) -> Self {
+        Self {
+            phase: AtomicU32::new(phase.code()),
+            generation: AtomicU64::new(41),
+            accepted: AtomicU64::new(0),
+            cuts: AtomicU64::new(0),
+            mute: AtomicBool::new(false),
+            end: AtomicBool::new(false),
+        }
+    }
+
+    fn show(&self, phase: Phase) {
+        self.phase.store(phase.code(), Ordering::SeqCst);
+    }
+
+    fn report(&self, robot: &Robot, sequence: u64) -> Report {
+        let moving = self.phase.load(Ordering::SeqCst) == Phase::Moving.code();
+        Report {
+            layout_version: LAYOUT_VERSION,
+            joint_count: 6,
+            sequence,
+            robot_digest: robot.digest,
+            phase: self.phase.load(Ordering::SeqCst),
+            energised: 1,
+            generation: self.generation.load(Ordering::SeqCst),
+            trajectory_id: 7,
+            trajectory_s: 0.5,
+            command_rad: if moving { pose(HOME) } else { pose(AWAY) },
+            end_rad: pose(AWAY),
+            ..Report::default()
+        }
+    }
+
+    /// Reports a hundred times a second and answers trajectories, as the streamer does.
+    fn play(&self, arm: &str, robot: &Robot) {
+        let wire = Wire::join(arm, "played-streamer").expect("joins");
+        let reports = wire.report_publisher().expect("port");
+        let receipts = wire.receipt_publisher().expect("port");
+        let trajectories = wire.trajectory_subscriber().expect("port");
+        let mut sequence = 0;
+        while !self.end.load(Ordering::SeqCst) {
+            if !self.mute.load(Ordering::SeqCst) {
+                sequence += 1;
+                reports.send_copy(self.report(robot, sequence)).expect("sent");
+            }
+            while let Some(sample) = trajectories.receive().expect("received") {
+                let message = Box::new(*sample.payload());
+                let checked = CheckedTrajectory::try_from(&*message).expect("a good message");
+                let outcome = self.judge(&checked);
+                receipts
+                    .send_copy(Receipt::new(checked.trajectory_id, checked.generation, &outcome))
+                    .expect("sent");
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    fn judge(&self, checked: &CheckedTrajectory) -> Outcome {
+        if let Replaces::Cut { at_s, .. } = checked.replaces {
+            self.cuts.fetch_add(1, Ordering::SeqCst);
+            return Outcome::Rejected(Rejection::CutUnsupported { at_s });
+        }
+        assert_eq!(checked.generation, self.generation.load(Ordering::SeqCst) + 1, "the next generation");
+        let base_bits = checked.trajectory.base_rad().map(f64::to_bits);
+        assert_eq!(base_bits, pose(AWAY).map(f64::to_bits), "from where the arm rests");
+        self.accepted.fetch_add(1, Ordering::SeqCst);
+        self.generation.fetch_add(1, Ordering::SeqCst);
+        Outcome::Accepted { from_s: 0.0, tick: 9 }
+    }
+}
+
+/// Runs a service and a played streamer around a test.
+fn with_service(name: &str, played: &Played, test: impl FnOnce(&str, &Robot)) {
+    let (robot, scene): (Robot, Scene) = (ur5(), scene("open"));
+    let arm = format!("test-{name}-{}", std::process::id());
+    let (stop, ready) = (AtomicBool::new(false), AtomicBool::new(false));
+    thread::scope(|s| {
+        s.spawn(|| played.play(&arm, &robot));
+        s.spawn(|| {
+            let wire = Wire::join(&arm, "planner").expect("joins");
+            let mut service = Service::open(&wire, &robot, &scene, &stop).expect("opens");
+            ready.store(true, Ordering::SeqCst);
+            service.serve();
+        });
+        // Whatever the test does, the threads end: a panic is handed on after that.
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let since = Instant::now();
+            while !ready.load(Ordering::SeqCst) {
+                assert!(since.elapsed() < Duration::from_secs(20), "the service did not open");
+                thread::sleep(Duration::from_millis(5));
+            }
+            test(&arm, &robot);
+        }));
+        stop.store(true, Ordering::SeqCst);
+        played.end.store(true, Ordering::SeqCst);
+        if let Err(panic) = result {
+            std::panic::resume_unwind(panic);
+        }
+    });
+}
+
+fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanRequest {
+    CheckedPlanRequest { joints: 6, goal_rad, when, deadline_ms: 1_000, seed: 3, planner: planner.to_owned() }
+}
+
+/// Asks and waits for the answer.
+fn ask(arm: &str, asked: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> PlanOutcome {
+    let wire = Wire::join(arm, "client").expect("joins");
+    let client = wire.plan_client().expect("port");
+    let pending = client.send_copy(PlanRequest::from(asked)).expect("sent");
+    meanwhile();
+    let since = Instant::now();
+    loop {
+        if let Some(reply) = pending.receive().expect("received") {
+            return reply.payload().outcome();
+        }
+        assert!(since.elapsed() < Duration::from_secs(20), "no answer");
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn receipt_of(outcome: &PlanOutcome) -> Outcome {
+    let PlanOutcome::Planned { receipt: Some(receipt), .. } = outcome else { panic!("{outcome:?}") };
+    receipt.outcome().expect("known layout")
+}
+
+fn reason_of(outcome: &PlanOutcome) -> &str {
+    let PlanOutcome::Failed { reason } = outcome else { panic!("{outcome:?}") };
+    reason
+}
+
+#[test]
+fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
+    let played = Played::new(Phase::Holding);
+    with_service("rest", &played, |arm, robot| {
+        let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
+        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+        let PlanOutcome::Planned { trajectory_id, duration_s, strokes, .. } = outcome else { panic!() };
+        assert!((1..1 << 53).contains(&trajectory_id) && duration_s > 0.0 && strokes > 0);
+
+        // A second one goes on from the report's generation; and a saved motion is sent by the same way.
+        receipt_of(&ask(arm, &request(When::AtOnce, "straight", pose(THERE)), || ()));
+        let wire = Wire::join(arm, "cli").expect("joins");
+        let still = taustream_planner::timing::stand_still(6, &pose(AWAY)).expect("a pose");
+        let sent = send_trajectory(&wire, robot, &still, Duration::from_secs(5)).expect("sent");
+        let receipt = sent.receipt.expect("answered");
+        assert_eq!((receipt.trajectory_id(), sent.generation), (sent.trajectory_id, 44));
+
+        let mut other = robot.clone();
+        other.digest[3] ^= 1;
+        let error = send_trajectory(&wire, &other, &still, Duration::from_secs(5)).unwrap_err();
+        assert!(matches!(error, SendError::WrongRobot { .. }), "{error}");
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 3);
+}
+
+#[test]
+fn service_bad_requests_are_refused_in_words_and_nothing_is_sent() {
+    let played = Played::new(Phase::Holding);
+    with_service("bad", &played, |arm, _| {
+        let good = request(When::AtOnce, "", pose(THERE));
+        let seven = CheckedPlanRequest { joints: 7, ..good.clone() };
+        let nan = {
+            let mut goal = pose(THERE);
+            goal[2] = f64::NAN;
+            CheckedPlanRequest { goal_rad: goal, ..good.clone() }
+        };
+        let far = CheckedPlanRequest { goal_rad: pose([9.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..good.clone() };
+        let inside = CheckedPlanRequest { goal_rad: pose([0.0, 0.6, 0.0, 0.0, 0.0, 0.0]), ..good.clone() };
+        let unknown = CheckedPlanRequest { planner: "teleport".to_owned(), ..good.clone() };
+        for (asked, word) in [
+            (&seven, "7 joint values"),
+            (&nan, "goal of joint 3"),
+            (&far, "shoulder_pan"),
+            (&inside, "table"),
+            (&unknown, "unknown planner `teleport`; use one of auto, straight"),
+        ] {
+            let outcome = ask(arm, asked, || ());
+            assert!(reason_of(&outcome).contains(word), "{word}: {outcome:?}");
+        }
+        for phase in Phase::ALL.into_iter().filter(|p| !matches!(p, Phase::Holding | Phase::Moving)) {
+            played.show(phase);
+            let outcome = ask(arm, &good, || ());
+            assert!(reason_of(&outcome).contains(phase.word()), "{outcome:?}");
+        }
+        played.mute.store(true, Ordering::SeqCst);
+        let outcome = ask(arm, &good, || ());
+        assert!(reason_of(&outcome).contains("taustream-streamer of arm"), "{outcome:?}");
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 0);
+}
+
+#[test]
+fn service_while_moving_cuts_are_the_streamers_to_refuse_and_after_current_waits() {
+    let played = Played::new(Phase::Moving);
+    with_service("moving", &played, |arm, _| {
+        let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
+        assert_eq!(receipt_of(&outcome), Outcome::Rejected(Rejection::CutUnsupported { at_s: 0.5 }));
+        assert_eq!(played.cuts.load(Ordering::SeqCst), 1);
+
+        let outcome = ask(arm, &request(When::AfterCurrent, "", pose(THERE)), || {
+            thread::sleep(Duration::from_millis(700));
+            assert_eq!(played.accepted.load(Ordering::SeqCst), 0, "sent before the arm was at rest");
+            // Meanwhile, nobody else gets in between.
+            let other = ask(arm, &request(When::AfterCurrent, "", pose(HOME)), || ());
+            assert!(reason_of(&other).contains("waits"), "{other:?}");
+            played.show(Phase::Holding);
+        });
+        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+
+        // The running motion ends in a fault: the one that waits is given up.
+        played.show(Phase::Moving);
+        let outcome = ask(arm, &request(When::AfterCurrent, "", pose(THERE)), || {
+            thread::sleep(Duration::from_millis(700));
+            played.show(Phase::Fault);
+        });
+        assert!(reason_of(&outcome).contains("fault"), "{outcome:?}");
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn service_motion_whose_requester_has_gone_is_not_sent() {
+    let played = Played::new(Phase::Moving);
+    with_service("gone", &played, |arm, _| {
+        let wire = Wire::join(arm, "client").expect("joins");
+        let client = wire.plan_client().expect("port");
+        let asked = PlanRequest::from(&request(When::AfterCurrent, "", pose(THERE)));
+        let pending = client.send_copy(asked).expect("sent");
+        thread::sleep(Duration::from_millis(700));
+        drop(pending);
+        thread::sleep(Duration::from_millis(200));
+        played.show(Phase::Holding);
+        // The next request is served, so the service has looked at the one that is gone.
+        receipt_of(&ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()));
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn service_second_planner_of_an_arm_is_refused() {
+    let played = Played::new(Phase::Holding);
+    with_service("second", &played, |arm, robot| {
+        let (scene, stop) = (scene("open"), AtomicBool::new(false));
+        let wire = Wire::join(arm, "second").expect("joins");
+        let Err(error) = Service::open(&wire, robot, &scene, &stop) else {
+            panic!("two planners serve one arm")
+        };
+        assert!(error.to_string().contains("has a taustream-planner already"), "{error}");
+        // The first one still serves.
+        receipt_of(&ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()));
+    });
+}
