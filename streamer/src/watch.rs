@@ -102,7 +102,9 @@ impl Watch {
             }
             (answer.received, answer.position_rad) = (Some(received), servo.position_rad);
             answer.tracking_rad = (servo.position_rad - command_rad).abs();
-            answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
+            if facts.live {
+                answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
+            }
         }
     }
 
