@@ -57,6 +57,7 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
+        Action::Bench(args) => offline::bench::run(form, settings, args),
         Action::Demo(args) => demo::run(form, args),
         Action::Completions { shell } => completions(form, *shell),
     }

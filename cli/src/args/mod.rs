@@ -3,7 +3,7 @@ mod live;
 mod offline;
 
 pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs};
-pub(crate) use offline::{CheckArgs, CostArgs, MotionArgs, PlanArgs, SampleArgs};
+pub(crate) use offline::{BenchArgs, BenchName, CheckArgs, CostArgs, MotionArgs, PlanArgs, SampleArgs};
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -84,6 +84,8 @@ pub(crate) enum Action {
     ClearFault(CommandArgs),
     /// Show what the streamer does: phase, joints, timing, bus.
     Status,
+    /// Run a measurement that the documentation quotes.
+    Bench(BenchArgs),
     /// Start simulated servos, streamer and planner, and go through a few moves.
     Demo(DemoArgs),
     /// Print a completion script for a shell: `taustream completions bash > /etc/bash_completion.d/taustream`.

@@ -140,16 +140,22 @@ pub(crate) struct BenchArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum BenchName {
     /// Wake-up lateness and time of the streamer's cycle, beside bare loops in alternating slices of one run.
+    ///
+    /// No servos are needed: the frames go out, and the arm swings in memory only. Real servos on the bus would get
+    /// setpoints, so run it on a virtual bus.
     Cycle {
         /// How long to measure, s.
         #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 20.0)]
         seconds: f64,
-        /// Alternating slices a loop.
-        #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+        /// Slices, bare and streamer in turns.
+        #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 20)]
         slices: u32,
-        /// What carries the frames.
-        #[arg(long, value_name = "LINK", default_value = "auto")]
-        link: LinkChoice,
+        /// What carries the frames; without it they are dropped, without system calls.
+        #[arg(long, value_name = "LINK")]
+        link: Option<LinkChoice>,
+        /// Measure without real-time rights too; such figures say little.
+        #[arg(long)]
+        allow_non_realtime: bool,
     },
 }
 

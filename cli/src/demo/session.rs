@@ -71,7 +71,7 @@ impl<'a> Session<'a> {
 
     /// Enables, then plans and executes one move after the other.
     pub(crate) fn go_through_goals(&mut self, demo: &DemoFile) -> Result<(), Failure> {
-        obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX)?;
+        self.enable()?;
         obey(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
         for (i, goal_rad) in demo.goals_rad.iter().enumerate() {
             self.seen.borrow_mut().view.begin_move(i + 1);
@@ -91,6 +91,21 @@ impl<'a> Session<'a> {
             self.check_time()?;
         }
         Ok(())
+    }
+
+    /// Enables. Just after their configuration the streamer does not know yet that the drives rest, and refuses.
+    fn enable(&self) -> Result<(), Failure> {
+        let limit = Limit::after_s(REST_S_MAX);
+        loop {
+            match obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX) {
+                Err(Failure::Refused(_)) if !limit.is_over() => {
+                    interrupt::check()?;
+                    self.look()?;
+                    thread::sleep(Duration::from_millis(50));
+                }
+                outcome => return outcome,
+            }
+        }
     }
 
     /// Switches the drives off and sums up.

@@ -45,22 +45,42 @@ pub(crate) fn word(command: Command) -> &'static str {
 
 /// Whether a phase is where a command leads to. Commands that act at once have nothing to wait for.
 fn is_reached(command: Command, phase: Phase) -> bool {
+    let de_energised = matches!(phase, Phase::Configuring | Phase::Disabled);
     match command {
         Command::Enable => phase == Phase::Holding,
-        Command::Disable => phase == Phase::Disabled,
+        Command::Disable => de_energised,
         // The motion may end by itself before the pause has slowed it down.
         Command::Pause => matches!(phase, Phase::Paused | Phase::Holding),
-        Command::Stop => matches!(phase, Phase::Holding | Phase::Locked),
-        Command::FastStop => matches!(phase, Phase::Fault),
+        // An arm that rests is stopped, whatever else is the matter with it.
+        Command::Stop => de_energised || matches!(phase, Phase::Holding | Phase::Locked | Phase::Fault),
+        Command::FastStop => de_energised || phase == Phase::Fault,
         Command::ClearFault => matches!(phase, Phase::Locked | Phase::Disabled),
         Command::Resume | Command::TorqueOff | Command::Speed { .. } => true,
+    }
+}
+
+/// Whether a command that was accepted in this phase asks for what is already so, or changes no phase.
+fn is_so_already(command: Command, phase: Phase) -> bool {
+    match command {
+        Command::Enable => {
+            matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused | Phase::Stopping)
+        }
+        // A fault stays a fault when its drives are de-energised.
+        Command::Disable => phase == Phase::Fault,
+        Command::Pause
+        | Command::Resume
+        | Command::Stop
+        | Command::FastStop
+        | Command::TorqueOff
+        | Command::Speed { .. }
+        | Command::ClearFault => false,
     }
 }
 
 /// Whether a phase says that a command will not get where it leads to.
 fn is_lost(command: Command, phase: Phase) -> bool {
     let faulted = matches!(phase, Phase::Fault | Phase::Braking | Phase::FastStopping);
-    faulted && !matches!(command, Command::FastStop | Command::ClearFault | Command::TorqueOff)
+    faulted && matches!(command, Command::Enable | Command::Disable | Command::Pause)
 }
 
 /// Sends a command, waits up to `wait_s` for its effect, and prints the answer.
@@ -82,7 +102,8 @@ fn send(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result
         let at = phase.map_or("in an unknown phase", Phase::word);
         return Err(Failure::Refused(format!("{name} refused while {at}: {}", reply.text())));
     }
-    if wait_s > 0.0 && !phase.is_some_and(|p| is_reached(command, p)) {
+    let is_done = |p| is_reached(command, p) || is_so_already(command, p);
+    if wait_s > 0.0 && !phase.is_some_and(is_done) {
         phase = Some(wait_for(client, arm, command, wait_s)?);
     }
     Ok(Answer {

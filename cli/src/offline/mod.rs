@@ -1,4 +1,5 @@
 //! Commands that need files only.
+pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod cost;
 pub(crate) mod plan;

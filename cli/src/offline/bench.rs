@@ -1,0 +1,66 @@
+//! `taustream bench cycle`: wake-up lateness and the cost of the streamer's cycle, beside bare loops.
+use crate::args::{BenchArgs, BenchName};
+use crate::arm;
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use taustream_streamer::bench::{BenchError, BenchOptions, CycleBench, Quantiles, cycle};
+
+/// The measurement, for people and programs.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Answer(CycleBench);
+
+/// Measures and prints.
+pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Result<(), Failure> {
+    let BenchName::Cycle { seconds, slices, link, allow_non_realtime } = &args.name;
+    let options = BenchOptions {
+        settings: arm::settings(settings)?,
+        seconds: *seconds,
+        slices: *slices,
+        link: *link,
+        allow_non_realtime: *allow_non_realtime,
+    };
+    form.progress(format_args!("measuring for {seconds} s, the two loops in turns ({slices} slices) .."));
+    let measured = cycle(&options).map_err(|error| match error {
+        BenchError::Options { .. } => Failure::Usage(error.to_string()),
+        BenchError::Link(_) | BenchError::Rights(_) | BenchError::NotMoving(_) | BenchError::System(_) => {
+            Failure::Failed(format!("nothing was measured: {error}"))
+        }
+    })?;
+    form.print(&Answer(measured))
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let b = &self.0;
+        let rights = if b.realtime { "SCHED_FIFO, memory locked" } else { "WITHOUT real-time rights" };
+        writeln!(
+            f,
+            "{} joints, {}, {} us, {rights}; {} deadlines skipped",
+            b.joints, b.link, b.period_us, b.skipped
+        )?;
+        writeln!(f, "                            p50 (us)   p99 (us)  p99.9 (us)    max (us)     cycles")?;
+        row(f, "wake-up lateness, streamer", &b.streamer_lateness)?;
+        row(f, "wake-up lateness, bare", &b.bare_lateness)?;
+        row(f, "whole cycle, streamer", &b.streamer_cycle)?;
+        row(f, "same calls, bare", &b.bare_cycle)?;
+        for stage in &b.stages {
+            row(f, &format!("  stage {}", stage.stage), &stage.time)?;
+        }
+        writeln!(f, "ratios, streamer over bare: lateness p99 {:.3}", b.lateness_p99_ratio)?;
+        write!(
+            f,
+            "                            cycle p50 {:.3}, p99 {:.3}",
+            b.cycle_p50_ratio, b.cycle_p99_ratio
+        )
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, q: &Quantiles) -> fmt::Result {
+    let us = |ns: u64| std::time::Duration::from_nanos(ns).as_secs_f64() * 1e6;
+    let (p50, p99, p999, max) = (us(q.p50_ns), us(q.p99_ns), us(q.p999_ns), us(q.max_ns));
+    writeln!(f, "{name:<27} {p50:>9.2}  {p99:>9.2}  {p999:>10.2}  {max:>10.2} {:>10}", q.count)
+}
