@@ -22,13 +22,17 @@ pub(crate) struct Sample {
     pub(crate) commanded: Setpoint,
     /// What the drives answered; NaN before the first answer.
     pub(crate) measured_rad: JointArray,
+    /// How old each answer was: what was measured, was measured that much earlier.
+    pub(crate) measured_age_s: JointArray,
 }
 
 /// Most points of one curve; more cannot be seen and make the file heavy.
 const POINTS_MAX: usize = 1200;
 /// Half the width of the fit, in samples.
-const FIT_HALF_WIDTH: usize = 4;
+const FIT_HALF_WIDTH: usize = 5;
 const SIZE_PX: (u32, u32) = (1100, 1180);
+/// Share of the time axis that is left to the legend.
+const LEGEND_SHARE: f64 = 0.16;
 const COMMANDED: RGBColor = RGBColor(31, 119, 180);
 const MEASURED: RGBColor = RGBColor(255, 127, 14);
 /// One colour a joint, told apart by colour-blind eyes too (Okabe and Ito).
@@ -115,7 +119,7 @@ fn joint_panels(j: usize, samples: &[Sample], measured: &[[f64; 4]]) -> [Vec<Cur
             opacity: 1.0,
             points: commanded_points(samples, j, order),
         };
-        let label = if order == 0 { "measured" } else { "measured (derivative of a cubic fit)" };
+        let label = if order == 0 { "measured" } else { "measured, by cubic fit" };
         let points = measured_points(samples, measured, order);
         order += 1;
         let measured = Curve { label: label.to_owned(), colour: MEASURED, width_px: 1, opacity: 1.0, points };
@@ -151,8 +155,9 @@ fn thinned(points: Vec<Point>) -> Vec<Point> {
 
 /// Position, velocity, acceleration and jerk of one joint at every sample, from its measured positions.
 fn measured_derivatives(samples: &[Sample], joint: usize) -> Vec<[f64; 4]> {
+    let at = |array: &JointArray| array.get(joint).copied().unwrap_or(f64::NAN);
     let points: Vec<Point> =
-        samples.iter().map(|s| (s.t_s, s.measured_rad.get(joint).copied().unwrap_or(f64::NAN))).collect();
+        samples.iter().map(|s| (s.t_s - at(&s.measured_age_s), at(&s.measured_rad))).collect();
     (0..points.len())
         .map(|i| {
             let first = i.saturating_sub(FIT_HALF_WIDTH);
@@ -226,6 +231,7 @@ fn draw(file: &Path, title: &str, panels: &[Vec<Curve>; 4]) -> Result<(), Failur
 fn draw_panel(area: &Area<'_>, name: &str, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
     let (times, values) = ranges(curves);
     let mut chart = ChartBuilder::on(area)
+        .margin_left(14)
         .margin_right(16)
         .x_label_area_size(34)
         .y_label_area_size(74)
@@ -263,6 +269,8 @@ fn ranges(curves: &[Curve]) -> (Range<f64>, Range<f64>) {
     let times = span(points().map(|p| p.0));
     let values = span(points().map(|p| p.1));
     let room = 0.06 * (values.end - values.start);
+    // The legend stands right of the curves, where it hides none.
+    let times = times.start..times.end + LEGEND_SHARE * (times.end - times.start);
     (times, values.start - room..values.end + room)
 }
 
@@ -285,7 +293,8 @@ mod tests {
     fn recording(samples: usize, measured_rad: impl Fn(f64) -> f64) -> Vec<Sample> {
         let sample = |i: usize| {
             let t_s = 0.01 * i as f64;
-            Sample { t_s, commanded: Setpoint::default(), measured_rad: [measured_rad(t_s); MAX_JOINTS] }
+            let (measured_rad, measured_age_s) = ([measured_rad(t_s); MAX_JOINTS], [0.0; MAX_JOINTS]);
+            Sample { t_s, commanded: Setpoint::default(), measured_rad, measured_age_s }
         };
         (0..samples).map(sample).collect()
     }

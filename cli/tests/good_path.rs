@@ -141,7 +141,7 @@ fn check_says_aloud_what_may_touch_and_how_long_a_pause_takes() {
         "link3-link5",
         "a pause or stop from full speed takes",
         "VIRTUAL",
-        "MAY FALL",
+        "without torque",
         "wrist_3",
     ] {
         assert!(text.done().contains(word), "no `{word}`: {}", text.out);

@@ -111,7 +111,6 @@ impl<'a> Session<'a> {
     /// Switches the drives off and sums up.
     pub(crate) fn finish(self) -> Result<Summary, Failure> {
         self.look()?;
-        // The report of the last moving instant: tracking error and lateness are of interest up to here.
         let moved = self.seen.borrow().tracking_error_rad_max;
         obey(&self.client, self.arm, Command::Disable, DRIVES_S_MAX)?;
         self.look()?;
@@ -169,8 +168,9 @@ impl Seen {
     fn note(&mut self, r: &Report, phase: Phase) {
         let first_ns = *self.first_ns.get_or_insert(r.time_ns);
         let t_s = Duration::from_nanos(r.time_ns.saturating_sub(first_ns)).as_secs_f64();
-        if phase == Phase::Moving {
-            let errors = r.tracking_error_rad.iter().take(r.joints());
+        // The streamer's own maximum sees every cycle, reports only some. It counts from the enable on.
+        if matches!(phase, Phase::Holding | Phase::Moving) {
+            let errors = r.tracking_error_rad_max.iter().take(r.joints());
             self.tracking_error_rad_max = errors.fold(self.tracking_error_rad_max, |max, e| max.max(e.abs()));
         }
         if r.energised == 1 {
@@ -183,6 +183,7 @@ impl Seen {
                     jerk_rad_s3: r.command_jerk_rad_s3,
                 },
                 measured_rad: r.measured_rad,
+                measured_age_s: r.feedback_age_s,
             });
         }
         self.view.show(r, phase, t_s);
