@@ -154,8 +154,9 @@ fn check_ready(
 }
 
 fn explain(error: SendError) -> Failure {
-    match error {
-        SendError::Service(error) => Failure::Service(error),
-        SendError::WrongRobot { .. } | SendError::Transport { .. } => Failure::Refused(error.to_string()),
+    if let SendError::Service(error) = error {
+        Failure::Service(error)
+    } else {
+        Failure::Refused(error.to_string())
     }
 }

@@ -1,9 +1,5 @@
 //! Runs the real `taustream` as a user would, in a directory of its own.
-#![allow(
-    dead_code,
-    clippy::allow_attributes,
-    reason = "each test binary uses its part; an expectation would fail in the one that uses all"
-)]
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests, outside of any #[test] function")]
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,5 @@
 //! What users do every day: plan, check, sample, verify, rate.
-mod common;
-use common::{HOME, Scratch, stroke, trajectory};
+use crate::common::{HOME, Scratch, stroke, trajectory};
 use std::fs;
 
 const GOAL: &str = "1.0,-1.2,1.3,-1.6,-1.57,0.4";

@@ -1,45 +1,42 @@
 //! Everything that a user can get wrong: one clear sentence with the offender, exit code 1 or 2, nothing written.
-mod common;
-use common::{HOME, Scratch, config, stroke, trajectory};
+use crate::common::{HOME, Scratch, config, stroke, trajectory};
 use std::fs;
 
-/// The words after `taustream`, the exit code, and what stderr must name.
-type Case<'a> = (&'a [&'a str], i32, &'a [&'a str]);
+/// The words after `taustream` (HOME stands for the pose), the exit code, and what stderr must name.
+type Case<'a> = (&'a str, i32, &'a [&'a str]);
 
 /// Runs every case with and without `--json`, and asserts that no file came, went or changed.
 #[track_caller]
 fn refuse_all(scratch: &Scratch, cases: &[Case<'_>]) {
     assert!(!cases.is_empty());
     let before = scratch.files();
-    for (words, code, expected) in cases {
-        scratch.run(words).refused(*code, expected);
+    for (line, code, expected) in cases {
+        let words: Vec<&str> = line.split(' ').map(|word| if word == "HOME" { HOME } else { word }).collect();
+        scratch.run(&words).refused(*code, expected);
 
         let with_json: Vec<&str> = words.iter().copied().chain(["--json"]).collect();
         let ran = scratch.run(&with_json);
         ran.refused(*code, &[]);
-        let error: serde_json::Value = serde_json::from_str(&ran.err)
-            .unwrap_or_else(|e| panic!("`{}`: stderr is no JSON: {e}: {}", ran.words, ran.err));
+        let error: serde_json::Value = serde_json::from_str(&ran.err).unwrap_or(serde_json::Value::Null);
+        assert!(error.is_object(), "`{}`: stderr is no JSON: {}", ran.words, ran.err);
         let message = error["error"]["message"].as_str().unwrap_or_default();
         assert!(!message.is_empty() && error["error"]["kind"].is_string(), "{error}");
         for word in *expected {
             assert!(message.contains(word), "`{}`: the message lacks `{word}`: {message}", ran.words);
         }
-        assert_eq!(scratch.files(), before, "`{}` left files behind", words.join(" "));
+        assert_eq!(scratch.files(), before, "`{line}` left files behind");
     }
 }
 
 #[test]
 fn words_that_are_wrong_are_refused_by_name() {
-    let plan = ["plan", "--robot", "ur5", "--scene", "open", "--start", HOME, "--goal"];
-    let with = |goal: &'static str| -> Vec<&str> {
-        plan.iter().copied().chain([goal, "-o", "never.json"]).collect()
-    };
+    let with = |goal: &str| format!("plan --robot ur5 --scene open --start HOME --goal={goal} -o never.json");
     let scratch = Scratch::new();
     refuse_all(
         &scratch,
         &[
-            (&["fly"], 2, &["fly"]),
-            (&["plan", "--goal", "0"], 2, &["--robot"]),
+            ("fly", 2, &["fly"]),
+            ("plan --goal 0", 2, &["--robot"]),
             (&with("0,0,0,0,0"), 2, &["--goal has 5 values", "6 joints", "wrist_3"]),
             (&with("0,0,0,0,0,0,0"), 2, &["--goal has 7 values", "`ur5`"]),
             (&with("0,0,0,0,0,0,0,0,0"), 2, &["--goal", "9 values"]),
@@ -48,57 +45,18 @@ fn words_that_are_wrong_are_refused_by_name() {
             (&with("0,0,x,0,0,0"), 2, &["--goal", "value 3 is `x`", "rad"]),
             (&with(""), 2, &["--goal"]),
             (
-                &[
-                    "plan",
-                    "--robot",
-                    "ur5",
-                    "--scene",
-                    "open",
-                    "--start",
-                    HOME,
-                    "--goal",
-                    HOME,
-                    "--planner",
-                    "magic",
-                ],
+                "plan --robot ur5 --scene open --start HOME --goal HOME --planner magic",
                 2,
                 &["magic", "rrt-connect"],
             ),
-            (
-                &[
-                    "plan",
-                    "--robot",
-                    "ur5",
-                    "--scene",
-                    "open",
-                    "--start",
-                    HOME,
-                    "--goal",
-                    HOME,
-                    "--deadline-ms",
-                    "0",
-                ],
-                2,
-                &["--deadline-ms"],
-            ),
-            (
-                &[
-                    "plan", "--robot", "ur5", "--scene", "open", "--start", HOME, "--goal", HOME, "--seed",
-                    "-1",
-                ],
-                2,
-                &["--seed"],
-            ),
-            (
-                &["replan", "--goal", HOME, "--at-once", "--after-current"],
-                2,
-                &["--at-once", "--after-current"],
-            ),
-            (&["speed", "101"], 2, &["101", "0 to 100"]),
-            (&["speed", "-1"], 2, &["-1", "0 to 100"]),
-            (&["speed", "nan"], 2, &["nan", "0 to 100"]),
-            (&["stop", "--wait-s", "-3"], 2, &["--wait-s"]),
-            (&["completions", "tcl"], 2, &["tcl", "bash"]),
+            ("plan --robot ur5 --scene open --start HOME --goal HOME --deadline-ms 0", 2, &["--deadline-ms"]),
+            ("plan --robot ur5 --scene open --start HOME --goal HOME --seed -1", 2, &["--seed"]),
+            ("replan --goal HOME --at-once --after-current", 2, &["--at-once", "--after-current"]),
+            ("speed 101", 2, &["101", "0 to 100"]),
+            ("speed -1", 2, &["-1", "0 to 100"]),
+            ("speed nan", 2, &["nan", "0 to 100"]),
+            ("stop --wait-s -3", 2, &["--wait-s"]),
+            ("completions tcl", 2, &["tcl", "bash"]),
         ],
     );
 }
@@ -109,27 +67,15 @@ fn files_that_do_not_exist_are_refused_by_name() {
     refuse_all(
         &scratch,
         &[
-            (
-                &["plan", "--robot", "ur6", "--scene", "open", "--start", HOME, "--goal", HOME],
-                2,
-                &["ur6", "robots/ur6.toml"],
-            ),
-            (
-                &["plan", "--robot", "ur5", "--scene", "no/such.toml", "--start", HOME, "--goal", HOME],
-                2,
-                &["no/such.toml"],
-            ),
-            (&["sample", "move.json"], 2, &["move.json"]),
-            (&["sample", "."], 2, &["."]),
-            (
-                &["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "move.json"],
-                2,
-                &["move.json"],
-            ),
-            (&["run", "move.json"], 2, &["move.json"]),
-            (&["check", "nothing"], 2, &["nothing"]),
-            (&["status", "--settings", "nowhere.toml"], 2, &["nowhere.toml"]),
-            (&["demo", "--config", "nowhere.toml"], 2, &["nowhere.toml"]),
+            ("plan --robot ur6 --scene open --start HOME --goal HOME", 2, &["ur6", "robots/ur6.toml"]),
+            ("plan --robot ur5 --scene no/such.toml --start HOME --goal HOME", 2, &["no/such.toml"]),
+            ("sample move.json", 2, &["move.json"]),
+            ("sample .", 2, &["."]),
+            ("verify --robot ur5 --scene open --trajectory move.json", 2, &["move.json"]),
+            ("run move.json", 2, &["move.json"]),
+            ("check nothing", 2, &["nothing"]),
+            ("status --settings nowhere.toml", 2, &["nowhere.toml"]),
+            ("demo --config nowhere.toml", 2, &["nowhere.toml"]),
         ],
     );
 }
@@ -158,51 +104,19 @@ fn configuration_faults_are_refused_with_file_key_and_value() {
     refuse_all(
         &scratch,
         &[
-            (&["check", "unknown.toml"], 2, &["unknown.toml", "colour", "no such key"]),
-            (&["check", "nan.toml"], 2, &["nan.toml", "a_m", "NaN"]),
-            (&["check", "zero.toml"], 2, &["zero.toml", "velocity_rad_s", "above 0"]),
-            (&["check", "six.toml"], 2, &["six.toml", "position_rad"]),
-            (&["check", "half.toml"], 2, &["half.toml"]),
-            (&["check", "binary.toml"], 2, &["binary.toml"]),
-            (&["check", "ball.toml"], 2, &["ball.toml", "radius_m", "-1"]),
-            (&["check", "twice.toml"], 2, &["twice.toml", "servo[1].node_id", "once on a bus"]),
-            (&["check", "long.toml"], 2, &["long.toml", "interface", "an-interface-too-long"]),
+            ("check unknown.toml", 2, &["unknown.toml", "colour", "no such key"]),
+            ("check nan.toml", 2, &["nan.toml", "a_m", "NaN"]),
+            ("check zero.toml", 2, &["zero.toml", "velocity_rad_s", "above 0"]),
+            ("check six.toml", 2, &["six.toml", "position_rad"]),
+            ("check half.toml", 2, &["half.toml"]),
+            ("check binary.toml", 2, &["binary.toml"]),
+            ("check ball.toml", 2, &["ball.toml", "radius_m", "-1"]),
+            ("check twice.toml", 2, &["twice.toml", "servo[1].node_id", "once on a bus"]),
+            ("check long.toml", 2, &["long.toml", "interface", "an-interface-too-long"]),
             // Every fault at once.
-            (&["check", "faults.toml"], 2, &["node_id", "300", "period_us"]),
-            (
-                &[
-                    "plan",
-                    "--robot",
-                    "zero.toml",
-                    "--scene",
-                    "open",
-                    "--start",
-                    HOME,
-                    "--goal",
-                    HOME,
-                    "-o",
-                    "x.json",
-                ],
-                2,
-                &["zero.toml"],
-            ),
-            (
-                &[
-                    "plan",
-                    "--robot",
-                    "ur5",
-                    "--scene",
-                    "ball.toml",
-                    "--start",
-                    HOME,
-                    "--goal",
-                    HOME,
-                    "-o",
-                    "x.json",
-                ],
-                2,
-                &["radius_m"],
-            ),
+            ("check faults.toml", 2, &["node_id", "300", "period_us"]),
+            ("plan --robot zero.toml --scene open --start HOME --goal HOME -o x.json", 2, &["zero.toml"]),
+            ("plan --robot ur5 --scene ball.toml --start HOME --goal HOME -o x.json", 2, &["radius_m"]),
         ],
     );
 }
@@ -227,55 +141,27 @@ fn trajectory_files_that_are_wrong_are_refused_by_key() {
     refuse_all(
         &scratch,
         &[
-            (&["sample", "n3.json"], 2, &["n3.json", "strokes[0]", "3"]),
-            (&["sample", "nan.json"], 2, &["nan.json"]),
-            (&["sample", "huge.json"], 2, &["huge.json"]),
-            (&["sample", "600.json"], 2, &["600.json", "600", "512"]),
-            (&["sample", "seven.json"], 2, &["seven.json", "base_rad"]),
-            (&["sample", "unknown.json"], 2, &["unknown.json", "colour"]),
-            (&["sample", "old.json"], 2, &["old.json", "version"]),
-            (&["sample", "cut.json"], 2, &["cut.json"]),
-            (&["sample", "good.json", "--rate-hz", "0"], 2, &["--rate-hz is 0"]),
-            (&["sample", "good.json", "--rate-hz", "nan"], 2, &["--rate-hz is NaN"]),
-            (&["sample", "good.json", "--at", "0,x"], 2, &["--at", "`x`"]),
-            (&["sample", "good.json", "--at", "0", "--rate-hz", "5"], 2, &["--at", "--rate-hz"]),
+            ("sample n3.json", 2, &["n3.json", "strokes[0]", "3"]),
+            ("sample nan.json", 2, &["nan.json"]),
+            ("sample huge.json", 2, &["huge.json"]),
+            ("sample 600.json", 2, &["600.json", "600", "512"]),
+            ("sample seven.json", 2, &["seven.json", "base_rad"]),
+            ("sample unknown.json", 2, &["unknown.json", "colour"]),
+            ("sample old.json", 2, &["old.json", "version"]),
+            ("sample cut.json", 2, &["cut.json"]),
+            ("sample good.json --rate-hz 0", 2, &["--rate-hz is 0"]),
+            ("sample good.json --rate-hz nan", 2, &["--rate-hz is NaN"]),
+            ("sample good.json --at 0,x", 2, &["--at", "`x`"]),
+            ("sample good.json --at 0 --rate-hz 5", 2, &["--at", "--rate-hz"]),
+            ("verify --robot ur5 --scene open --trajectory other.json", 2, &["other.json", "digest"]),
+            ("run good.json", 2, &["good.json", "digest", "taustream plan"]),
+            ("run other.json", 2, &["other.json", "digest"]),
             (
-                &["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "other.json"],
-                2,
-                &["other.json", "digest"],
-            ),
-            (&["run", "good.json"], 2, &["good.json", "digest", "taustream plan"]),
-            (&["run", "other.json"], 2, &["other.json", "digest"]),
-            (
-                &[
-                    "cost",
-                    "--robot",
-                    "ur5",
-                    "--scene",
-                    "open",
-                    "--trajectory",
-                    "good.json",
-                    "--weights",
-                    "1,2",
-                ],
+                "cost --robot ur5 --scene open --trajectory good.json --weights 1,2",
                 2,
                 &["--weights", "2 weights"],
             ),
-            (
-                &[
-                    "cost",
-                    "--robot",
-                    "ur5",
-                    "--scene",
-                    "open",
-                    "--trajectory",
-                    "good.json",
-                    "--expansion-m",
-                    "nan",
-                ],
-                2,
-                &["expansion_m"],
-            ),
+            ("cost --robot ur5 --scene open --trajectory good.json --expansion-m nan", 2, &["expansion_m"]),
         ],
     );
 }
@@ -292,12 +178,12 @@ fn robot_of_seven_joints_refuses_six_values() {
         &scratch,
         &[
             (
-                &["plan", "--robot", "seven.toml", "--scene", "open", "--start", HOME, "--goal", HOME],
+                "plan --robot seven.toml --scene open --start HOME --goal HOME",
                 2,
                 &["--start has 6 values", "7 joints", "wrist_4"],
             ),
             (
-                &["verify", "--robot", "seven.toml", "--scene", "open", "--trajectory", "six.json"],
+                "verify --robot seven.toml --scene open --trajectory six.json",
                 2,
                 &["six.json", "6 joints", "7"],
             ),
@@ -310,40 +196,30 @@ fn poses_that_cannot_be_are_refused_with_joint_or_contact() {
     let scratch = Scratch::new();
     // A ball where the arm's forearm is in its home pose, and a closed shell round the base.
     scratch.write("inside.toml", "[[sphere]]\nname = \"ball\"\ncenter_m = [0.0, 0.0, 0.5]\nradius_m = 0.5\n");
-    let plan = |scene: &'static str, start: &'static str, goal: &'static str| {
-        [
-            "plan",
-            "--robot",
-            "ur5",
-            "--scene",
-            scene,
-            "--start",
-            start,
-            "--goal",
-            goal,
-            "--deadline-ms",
-            "1500",
-            "-o",
-            "x.json",
-        ]
+    let plan = |scene: &str, start: &str, goal: &str| {
+        format!("plan --robot ur5 --scene {scene} --start {start} --goal {goal} --deadline-ms 1500 -o x.json")
     };
     refuse_all(
         &scratch,
         &[
-            (&plan("inside.toml", HOME, "1,-1.57,1.57,-1.57,-1.57,0"), 1, &["start in collision", "ball"]),
-            (&plan("open", HOME, "0,-1.57,9,-1.57,-1.57,0"), 1, &["goal outside limits", "joint 3", "elbow"]),
+            (&plan("inside.toml", "HOME", "1,-1.57,1.57,-1.57,-1.57,0"), 1, &["start in collision", "ball"]),
             (
-                &plan("open", "4,-1.57,1.57,-1.57,-1.57,0", HOME),
+                &plan("open", "HOME", "0,-1.57,9,-1.57,-1.57,0"),
+                1,
+                &["goal outside limits", "joint 3", "elbow"],
+            ),
+            (
+                &plan("open", "4,-1.57,1.57,-1.57,-1.57,0", "HOME"),
                 1,
                 &["start outside limits", "joint 1", "shoulder_pan"],
             ),
             (
-                &plan("open", HOME, "0,-90,90,-90,-90,0"),
+                &plan("open", "HOME", "0,-90,90,-90,-90,0"),
                 1,
                 &["goal outside limits", "looks like degrees", "1.5708"],
             ),
             // The arm straight down through the table.
-            (&plan("open", HOME, "0,1.57,0,0,0,0"), 1, &["goal in collision"]),
+            (&plan("open", "HOME", "0,1.57,0,0,0,0"), 1, &["goal in collision"]),
         ],
     );
 }
@@ -363,21 +239,9 @@ fn goal_behind_a_closed_wall_is_refused_within_the_deadline() {
     ];
     scratch.write("wall.toml", &walls.concat());
     let (start, goal) = ("1.57,-0.4,0.6,-1.57,-1.57,0", "-1.57,-0.4,0.6,-1.57,-1.57,0");
-    let words = [
-        "plan",
-        "--robot",
-        "ur5",
-        "--scene",
-        "wall.toml",
-        "--start",
-        start,
-        "--goal",
-        goal,
-        "--deadline-ms",
-        "700",
-        "-o",
-        "x.json",
-    ];
+    let words = format!(
+        "plan --robot ur5 --scene wall.toml --start {start} --goal {goal} --deadline-ms 700 -o x.json"
+    );
     refuse_all(&scratch, &[(&words, 1, &["no path found", "link2 and back", "longer deadline"])]);
 }
 
@@ -395,9 +259,7 @@ fn motion_beyond_limits_or_through_an_obstacle_is_not_verified() {
         "[[cylinder]]\nname = \"post\"\ncenter_m = [0.0, 0.45, 0.4]\nradius_m = 0.1\nlength_m = 1.2\n\
         [[cylinder]]\nname = \"post2\"\ncenter_m = [0.0, -0.45, 0.4]\nradius_m = 0.1\nlength_m = 1.2\n",
     );
-    let verify = |file: &'static str, scene: &'static str| {
-        ["verify", "--robot", "ur5", "--scene", scene, "--trajectory", file]
-    };
+    let verify = |file: &str, scene: &str| format!("verify --robot ur5 --scene {scene} --trajectory {file}");
     refuse_all(
         &scratch,
         &[
@@ -413,20 +275,20 @@ fn commands_without_a_streamer_say_so() {
     let scratch = Scratch::new();
     let arm = format!("nobody-{}", std::process::id());
     scratch.settings(&arm);
-    for words in [
-        &["enable"][..],
-        &["disable"],
-        &["pause"],
-        &["resume"],
-        &["stop"],
-        &["stop", "--fast"],
-        &["torque-off"],
-        &["clear-fault"],
-        &["speed", "50"],
-        &["status"],
-        &["replan", "--goal", HOME],
+    for command in [
+        "enable",
+        "disable",
+        "pause",
+        "resume",
+        "stop",
+        "stop --fast",
+        "torque-off",
+        "clear-fault",
+        "speed 50",
+        "status",
+        "replan --goal HOME",
     ] {
-        let words: Vec<&str> = words.iter().copied().chain(["--settings", "settings.toml"]).collect();
+        let words = format!("{command} --settings settings.toml");
         let case: Case<'_> = (&words, 1, &["taustream-streamer", &arm, "is not running", "start"]);
         refuse_all(&scratch, &[case]);
     }
@@ -449,8 +311,8 @@ fn services_of_another_user_are_named() {
     let segment = OtherUser(format!("/dev/shm/taustream.4242.{arm}.test").into());
     fs::write(&segment.0, "").expect("a file in /dev/shm");
     let expected: &[&str] = &["uid 4242", "not running", &arm];
-    refuse_all(&scratch, &[(&["status", "--settings", "settings.toml"], 1, expected)]);
-    refuse_all(&scratch, &[(&["stop", "--settings", "settings.toml"], 1, expected)]);
+    refuse_all(&scratch, &[("status --settings settings.toml", 1, expected)]);
+    refuse_all(&scratch, &[("stop --settings settings.toml", 1, expected)]);
 }
 
 #[test]
@@ -472,5 +334,5 @@ fn stopping_needs_only_the_name_of_broken_settings() {
 #[test]
 #[should_panic(expected = "check")]
 fn checker_notices_a_command_that_succeeds() {
-    refuse_all(&Scratch::new(), &[(&["check", "ur5"], 2, &["ur5"])]);
+    refuse_all(&Scratch::new(), &[("check ur5", 2, &["ur5"])]);
 }

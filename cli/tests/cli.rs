@@ -1,0 +1,7 @@
+//! The real `taustream` command, as users meet it.
+#[path = "cli/bad_input.rs"]
+mod bad_input;
+#[path = "cli/common.rs"]
+mod common;
+#[path = "cli/good_path.rs"]
+mod good_path;
