@@ -161,3 +161,75 @@ fn phase_line(t: &Transition) -> Value {
         "joint": t.cause.and_then(|c| c.joint), "value": t.cause.map(|c| c.value),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facts::{BUSES_MAX, Cause};
+    use crate::phases::Event;
+    use std::sync::mpsc::channel;
+    use taustream_messages::{FaultReason, Phase};
+    use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+
+    fn settings() -> Settings {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
+        Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    fn cycle(tick: u64, position_rad: JointArray) -> CycleRecord {
+        CycleRecord {
+            tick,
+            time_ns: 5_270_041_203_103,
+            syncs: [tick; BUSES_MAX],
+            phase: Phase::Moving,
+            trajectory_id: 7,
+            s: 0.1 + 0.2,
+            sigma: 1.0 / 3.0,
+            position_rad,
+            sent: [7; BUSES_MAX],
+            lost: [0; BUSES_MAX],
+        }
+    }
+
+    /// Goal: what is read is what was written, to the last bit, in order, acceptance in front of its cycles.
+    #[test]
+    fn log_read_back_gives_the_same_bits_in_the_same_order() {
+        let path = std::env::temp_dir().join(format!("taustream-log-{}", std::process::id()));
+        let settings = settings();
+        let queue = Arc::new(ArrayQueue::new(64));
+        let (sender, candidates) = channel();
+        let recorder = Recorder::start(&path, &settings, Arc::clone(&queue), candidates).unwrap();
+        let base_rad = [0.1 + 0.2, -1.57, 1.57, -1.57, 1e-17, 1.0 / 3.0, 0.0, 0.0];
+        let stroke = Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad: [0.7; MAX_JOINTS] };
+        let stroke = Stroke { delta_rad: [0.7, 0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 0.0], ..stroke };
+        let trajectory = Trajectory::new(6, base_rad, &[stroke]).unwrap();
+        let digest = Some(settings.robot.digest_hex());
+        let file = TrajectoryFile { robot: "ur5".into(), digest, trajectory: trajectory.clone() };
+        sender.send(Candidate { trajectory_id: 7, generation: 3, file }).unwrap();
+        let start_offset_rad = [0.0; MAX_JOINTS];
+        queue.push(Record::Accepted { tick: 41, trajectory_id: 7, start_offset_rad }).unwrap();
+        let position_rad = trajectory.sample(0.777).position_rad;
+        queue.push(Record::Cycle(cycle(41, position_rad))).unwrap();
+        let cause =
+            Some(Cause { reason: FaultReason::FeedbackLate, joint: Some(2), value: 0.021, limit: 0.02 });
+        let (from, to, event) = (Phase::Moving, Phase::FastStopping, Event::StopFault);
+        queue.push(Record::Transition(Transition { tick: 42, from, to, event, cause })).unwrap();
+        queue.push(Record::Lost(5)).unwrap();
+        recorder.finish().unwrap();
+
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let lines: Vec<Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        let events: Vec<&str> = lines.iter().map(|l| l["event"].as_str().unwrap()).collect();
+        assert_eq!(events, ["start", "trajectory", "cycle", "phase", "lost"]);
+        let bits = |v: &Value| v.as_f64().unwrap().to_bits();
+        for joint in 0..6 {
+            assert_eq!(bits(&lines[2]["position_rad"][joint]), position_rad[joint].to_bits());
+            assert_eq!(bits(&lines[1]["file"]["base_rad"][joint]), base_rad[joint].to_bits());
+        }
+        assert_eq!(bits(&lines[2]["s"]), (0.1_f64 + 0.2).to_bits());
+        assert_eq!(lines[2]["sync"], json!([41]));
+        assert_eq!((&lines[3]["joint"], &lines[3]["reason"]), (&json!(2), &json!("feedback late (s)")));
+        assert_eq!((&lines[1]["generation"], &lines[4]["records"]), (&json!(3), &json!(5)));
+    }
+}
