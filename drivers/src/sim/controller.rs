@@ -134,7 +134,6 @@ impl Controller {
     }
 
     /// True when a ramp has brought the reference to rest.
-    #[expect(clippy::float_cmp, reason = "the ramp ends on exactly 0")]
     pub(crate) fn has_stopped(&self) -> bool {
         matches!(self.mode, Mode::Slowing(_)) && self.reference_rad_s == 0.0
     }

@@ -113,6 +113,8 @@ pub struct Drive {
     pub(super) astray: Option<Nanos>,
     /// Since when the reference of a ramp rests.
     pub(super) resting: Option<Nanos>,
+    /// When the joint was last seen moving after that.
+    pub(super) moving: Nanos,
     pub(super) encoder_shift_rad: f64,
     pub(super) warning: bool,
     pub(super) refuse_writes: u32,
@@ -122,7 +124,7 @@ pub struct Drive {
 const EMCY_COMMUNICATION: u16 = 0x8100;
 /// Emergency code for a SYNC whose length does not fit object 0x1019.
 const EMCY_SYNC_LENGTH: u16 = 0x8240;
-/// Emergency code for an RPDO longer than its mapping is not sent: CiA 301 lets a drive take the first bytes.
+/// Object that says whether SYNC carries a counter.
 const SYNC_COUNTER: u16 = 0x1019;
 
 impl Drive {
@@ -148,6 +150,7 @@ impl Drive {
             limited: false,
             astray: None,
             resting: None,
+            moving: Nanos(0),
             encoder_shift_rad: 0.0,
             warning: false,
             refuse_writes: 0,

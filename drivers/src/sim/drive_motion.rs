@@ -6,8 +6,10 @@ use crate::codec::{NmtState, words};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 
-/// A ramp has ended when the joint is slower than this, or some time after its reference rests.
+/// A ramp has ended when the joint was slower than this for a while: one that only turns round is not at rest.
 const STANDSTILL_RAD_S: f64 = 0.01;
+/// That while.
+const SLOW_S: f64 = 0.01;
 /// How long a joint may creep after its reference rests: a jammed or overloaded one must not keep a fault waiting.
 const STANDSTILL_S: f64 = 0.5;
 /// Time that is simulated after a pause of the process; what is longer is skipped.
@@ -127,7 +129,10 @@ impl Drive {
                 self.astray = None;
                 self.halted = false;
             }
-            Action::Follow => self.controller.follow(),
+            Action::Follow => {
+                self.plant.energise(true); // A brake that was closing opens again.
+                self.controller.follow();
+            }
             Action::SlowDown(slowing) => {
                 let measured = (self.measured_rad(0.0), self.plant.velocity_rad_s);
                 self.controller.slow_down(self.deceleration_rad_s2(slowing), measured);
@@ -145,13 +150,9 @@ impl Drive {
     /// Looks for faults, and for the end of a ramp.
     pub(super) fn supervise(&mut self, now: Nanos, out: &mut Vec<CanFrame>) {
         if self.controller.has_stopped() && self.power.is_slowing() {
-            let since = *self.resting.get_or_insert(now);
-            if self.plant.velocity_rad_s.abs() < STANDSTILL_RAD_S || now.since_s(since) > STANDSTILL_S {
-                let action = self.power.standstill();
-                self.perform(action);
-            }
+            self.settle(now);
         }
-        if let Some(_node) = self.consumers.lost(now) {
+        if self.consumers.lost(now).is_some() {
             self.report(words::EMCY_HEARTBEAT, out);
             self.lose_connection(words::EMCY_HEARTBEAT, out);
             // 0x1029: what a lost heartbeat does to the communication state.
@@ -165,6 +166,24 @@ impl Drive {
             self.watch_setpoints(now, out);
         }
         self.watch_following(now, out);
+    }
+
+    /// Ends a ramp once the joint rests. A drive that is about to lose its torque closes the brake first.
+    fn settle(&mut self, now: Nanos) {
+        let resting = *self.resting.get_or_insert(now);
+        if self.plant.velocity_rad_s.abs() > STANDSTILL_RAD_S {
+            self.moving = now;
+        }
+        let rests = now.since_s(self.moving.max(resting)) > SLOW_S || now.since_s(resting) > STANDSTILL_S;
+        if !rests {
+            return;
+        }
+        if self.power.ends_released() && self.parameters.plant.brake && self.plant.is_free() {
+            self.plant.shut_brake(true);
+            return;
+        }
+        let action = self.power.standstill();
+        self.perform(action);
     }
 
     /// A fault: emergency message and transition 13.

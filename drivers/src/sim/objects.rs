@@ -30,12 +30,12 @@ impl Kind {
     /// The values that the type can hold.
     const fn range(self) -> (i64, i64) {
         match self {
-            Self::U8 => (0, u8::MAX as i64),
-            Self::U16 => (0, u16::MAX as i64),
-            Self::U32 => (0, u32::MAX as i64),
-            Self::I8 => (i8::MIN as i64, i8::MAX as i64),
-            Self::I16 => (i16::MIN as i64, i16::MAX as i64),
-            Self::I32 => (i32::MIN as i64, i32::MAX as i64),
+            Self::U8 => (0, 0xFF),
+            Self::U16 => (0, 0xFFFF),
+            Self::U32 => (0, 0xFFFF_FFFF),
+            Self::I8 => (-0x80, 0x7F),
+            Self::I16 => (-0x8000, 0x7FFF),
+            Self::I32 => (-0x8000_0000, 0x7FFF_FFFF),
             Self::Text(_) => (0, 0),
         }
     }
@@ -229,8 +229,8 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x607D, 0, Kind::U8, 2),
         Spec::rw(0x607D, 1, Kind::I32, i64::from(i32::MIN)),
         Spec::rw(0x607D, 2, Kind::I32, i64::from(i32::MAX)),
-        Spec::rw(0x6084, 0, Kind::U32, 1).within(1, u32::MAX as i64),
-        Spec::rw(0x6085, 0, Kind::U32, 1).within(1, u32::MAX as i64),
+        Spec::rw(0x6084, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF),
+        Spec::rw(0x6085, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF),
         Spec::ro(0x608F, 0, Kind::U8, 2),
         Spec::ro(0x608F, 1, Kind::U32, 1),
         Spec::ro(0x608F, 2, Kind::U32, 1),

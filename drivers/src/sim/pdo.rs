@@ -219,8 +219,7 @@ pub(crate) fn check_write(dictionary: &Dictionary, address: Address, value: i64)
     match (mapping, address.sub) {
         (false, PDO_COB_ID) => check_cob_id(cob_id, value),
         (false, PDO_TYPE) if (241..=253).contains(&value) => Err(words::ABORT_RANGE),
-        (false, PDO_TYPE) => Ok(()),
-        (false, PDO_EVENT_TIMER) => Ok(()),
+        (false, PDO_TYPE | PDO_EVENT_TIMER) => Ok(()),
         (_, _) if exists => Err(words::ABORT_DEVICE_STATE),
         (false, _) => Ok(()),
         (true, 0) => check_count(dictionary, address.index, transmit, value),
@@ -261,12 +260,11 @@ fn slot(dictionary: &Dictionary, entry: i64, transmit: bool) -> Result<Slot, Abo
         (0x0007, 0) => Some(Kind::U32),
         _ => None,
     };
-    let (kind, allowed) = match dummy {
-        Some(kind) => (kind, !transmit),
-        None => {
-            let spec = dictionary.spec(entry.address)?;
-            (spec.kind, if transmit { spec.in_tpdo } else { spec.in_rpdo })
-        }
+    let (kind, allowed) = if let Some(kind) = dummy {
+        (kind, !transmit)
+    } else {
+        let spec = dictionary.spec(entry.address)?;
+        (spec.kind, if transmit { spec.in_tpdo } else { spec.in_rpdo })
     };
     if !allowed || kind.bits() != entry.bits {
         return Err(words::ABORT_NOT_MAPPABLE);

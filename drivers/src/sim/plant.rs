@@ -45,6 +45,7 @@ pub(crate) struct Plant {
     pub(crate) jammed: bool,
     energised: bool,
     brake_closed: bool,
+    brake_shall_close: bool,
     brake_moves_s: f64,
 }
 
@@ -58,14 +59,21 @@ impl Plant {
             jammed: false,
             energised: false,
             brake_closed: parameters.brake,
+            brake_shall_close: true,
             brake_moves_s: 0.0,
         }
     }
 
     /// Power to the motor; the brake opens with it and closes without it, after its delay.
     pub(crate) fn energise(&mut self, energised: bool) {
-        if energised != self.energised {
-            self.energised = energised;
+        self.energised = energised;
+        self.shut_brake(!energised);
+    }
+
+    /// Begins to close the brake, or to open it, whether the motor is energised or not.
+    pub(crate) fn shut_brake(&mut self, shut: bool) {
+        if shut != self.brake_shall_close {
+            self.brake_shall_close = shut;
             self.brake_moves_s = self.parameters.brake_delay_s;
         }
     }
@@ -109,7 +117,7 @@ impl Plant {
             self.brake_moves_s -= dt_s;
         }
         if self.brake_moves_s <= 0.0 {
-            self.brake_closed = self.parameters.brake && !self.energised;
+            self.brake_closed = self.parameters.brake && self.brake_shall_close;
         }
     }
 }

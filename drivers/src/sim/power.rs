@@ -136,6 +136,11 @@ impl Power {
         self.after_standstill.is_some()
     }
 
+    /// True when the ramp that is under way ends without torque.
+    pub(crate) fn ends_released(&self) -> bool {
+        self.after_standstill.is_some_and(|next| next != PowerState::QuickStopActive)
+    }
+
     /// Self-test done: transitions 0 and 1.
     pub(crate) fn boot(&mut self) {
         if self.state == PowerState::NotReadyToSwitchOn {
@@ -182,18 +187,15 @@ impl Power {
 
     /// A fault was found: transitions 13 and 14, with reaction 0x605E.
     pub(crate) fn fault(&mut self, options: &Options) -> Action {
-        let energised = self.is_energised();
-        match self.state {
-            PowerState::Fault | PowerState::FaultReactionActive => Action::Continue,
-            _ if energised && options.fault_reaction != 0 => {
-                self.slow(PowerState::FaultReactionActive, PowerState::Fault, options.fault_reaction)
-            }
-            _ => {
-                self.after_standstill = None;
-                self.state = PowerState::Fault;
-                Action::Release
-            }
+        if matches!(self.state, PowerState::Fault | PowerState::FaultReactionActive) {
+            return Action::Continue;
         }
+        if self.is_energised() && options.fault_reaction != 0 {
+            return self.slow(PowerState::FaultReactionActive, PowerState::Fault, options.fault_reaction);
+        }
+        self.after_standstill = None;
+        self.state = PowerState::Fault;
+        Action::Release
     }
 
     /// The connection to the master was lost: reaction 0x6007. Faults (1) are the caller's, who knows the code.
@@ -262,7 +264,11 @@ impl Power {
                 self.state = PowerState::OperationEnabled; // 16
                 Action::Follow
             }
-            _ => Action::Continue,
+            Command::EnableOperation
+            | Command::Shutdown
+            | Command::SwitchOn
+            | Command::QuickStop
+            | Command::None => Action::Continue,
         }
     }
 

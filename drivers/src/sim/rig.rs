@@ -161,27 +161,27 @@ impl Rig {
             call(&mut unit.drive, &mut frames);
             let (bus, silent, delay_s, loss) = (unit.bus, unit.silent, unit.delay_s, unit.loss);
             for frame in frames.iter().filter(|_| !silent) {
-                if !self.is_lost(loss) {
-                    self.put(now, bus, delay_s, *frame, out);
+                if self.is_lost(loss) {
+                    continue;
+                }
+                if delay_s > 0.0 {
+                    self.hold_back(now, bus, delay_s, *frame);
+                } else if let Some(out) = out.get_mut(bus) {
+                    out.push(*frame);
                 }
             }
         }
         self.scratch = frames;
     }
 
-    /// Puts a frame on the bus, now or after its wire's delay.
-    fn put(&mut self, now: Nanos, bus: usize, delay_s: f64, frame: CanFrame, out: &mut [Vec<CanFrame>]) {
-        if delay_s > 0.0
-            && let Some(held) = self.held.get_mut(bus)
-        {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 10 s")]
-            let due = Nanos(now.0.saturating_add((delay_s * 1e9) as u64));
-            let place = held.partition_point(|(other, _)| *other <= due);
-            if held.len() < HELD_MAX {
-                held.insert(place, (due, frame));
-            }
-        } else if let Some(out) = out.get_mut(bus) {
-            out.push(frame);
+    /// Keeps a frame until its wire's delay is over.
+    fn hold_back(&mut self, now: Nanos, bus: usize, delay_s: f64, frame: CanFrame) {
+        let Some(held) = self.held.get_mut(bus) else { return };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 10 s")]
+        let due = Nanos(now.0.saturating_add((delay_s * 1e9) as u64));
+        let place = held.partition_point(|(other, _)| *other <= due);
+        if held.len() < HELD_MAX {
+            held.insert(place, (due, frame));
         }
     }
 

@@ -220,19 +220,16 @@ impl Section<'_> {
         }
     }
 
-    /// The value of a key for joint `at`; a list of another length than the arm is a fault, reported once.
+    /// The value of a key for joint `at`; a list of another length than the arm is a fault.
     fn of_joint(&self, key: &'static str, at: usize) -> Option<&Value> {
-        match self.table.get(key)? {
-            Value::Array(list) if list.len() == self.joints => list.get(at),
-            Value::Array(list) => {
-                if at == 0 {
-                    let expected = format!("one value for all joints, or {}", self.joints);
-                    self.fault(key, &format!("a list of {}", list.len()), &expected);
-                }
-                None
-            }
-            single => Some(single),
+        let value = self.table.get(key)?;
+        let Value::Array(list) = value else { return Some(value) };
+        if list.len() != self.joints {
+            let expected = format!("one value for all joints, or {}", self.joints);
+            self.fault(key, &format!("a list of {}", list.len()), &expected);
+            return None;
         }
+        list.get(at)
     }
 
     fn path(&self, key: &str, at: usize) -> String {

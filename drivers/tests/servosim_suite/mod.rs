@@ -1,0 +1,7 @@
+//! The parts of the suite.
+mod arm;
+mod bench;
+mod hostile;
+mod motion;
+mod network;
+mod power;
