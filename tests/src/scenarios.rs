@@ -1,9 +1,9 @@
 //! What must hold over the real processes, one function a promise. Names say area, event, condition.
-use crate::stage::Stage;
+use crate::stage::{PATIENCE, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
-use taustream_messages::service::Wire;
+use taustream_messages::service::{ReceiptSubscriber, TrajectoryPublisher, Wire};
 use taustream_messages::trajectory::Doctored;
 use taustream_messages::{
     CheckedTrajectory, FaultReason, Outcome, Phase, Receipt, Rejection, Replaces, Report, TrajectoryMessage,
@@ -152,13 +152,17 @@ fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[Faul
     stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "fault")?;
     stage.cli_refused(&["enable"], "clear-fault")?;
     stage.simulator.tell("clear")?;
+    // A drive that dropped out while others hold the arm: nothing is cleared before all are off.
+    stage.cli_refused(&["clear-fault"], "disable")?;
+    stage.cli_done(&["disable"])?;
+    stage.await_report("all drives off", |report, _| report.energised == 0)?;
     let since = Instant::now();
     while stage.cli(&["clear-fault"])?.code != 0 {
-        ensure!(since.elapsed() < Duration::from_secs(20), "the fault cannot be cleared");
+        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared");
     }
     let (after, phase) = stage.report()?;
     ensure!(phase != Phase::Moving && after.sigma == 0.0, "the arm went on by itself: {}", phase.word());
-    stage.await_report("ready to be enabled", |_, phase| matches!(phase, Phase::Locked | Phase::Disabled))?;
+    stage.await_report("ready to be enabled", |_, phase| phase == Phase::Disabled)?;
     enable(stage)?;
     stage.replan(&goals.text(1)?)?;
     arrive(stage, goals.rad(1)?)?;
@@ -191,40 +195,54 @@ fn message(report: &Report, delta_rad: f64, base_shift_rad: f64) -> Result<Check
     })
 }
 
-fn receipt_of(wire: &Wire, sent: &TrajectoryMessage) -> Result<Receipt> {
-    let receipts = wire.receipt_subscriber()?;
-    wire.trajectory_publisher()?.send_copy(*sent)?;
-    let since = Instant::now();
-    loop {
-        while let Some(receipt) = receipts.receive()? {
-            if receipt.trajectory_id() == sent.claimed_id() {
-                return Ok(*receipt);
-            }
-        }
-        ensure!(since.elapsed() < Duration::from_secs(20), "no receipt of message {}", sent.claimed_id());
-        std::thread::sleep(Duration::from_millis(5));
-    }
+/// A sender of trajectories beside the planner. It stays connected: a message dies with its sender.
+struct Sender {
+    trajectories: TrajectoryPublisher,
+    receipts: ReceiptSubscriber,
+    _wire: Wire,
 }
 
-fn rejection(wire: &Wire, sent: &TrajectoryMessage) -> Result<Rejection> {
-    match receipt_of(wire, sent)?.outcome().context("an unreadable receipt")? {
-        Outcome::Rejected(rejection) => Ok(rejection),
-        Outcome::Accepted { .. } => anyhow::bail!("accepted what had to be refused"),
+impl Sender {
+    fn join(arm: &str) -> Result<Self> {
+        let wire = Wire::join(arm, "hostile")?;
+        let (trajectories, receipts) = (wire.trajectory_publisher()?, wire.receipt_subscriber()?);
+        Ok(Self { trajectories, receipts, _wire: wire })
+    }
+
+    fn receipt_of(&self, sent: &TrajectoryMessage) -> Result<Receipt> {
+        self.trajectories.send_copy(*sent)?;
+        let since = Instant::now();
+        loop {
+            while let Some(receipt) = self.receipts.receive()? {
+                if receipt.trajectory_id() == sent.claimed_id() {
+                    return Ok(*receipt);
+                }
+            }
+            ensure!(since.elapsed() < Duration::from_secs(20), "no receipt of message {}", sent.claimed_id());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn rejection(&self, sent: &TrajectoryMessage) -> Result<Rejection> {
+        match self.receipt_of(sent)?.outcome().context("an unreadable receipt")? {
+            Outcome::Rejected(rejection) => Ok(rejection),
+            Outcome::Accepted { .. } => anyhow::bail!("accepted what had to be refused"),
+        }
     }
 }
 
 fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    let wire = Wire::join(&stage.settings.name, "hostile")?;
+    let sender = Sender::join(&stage.settings.name)?;
     let (at_rest, _) = stage.report()?;
     let good = message(&at_rest, 0.05, 0.0)?;
     let wrong_robot = TrajectoryMessage::new(&good).doctored(Doctored::Digest(0x55));
-    ensure!(rejection(&wire, &wrong_robot)? == Rejection::WrongRobot, "another robot's digest");
+    ensure!(sender.rejection(&wrong_robot)? == Rejection::WrongRobot, "another robot's digest");
     let mut stale = good.clone();
     stale.generation = at_rest.generation;
-    let stale = rejection(&wire, &TrajectoryMessage::new(&stale))?;
+    let stale = sender.rejection(&TrajectoryMessage::new(&stale))?;
     ensure!(matches!(stale, Rejection::StaleGeneration { .. }), "{stale}");
-    let away = rejection(&wire, &TrajectoryMessage::new(&message(&at_rest, 0.05, 0.02)?))?;
+    let away = sender.rejection(&TrajectoryMessage::new(&message(&at_rest, 0.05, 0.02)?))?;
     ensure!(matches!(away, Rejection::NotAtBase { joint: 0, .. }), "{away}");
     let mut fast = good.clone();
     let strokes = [Stroke {
@@ -234,7 +252,7 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
         delta_rad: [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     }];
     fast.trajectory = Trajectory::new(good.trajectory.joints(), *good.trajectory.base_rad(), &strokes)?;
-    let fast = rejection(&wire, &TrajectoryMessage::new(&fast))?;
+    let fast = sender.rejection(&TrajectoryMessage::new(&fast))?;
     ensure!(matches!(fast, Rejection::Limit { joint: 0, .. }), "{fast}");
 
     stage.replan(&goals.text(0)?)?;
@@ -248,14 +266,14 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
         Doctored::Exponent(3),
         Doctored::Layout(99),
     ] {
-        let refused = rejection(&wire, &TrajectoryMessage::new(&good).doctored(doctored))?;
+        let refused = sender.rejection(&TrajectoryMessage::new(&good).doctored(doctored))?;
         let known = matches!(refused, Rejection::Malformed(_) | Rejection::JointCount { .. });
         ensure!(known, "{doctored:?}: {refused}");
     }
     let (running, _) = stage.report()?;
     let mut cut = message(&running, 0.05, 0.0)?;
     cut.replaces = Replaces::Cut { trajectory_id: running.trajectory_id, at_s: running.trajectory_s + 0.5 };
-    let cut = rejection(&wire, &TrajectoryMessage::new(&cut))?;
+    let cut = sender.rejection(&TrajectoryMessage::new(&cut))?;
     ensure!(matches!(cut, Rejection::CutUnsupported { .. } | Rejection::NotReady { .. }), "{cut}");
     let report = arrive(stage, goals.rad(0)?)?;
     ensure!(report.accepted == 1, "{} trajectories accepted", report.accepted);
@@ -285,7 +303,6 @@ fn commands_out_of_place(stage: &mut Stage, goals: &Goals) -> Result<()> {
     stage.replan(&goals.text(0)?)?;
     stage.await_under_way(0.1)?;
     stage.cli_refused(&["disable"], "moving")?;
-    stage.cli_refused(&["enable"], "moving")?;
     stage.cli_refused(&["replan", "--at-once", "--goal", &goals.text(1)?], "rest")?;
     stage.cli_done(&["torque-off"])?;
     let report = stage.await_phase(Phase::Fault)?;

@@ -139,7 +139,7 @@ pub fn judge(
             }
         }
     }
-    if let Some(at) = on_bus.iter().zip(&claimed).position(|(cycle, claimed)| !claimed && !cycle.is_empty()) {
+    if let Some(at) = on_bus.iter().zip(&claimed).position(|(cycle, claimed)| !claimed && is_live(cycle)) {
         return Err(Flaw::Log(format!("SYNC {} carried setpoints that the log does not know", at + 1)));
     }
     verdict.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
@@ -160,6 +160,11 @@ fn split_at_syncs(frames: &[BusFrame], encodings: &[Encoding]) -> Vec<Vec<(u8, V
         }
     }
     cycles
+}
+
+/// True when a drive is told to follow: bit 3 of the controlword (CiA 402, "enable operation").
+fn is_live(cycle: &[(u8, Vec<u8>)]) -> bool {
+    cycle.iter().any(|(_, data)| data.first().is_some_and(|low| low & 0x08 != 0))
 }
 
 fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> Verdict {

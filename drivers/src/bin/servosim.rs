@@ -12,7 +12,7 @@ use taustream_arm::{Kind, Settings};
 use taustream_drivers::link::{CanLink, LinkChoice, LinkRole};
 use taustream_drivers::sim::serve::{StandardInput, serve};
 use taustream_drivers::sim::settings::drives;
-use taustream_drivers::sim::{FaultOrder, Rig};
+use taustream_drivers::sim::{FaultOrder, Rig, priority};
 use taustream_drivers::{Nanos, link};
 
 /// What the manual says beyond the list of options.
@@ -125,6 +125,9 @@ fn run(args: &Args, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    if let Err(error) = priority::raise() {
+        tracing::info!("running without SCHED_FIFO ({error}): on a busy computer the drives may answer late");
     }
     let on: Vec<String> = links.iter().map(|link| link.describe()).collect();
     let mut stdout = std::io::stdout();

@@ -16,6 +16,7 @@ mod objects;
 mod pdo;
 mod plant;
 mod power;
+pub mod priority;
 pub mod rig;
 mod sdo_server;
 pub mod serve;
