@@ -46,14 +46,6 @@ pub enum SendError {
         /// Ours.
         ours: String,
     },
-    /// A planner serves this arm already.
-    #[error("arm `{arm}` has a taustream-planner already ({why}); end that one first")]
-    Served {
-        /// The arm's name.
-        arm: String,
-        /// What shared memory said.
-        why: String,
-    },
     /// Shared memory refused in the middle of it.
     #[error("the trajectory could not be handed over: cannot {what}: {why}")]
     Transport {

@@ -32,6 +32,25 @@ const TAKE_OVER_WITHIN: Duration = Duration::from_secs(3);
 
 type Request = ActiveRequest<ipc::Service, PlanRequest, (), PlanReply, ()>;
 
+/// Why a planner cannot serve.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OpenError {
+    /// A planner serves this arm already.
+    #[error("arm `{arm}` has a taustream-planner already ({why}); end that one first")]
+    Served {
+        /// The arm's name.
+        arm: String,
+        /// What shared memory said.
+        why: String,
+    },
+    /// Shared memory refused.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// The ports to the streamer cannot be opened.
+    #[error(transparent)]
+    Send(#[from] SendError),
+}
+
 /// The planner of one arm.
 pub struct Service<'a> {
     robot: &'a Robot,
@@ -66,7 +85,7 @@ impl<'a> Service<'a> {
         robot: &'a Robot,
         scene: &'a Scene,
         stop: &'a AtomicBool,
-    ) -> Result<Self, SendError> {
+    ) -> Result<Self, OpenError> {
         let server = take_server(wire)?;
         let outbox = Outbox::open(wire)?;
         Ok(Self { robot, scene, outbox, server, stop, seen: Seen::default(), waiting: None })
@@ -302,13 +321,13 @@ fn reply(request: &Request, outcome: &PlanOutcome) {
 }
 
 /// The one place of a planner. That of a killed planner is free again once shared memory has been cleaned up.
-fn take_server(wire: &Wire) -> Result<PlanServer, SendError> {
+fn take_server(wire: &Wire) -> Result<PlanServer, OpenError> {
     let since = Instant::now();
     loop {
         match wire.plan_server() {
             Ok(server) => return Ok(server),
             Err(ServiceError::Refused { arm, why, .. }) if since.elapsed() > TAKE_OVER_WITHIN => {
-                return Err(SendError::Served { arm, why });
+                return Err(OpenError::Served { arm, why });
             }
             Err(e) if since.elapsed() > TAKE_OVER_WITHIN => return Err(e.into()),
             Err(_) => thread::sleep(Duration::from_millis(100)),
