@@ -91,7 +91,7 @@ pub struct Supervision {
     pub lost_cycles_max: u32,
     /// How long drives may take for each step of bring-up and enabling.
     pub drive_timeout_s: f64,
-    /// Distance from a trajectory's base at which it is still taken; it becomes a step of the setpoint.
+    /// Distance from a trajectory's base at which it is still taken; the streamer lets it go along the start of the motion.
     pub base_tolerance_rad: f64,
     /// Speed override at start, in percent.
     pub first_speed_percent: f64,
@@ -140,7 +140,7 @@ const RATE_HZ: Bounds = Bounds::within(1.0, 1000.0, "Hz");
 const AGE_S: Bounds = Bounds::above(0.0, 1.0, "s");
 const ERROR_RAD: Bounds = Bounds::above(0.0, 3.2, "rad");
 const TIMEOUT_S: Bounds = Bounds::within(0.1, 60.0, "s");
-/// The difference between base and commanded pose reaches the drives as a step, so it stays at an encoder's resolution.
+/// The difference between base and commanded pose shifts the start of a verified motion, so it stays at an encoder's resolution.
 const TOLERANCE_RAD: Bounds = Bounds::within(0.0, 1e-6, "rad");
 const PERCENT: Bounds = Bounds::above(0.0, 100.0, "percent");
 /// The arm's name stands in file names of shared memory, beside a prefix and a service's name.

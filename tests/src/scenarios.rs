@@ -156,17 +156,29 @@ fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[Faul
     stage.cli_refused(&["clear-fault"], "disable")?;
     stage.cli_done(&["disable"])?;
     stage.await_report("all drives off", |report, _| report.energised == 0)?;
+    // A drive that comes back with a fault of its own, as one that was silent does, is cleared once more.
     let since = Instant::now();
-    while stage.cli(&["clear-fault"])?.code != 0 {
-        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared");
+    while !is_ready_to_enable(stage)? {
+        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared: {}", stage.streamer.said());
+        stage.cli(&["clear-fault"])?;
     }
-    let (after, phase) = stage.report()?;
-    ensure!(phase != Phase::Moving && after.sigma == 0.0, "the arm went on by itself: {}", phase.word());
-    stage.await_report("ready to be enabled", |_, phase| phase == Phase::Disabled)?;
     enable(stage)?;
     stage.replan(&goals.text(1)?)?;
     arrive(stage, goals.rad(1)?)?;
     Ok(())
+}
+
+/// Disabled, and still so half a second later.
+fn is_ready_to_enable(stage: &mut Stage) -> Result<bool> {
+    for _ in 0..10 {
+        let (report, phase) = stage.report()?;
+        ensure!(phase != Phase::Moving && report.sigma == 0.0, "the arm goes on by itself: {}", phase.word());
+        if phase != Phase::Disabled {
+            return Ok(false);
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    Ok(true)
 }
 
 fn servo_silent(stage: &mut Stage, goals: &Goals) -> Result<()> {
