@@ -3,7 +3,7 @@
 
 use anyhow::Context;
 use clap::Parser;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -32,6 +32,8 @@ Examples:
   taustream-servosim --settings vcan6 --start-rad \"0,-1.57,1.57,-1.57,-1.57,0\"
   taustream-servosim --settings vcan6 --link local --fault joint=elbow,kind=silence,after=moving,at_s=0.5
 
+It is no model of a safety function: real arms need their own emergency stop.
+
 Exit status: 0 ended by SIGINT or SIGTERM, 1 the link failed, 2 bad usage or bad file.";
 
 /// Simulated servos on the buses of a settings file: they move, fall, warn and fail as real ones do, and break nothing.
@@ -58,6 +60,7 @@ struct Args {
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .with_env_filter(
             tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into()),
         )

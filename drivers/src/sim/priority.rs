@@ -7,7 +7,7 @@ const PRIORITY: i32 = 60;
 /// Asks for SCHED_FIFO for the calling thread.
 ///
 /// # Errors
-/// The operating system's reason, usually a missing RLIMIT_RTPRIO or CAP_SYS_NICE.
+/// The operating system's reason, usually a missing `RLIMIT_RTPRIO` or `CAP_SYS_NICE`.
 pub fn raise() -> std::io::Result<()> {
     let parameters = libc::sched_param { sched_priority: PRIORITY };
     // SAFETY: 0 names the calling thread, and the pointer is to a live `sched_param` that the call only reads.

@@ -5,3 +5,4 @@ mod hostile;
 mod motion;
 mod network;
 mod power;
+mod process;
