@@ -66,7 +66,7 @@ pub(crate) enum Failure {
         why: Box<Self>,
     },
     /// Ctrl-C.
-    #[error("interrupted: {0}")]
+    #[error("{0}")]
     Interrupted(String),
 }
 

@@ -48,8 +48,11 @@ fn move_and_disable(form: Form, args: &DemoArgs, demo: &DemoFile, arm: &ArmName)
     match moved {
         Ok(()) => session.finish(),
         Err(why) => {
-            session.stop_in_order();
-            Err(why)
+            let why = session.with_fault(why);
+            let stopped = session.stop_in_order();
+            // Here Ctrl-C does stop the arm, unlike in a command that only waits.
+            let by_user = matches!(why, Failure::Interrupted(_));
+            Err(if by_user { Failure::Interrupted(stopped.to_owned()) } else { why })
         }
     }
 }

@@ -51,6 +51,8 @@ pub(crate) struct Summary {
     executed_s: f64,
     clearance_m: f64,
     tracking_error_rad_max: f64,
+    /// Faults that were recovered from, in words.
+    faults: Vec<String>,
     frames_sent: u64,
     frames_lost: u64,
     frames_received: u64,
@@ -74,18 +76,14 @@ pub(crate) struct Summary {
 
 impl Summary {
     /// Sums up what was seen until the last report.
-    pub(crate) fn new(
-        last: &Report,
-        moves: Vec<Move>,
-        samples: Vec<Sample>,
-        tracking_error_rad_max: f64,
-    ) -> Self {
+    pub(crate) fn new(last: &Report, moves: Vec<Move>, faults: Vec<String>, samples: Vec<Sample>) -> Self {
         let mut summary = Self {
             verdict: "DEMO OK",
             planned_s: 0.0,
             executed_s: 0.0,
             clearance_m: moves.iter().map(|m| m.clearance_m).fold(f64::INFINITY, f64::min),
-            tracking_error_rad_max,
+            tracking_error_rad_max: 0.0,
+            faults,
             frames_sent: last.frames_sent,
             frames_lost: last.frames_lost,
             frames_received: last.frames_received,
@@ -105,6 +103,12 @@ impl Summary {
         };
         summary.add_up();
         summary
+    }
+
+    /// Adds the largest tracking error of any cycle.
+    pub(crate) fn with_tracking_error(mut self, tracking_error_rad_max: f64) -> Self {
+        self.tracking_error_rad_max = tracking_error_rad_max;
+        self
     }
 
     fn add_up(&mut self) {
@@ -159,15 +163,15 @@ impl fmt::Display for Summary {
         for m in &self.moves {
             writeln!(
                 f,
-                "{:>4}  {:>11.3}  {:>12.3}  {:>13.4}  {:>21.3}  {:>12.3}  {} ({} strokes)",
+                "{:>4}  {:>11.3}  {:>12.3}  {:>13.4}  {:>21.3}  {:>12.3}  {:>7}\n      {}",
                 m.number,
                 m.planned_s,
                 m.executed_s,
                 m.clearance_m,
                 m.tracking_error_rad_max * 1e3,
                 m.planning_s,
-                m.planner,
-                m.strokes
+                m.strokes,
+                m.planner
             )?;
         }
         let counted = if self.executed_counted_in_cycles { "counted in cycles" } else { "to one report" };
@@ -191,6 +195,9 @@ impl fmt::Display for Summary {
             self.lateness_ns_p99 / 1000,
             self.lateness_ns_max / 1000
         )?;
+        for fault in &self.faults {
+            writeln!(f, "fault, recovered from    {fault}")?;
+        }
         for plot in &self.plots {
             writeln!(f, "plot                     {}", plot.display())?;
         }
