@@ -288,7 +288,7 @@ impl Stage {
     /// # Errors
     /// When it is refused.
     pub fn replan(&self, goal_rad: &str) -> Result<Answer> {
-        self.cli_done(&["replan", "--goal", goal_rad, "--seed", "1", "--deadline-ms", "20000"])
+        self.cli_done(&["replan", "--goal", goal_rad, "--seed", "1", "--deadline-ms", "2500"])
     }
 
     /// The newest report.

@@ -141,6 +141,20 @@ fn frame_missing_fails() {
 }
 
 #[test]
+fn frame_missing_passes_only_in_a_fault_and_only_as_a_gap() {
+    let (mut frames, mut log) = recording();
+    nth_cycle(&mut log, 389).phase = "fault".into();
+    let at = place(&frames, 390, 3);
+    frames.remove(at);
+    let verdict = judge(&frames, &log, 0, &encodings()).expect("a drive that dropped out gets no setpoint");
+    assert_eq!(verdict.setpoints, 400 * JOINTS - 1);
+    let other = place(&frames, 390, 4);
+    frames.insert(at, frames[other].clone());
+    judge(&frames, &log, 0, &encodings())
+        .expect_err("one frame too few for one node, one too many for another");
+}
+
+#[test]
 fn sync_missing_fails() {
     let (mut frames, log) = recording();
     let at = place(&frames, 120, 1) - 1;
