@@ -222,14 +222,14 @@ const SETTINGS_CASES: &[Case] = &[
     (Settings, "report_rate_hz = 100.0", "report_rate_hz = 0.0", "cycle.report_rate_hz", "from 1 to 1000 Hz"),
     (
         Settings,
-        "feedback_age_s_max = 0.02",
+        "feedback_age_s_max = 0.05",
         "feedback_age_s_max = 0.001",
         "supervision.feedback_age_s_max",
         "two periods",
     ),
     (
         Settings,
-        "feedback_age_s_max = 0.02",
+        "feedback_age_s_max = 0.05",
         "feedback_age_s_max = 20",
         "supervision.feedback_age_s_max",
         "up to 1 s",

@@ -2,6 +2,7 @@
 use crate::stage::{PATIENCE, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
+use std::process::Command;
 use std::time::{Duration, Instant};
 use taustream_messages::service::{ReceiptSubscriber, TrajectoryPublisher, Wire};
 use taustream_messages::trajectory::Doctored;
@@ -46,6 +47,7 @@ pub const ALL: &[Scenario] = &[
     Scenario { name: "servo_fault_mid_motion_fast_stop_names_joint", run: servo_fault },
     Scenario { name: "message_hostile_mid_motion_changes_nothing", run: hostile_messages },
     Scenario { name: "streamer_started_twice_second_is_refused", run: started_twice },
+    Scenario { name: "interface_missing_or_down_streamer_says_so", run: interface_missing_or_down },
     Scenario { name: "commands_out_of_place_are_refused_with_reason", run: commands_out_of_place },
 ];
 
@@ -299,6 +301,22 @@ fn started_twice(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let (status, said) = stage.second_streamer()?;
     ensure!(status.code() == Some(1), "the second streamer ended with {status}: {said}");
     ensure!(said.contains("vcan0") || said.contains("command"), "it does not say what is taken: {said}");
+    arrive(stage, goals.rad(0)?)?;
+    Ok(())
+}
+
+/// A streamer whose bus is not there ends with the cure in its message, and disturbs nobody.
+fn interface_missing_or_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.replan(&goals.text(0)?)?;
+    let (status, said) = stage.streamer_on("vcan9")?;
+    ensure!(status.code() == Some(1), "a missing interface ended the streamer with {status}: {said}");
+    ensure!(said.contains("vcan9") && said.contains("ip link"), "no cure in: {said}");
+    let down = Command::new("ip").args(["link", "set", "vcan1", "down"]).status()?;
+    ensure!(down.success(), "vcan1 cannot be set down: {down}");
+    let (status, said) = stage.streamer_on("vcan1")?;
+    ensure!(status.code() == Some(1), "an interface that is down ended the streamer with {status}: {said}");
+    ensure!(said.contains("vcan1") && said.contains("up"), "no cure in: {said}");
     arrive(stage, goals.rad(0)?)?;
     Ok(())
 }

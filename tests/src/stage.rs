@@ -217,12 +217,33 @@ impl Stage {
     /// # Errors
     /// When it does not end.
     pub fn second_streamer(&self) -> Result<(ExitStatus, String)> {
-        let settings = self.settings_file.to_str().context("path is not UTF-8")?;
+        self.other_streamer(&self.settings_file)
+    }
+
+    /// Starts another streamer, of another arm on another interface, and waits for its end.
+    ///
+    /// # Errors
+    /// When it does not end.
+    pub fn streamer_on(&self, interface: &str) -> Result<(ExitStatus, String)> {
+        let (ours, bus) = (&self.settings, self.settings.buses.first().context("no bus")?);
+        let text = fs::read_to_string(&self.settings_file)?
+            .replace(&format!("name = \"{}\"", ours.name), &format!("name = \"on-{interface}\""))
+            .replace(&format!("interface = \"{}\"", bus.interface), &format!("interface = \"{interface}\""));
+        // Its robot and scene are named relative to it, so it stands beside ours; the machine's disk forgets it.
+        let file = self.settings_file.with_file_name(format!("on-{interface}.toml"));
+        fs::write(&file, text)?;
+        let ended = self.other_streamer(&file);
+        fs::remove_file(&file)?;
+        ended
+    }
+
+    fn other_streamer(&self, settings: &Path) -> Result<(ExitStatus, String)> {
+        let settings = settings.to_str().context("path is not UTF-8")?;
         let program = self.programs.join("taustream-streamer");
         let args = ["--settings", settings, "--link", "socketcan"];
-        let mut second = Process::start(&program, &args, &self.dir, "second-streamer")?;
-        let status = second.await_end()?;
-        Ok((status, second.said()))
+        let mut other = Process::start(&program, &args, &self.dir, "other-streamer")?;
+        let status = other.await_end()?;
+        Ok((status, other.said()))
     }
 
     /// Runs `taustream ARGS` with this stage's settings.
