@@ -66,6 +66,19 @@ fn bring_up_of_one_node_sends_the_golden_frames() {
     assert_eq!(seen, golden);
 }
 
+/// Option code 6 of 0x605A stays energised after a quick stop, 2 switches off: that is only for joints that may go limp.
+#[test]
+fn bring_up_of_a_joint_that_may_go_limp_lets_a_quick_stop_end_without_torque() {
+    let mut safe = settings(2);
+    safe.servos[1].limp_is_safe = true;
+    let mut bench = Bench::with(safe);
+    bench.until(DriveState::Disabled, 2_000);
+    let quick_stops: Vec<String> = (bench.drives.iter())
+        .flat_map(|drive| drive.seen.iter().map(hex).filter(|line| line.contains(" 2B 5A 60 ")))
+        .collect();
+    assert_eq!(quick_stops, ["601 2B 5A 60 00 06 00 00 00", "602 2B 5A 60 00 02 00 00 00"]);
+}
+
 #[test]
 fn bring_up_of_six_nodes_keeps_one_sdo_frame_a_node_and_cycle() {
     let mut bench = Bench::new(6);

@@ -1,5 +1,5 @@
 //! The master against the simulated drives, frame by frame in memory: two independent readings of one protocol.
-#![expect(clippy::unwrap_used, reason = "a test ends by panicking")]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "a test ends by panicking")]
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::{Cia402Driver, rad_from_counts};

@@ -1,6 +1,6 @@
 //! World, search, optimisation, timing, verification and the replan service.
 //!
-//! [`plan`] goes from two poses to a verified motion; [`verify`] proves any trajectory; the service
+//! [`plan()`] goes from two poses to a verified motion; [`verify()`] proves any trajectory; the service
 //! (`taustream-planner`) answers replan requests and hands motions to the streamer. An ordinary process: it may
 //! allocate and use every core, and it never touches a bus.
 #![forbid(unsafe_code)]

@@ -1,7 +1,7 @@
 //! The proof that a trajectory keeps the limits and the distance to everything, along its whole length.
 //!
 //! Limits are proven by the motion crate from closed-form peaks; distances by bisection with a proven step
-//! ([`crate::collide::sweep`]). A motion that cannot be proven within bounded work is refused, and said to be so.
+//! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
 use crate::collide::{Blocked, SweepRules, sweep};
 use crate::work::Work;
 use crate::world::World;

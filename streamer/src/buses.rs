@@ -102,7 +102,7 @@ impl Buses {
 
     /// Takes what has arrived, and asks the drivers what they know now.
     ///
-    /// Real time: at most [`RECEIVES_MAX`] system calls a bus, never waits.
+    /// Real time: at most `RECEIVES_MAX` system calls a bus, never waits.
     pub fn receive(&mut self, now: Nanos, facts: &mut Facts) {
         for (bus, found) in self.0.iter_mut().zip(&mut facts.buses) {
             for _ in 0..RECEIVES_MAX {

@@ -4,7 +4,7 @@
 //! Differences are divided differences over the commands that left, on their true times. Each of them is an average
 //! of the derivative over the time it spans (its Peano kernel is positive and of unit mass), so a motion inside
 //! its limits cannot exceed them by discretisation, skipped cycles included; what is left is rounding, for which
-//! [`SLACK`] is plenty. Hence the guard never trips in a verified motion.
+//! `SLACK` is plenty. Hence the guard never trips in a verified motion.
 //!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
 use crate::facts::{Braking, Facts, Trip, TripKind};

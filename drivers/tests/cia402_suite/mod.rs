@@ -36,18 +36,18 @@ pub(crate) struct Bench {
     pub(crate) heard: Vec<Option<(u16, i32)>>,
 }
 
-/// The shipped settings with this many servos.
+/// The settings of this suite with this many servos.
 pub(crate) fn settings(servos: usize) -> Settings {
     // Reading the robot works out which links may touch: once is enough.
-    static SHIPPED: OnceLock<Settings> = OnceLock::new();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
-    let mut settings = SHIPPED.get_or_init(|| Settings::load(&file).unwrap()).clone();
+    static READ: OnceLock<Settings> = OnceLock::new();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cia402_suite/six_servos.toml");
+    let mut settings = READ.get_or_init(|| Settings::load(&file).unwrap()).clone();
     settings.servos.truncate(servos);
     settings
 }
 
 impl Bench {
-    /// Drives with the node ids of the shipped settings.
+    /// Drives with the node ids of the settings.
     pub(crate) fn new(servos: usize) -> Self {
         Self::with(settings(servos))
     }
