@@ -33,6 +33,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     let programs = workspace::target(&root).join("debug");
     links_on_vcan(&root, &programs)?;
     scenarios_on_vcan(&root, &programs)?;
+    figures_on_vcan(&root, &programs)?;
     println!("\nTEST OK: everything passed, nothing was skipped, {:.0} s", since.elapsed().as_secs_f64());
     Ok(ExitCode::SUCCESS)
 }
@@ -91,4 +92,14 @@ fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     let mut command = Command::new(program);
     command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).current_dir(root);
     perform("scenarios on a real vcan0", &mut command)
+}
+
+/// The cycle beside bare loops, for the record: figures of a shared machine are printed, not judged.
+fn figures_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    let words = machine(programs, &workspace::target(root).join("figures"))?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command.args(rest).arg(programs.join("taustream")).current_dir(root);
+    command.args(["bench", "cycle", "--seconds", "8", "--link", "socketcan"]);
+    perform("figures of the cycle on a real vcan0 (not judged)", &mut command)
 }
