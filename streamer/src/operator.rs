@@ -52,7 +52,10 @@ impl Supervisor {
                 self.step(Event::EnableAsked, facts, orders);
                 Ok(Why::Enabling)
             }
-            Phase::Configuring => Err(self.first_not(facts, DriveState::Disabled).unwrap_or(Why::Wait)),
+            // All drives ready, yet still configuring: only their speeds are missing.
+            Phase::Configuring => {
+                Err(self.first_not(facts, DriveState::Disabled).unwrap_or(Why::SpeedUnknown))
+            }
             Phase::Fault | Phase::FastStopping | Phase::Braking => Err(Why::ClearFirst),
             Phase::Disabling => Err(Why::Wait),
             Phase::Enabling
@@ -82,7 +85,7 @@ impl Supervisor {
             }
             pose_rad[joint] = position_rad;
         }
-        let (joint, speed_rad_s) = self.watch.fastest();
+        let (joint, speed_rad_s) = self.watch.fastest().ok_or(Why::SpeedUnknown)?;
         if speed_rad_s > REST_RAD_S {
             return Err(Why::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
         }

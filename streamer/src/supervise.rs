@@ -292,7 +292,8 @@ impl Supervisor {
         });
         if let Some(cause) = bad {
             self.raise(Event::HardFault, cause, facts, orders);
-        } else if self.all(facts, |s| s.state == DriveState::Disabled) {
+        } else if self.all(facts, |s| s.state == DriveState::Disabled) && self.watch.fastest().is_some() {
+            // Ready to be energised includes that rest can be told from motion: the first `enable` is not refused for it.
             self.step(Event::DrivesReady, facts, orders);
         } else {
             self.step(Event::DrivesLost, facts, orders);

@@ -25,6 +25,8 @@ struct Answers {
     jump_limit_rad: f64,
     tracking_rad: f64,
     tracking_rad_max: f64,
+    /// Cycles in a row in which the drive told its position.
+    told_cycles: u32,
     past_rad: [f64; REST_CYCLES],
     past_at: [Nanos; REST_CYCLES],
 }
@@ -37,6 +39,7 @@ impl Answers {
         jump_limit_rad: f64::INFINITY,
         tracking_rad: 0.0,
         tracking_rad_max: 0.0,
+        told_cycles: 0,
         past_rad: [f64::NAN; REST_CYCLES],
         past_at: [Nanos(0); REST_CYCLES],
     };
@@ -89,6 +92,8 @@ impl Watch {
             joints.zip(&self.velocity_rad_s_max).take(self.joints)
         {
             answer.past_rad[self.slot] = servo.position_rad;
+            let told = reports(servo.state) && servo.position_rad.is_finite();
+            answer.told_cycles = if told { answer.told_cycles.saturating_add(1) } else { 0 };
             answer.past_at[self.slot] = facts.tick.woke;
             let Some(received) = servo.received else { continue };
             if answer.received == Some(received) {
@@ -167,33 +172,52 @@ impl Watch {
         received.map_or(f64::INFINITY, |at| facts.tick.woke.since_s(at))
     }
 
-    /// The fastest joint and its speed over the last cycles, rad/s; infinite while too little was heard.
+    /// The fastest joint and its speed over the last cycles, rad/s. `None` while one of the joints was heard for too
+    /// short a time to tell: after bring-up, and again after its drive was configured anew.
+    ///
+    /// Real time: no allocation.
     #[must_use]
-    pub fn fastest(&self) -> (usize, f64) {
+    pub fn fastest(&self) -> Option<(usize, f64)> {
         let oldest = (self.slot + 1) % REST_CYCLES;
         let mut worst = (0, 0.0);
         for (joint, answer) in self.answers.iter().enumerate().take(self.joints) {
             let time_s = answer.past_at[self.slot].since_s(answer.past_at[oldest]);
             let moved_rad = (answer.past_rad[self.slot] - answer.past_rad[oldest]).abs();
-            let speed = if time_s > 0.0 { moved_rad / time_s } else { f64::INFINITY };
-            let speed = if speed.is_nan() { f64::INFINITY } else { speed };
+            let speed = moved_rad / time_s;
+            if (answer.told_cycles as usize) < REST_CYCLES || !speed.is_finite() {
+                return None;
+            }
             if speed > worst.1 {
                 worst = (joint, speed);
             }
         }
-        worst
+        Some(worst)
     }
 
-    /// True when every joint rests.
+    /// True when every joint is known to rest.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        self.fastest().1 <= REST_RAD_S
+        self.fastest().is_some_and(|(_, speed_rad_s)| speed_rad_s <= REST_RAD_S)
     }
 
     /// Tracking error of every joint now, and the largest since the last restart, rad.
     #[must_use]
     pub fn tracking_rad(&self) -> (JointArray, JointArray) {
         (self.answers.map(|a| a.tracking_rad), self.answers.map(|a| a.tracking_rad_max))
+    }
+}
+
+/// Whether a drive in this state reports its position every cycle; before, the last one that was read stands still.
+fn reports(state: DriveState) -> bool {
+    match state {
+        DriveState::Disabled
+        | DriveState::Enabling
+        | DriveState::Enabled
+        | DriveState::Disabling
+        | DriveState::Fault => true,
+        DriveState::Absent | DriveState::Configuring | DriveState::EnergisedUnowned | DriveState::Refused => {
+            false
+        }
     }
 }
 

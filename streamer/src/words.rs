@@ -35,6 +35,7 @@ pub enum Why {
     NothingMoves,
     NotConfigured { joint: usize, state: DriveState },
     NotAtRest { joint: usize, speed_rad_s: f64, limit_rad_s: f64 },
+    SpeedUnknown,
     OutOfRange { joint: usize, position_rad: f64, range_rad: [f64; 2] },
     NoFeedback { joint: usize, age_s: f64 },
     Warns { joint: usize, status_word: u32 },
@@ -135,6 +136,9 @@ impl Why {
     fn plain_refusal(self) -> &'static str {
         match self {
             Self::ClearFirst => "the arm is in fault; `status` shows why, then `clear-fault`",
+            Self::SpeedUnknown => {
+                "the drives were heard for too short a time to know that the arm rests; ask again in a moment"
+            }
             Self::StopFirst => "the arm moves; `stop` first",
             Self::EnableFirst => "the drives are not energised; `enable` first",
             Self::NothingToResume => "nothing is paused; send a trajectory",

@@ -123,19 +123,9 @@ impl<'a> Session<'a> {
         self.enable()
     }
 
-    /// Enables. Just after their configuration the streamer does not know yet that the drives rest, and refuses.
     fn enable(&self) -> Result<(), Failure> {
-        let limit = Limit::after_s(REST_S_MAX);
-        loop {
-            match obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX) {
-                Err(Failure::Refused(_)) if !limit.is_over() => {
-                    interrupt::check()?;
-                    self.look()?;
-                    thread::sleep(Duration::from_millis(50));
-                }
-                outcome => return outcome,
-            }
-        }
+        self.look()?;
+        obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX)
     }
 
     /// Switches the drives off and sums up.

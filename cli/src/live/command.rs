@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::fmt;
 use std::thread;
 use std::time::Duration;
-use taustream_messages::{Command, Phase};
+use taustream_messages::{Command, CommandReply, Phase};
 
 /// What became of a command.
 #[derive(Debug, Serialize)]
@@ -96,7 +96,7 @@ pub(crate) fn obey(client: &Client, arm: &ArmName, command: Command, wait_s: f64
 }
 
 fn send(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<Answer, Failure> {
-    let reply = client.command(command)?;
+    let reply = ask(client, command, wait_s)?;
     let (name, mut phase) = (word(command), reply.phase());
     if !reply.is_accepted() {
         let at = phase.map_or("in an unknown phase", Phase::word);
@@ -113,6 +113,20 @@ fn send(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result
         phase: phase.map(Phase::word),
         message: reply.text(),
     })
+}
+
+/// Asks once; an `enable` that comes while drives are still being configured is asked again until they are.
+fn ask(client: &Client, command: Command, wait_s: f64) -> Result<CommandReply, Failure> {
+    let limit = Limit::after_s(wait_s);
+    loop {
+        let reply = client.command(command)?;
+        let too_early = command == Command::Enable && reply.phase() == Some(Phase::Configuring);
+        if reply.is_accepted() || !too_early || limit.is_over() {
+            return Ok(reply);
+        }
+        interrupt::check()?;
+        thread::sleep(Duration::from_millis(20));
+    }
 }
 
 fn wait_for(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<Phase, Failure> {
