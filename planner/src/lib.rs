@@ -8,6 +8,7 @@
 pub mod collide;
 pub mod cost;
 pub mod draw;
+pub mod leave;
 pub mod optimize;
 pub mod pipeline;
 pub mod plan;
@@ -22,5 +23,5 @@ pub mod work;
 pub mod world;
 
 pub use cost::{CostError, CostModel, PaperCost, paper_cost};
-pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan};
+pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, StartMargin, plan};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -4,12 +4,13 @@
 //! proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
+use crate::leave::Leaving;
 use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind};
 use crate::refine::refine;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
 use crate::tree::{Space, rrt_connect};
-use crate::verify::{Proof, Violation, verify_in};
+use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
 use crate::work::Work;
 use crate::world::World;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
@@ -54,6 +55,8 @@ impl Budget {
 pub struct Pipeline<'a> {
     space: Space<'a>,
     options: &'a PlanOptions,
+    /// Set when the motion must leave a margin before the pipeline's own path begins.
+    leaving: Option<Leaving<'a>>,
     budget: Budget,
     limits: [JointLimits; MAX_JOINTS],
     /// What was done, in words.
@@ -70,6 +73,7 @@ impl<'a> Pipeline<'a> {
         Self {
             space: Space::new(world, work),
             options,
+            leaving: None,
             budget: Budget::of(options),
             limits: world.robot().limits(),
             tried: Vec::new(),
@@ -78,13 +82,24 @@ impl<'a> Pipeline<'a> {
         }
     }
 
+    /// Has every motion begin where the arm stands, inside the margin, and go straight to where [`Self::run`] starts.
+    #[must_use]
+    pub fn leaving(mut self, leaving: Leaving<'a>) -> Self {
+        self.leaving = Some(leaving);
+        self
+    }
+
     /// Runs the stages that the kind of planner asks for.
     ///
     /// # Errors
     /// What was tried in vain.
     pub fn run(mut self, start_rad: &JointArray, goal_rad: &JointArray) -> Result<Plan, PlanError> {
         if start_rad.iter().zip(goal_rad).all(|(a, b)| (a - b).abs() <= SAME_RAD) {
-            self.stay(start_rad);
+            if self.leaving.is_some() {
+                self.propose(&[*goal_rad], "straight line");
+            } else {
+                self.stay(start_rad);
+            }
             return self.finish();
         }
         let line = vec![*start_rad, *goal_rad];
@@ -132,9 +147,36 @@ impl<'a> Pipeline<'a> {
     }
 
     fn stay(&mut self, pose_rad: &JointArray) {
-        if let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) {
-            self.keep(trajectory, "already there");
+        let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
+        match verify_in(self.space.world, &trajectory, self.space.work) {
+            Ok(proof) => self.best = Some((trajectory, proof, "already there".to_owned())),
+            Err(violation) => self.violation = Some(violation),
         }
+    }
+
+    /// The corners of a whole motion: the way out of the margin comes before the path.
+    fn whole_path(&self, path: &[JointArray]) -> Vec<JointArray> {
+        self.leaving.iter().map(|l| l.start_rad).chain(path.iter().copied()).collect()
+    }
+
+    /// What a motion must keep, and when; `None` when it does not leave the margin that it begins in.
+    fn stretches(&self, motion: &Trajectory) -> Option<Vec<Stretch<'_>>> {
+        let (world, duration_s) = (self.space.world, motion.duration_s());
+        let Some(leaving) = &self.leaving else {
+            return Some(vec![Stretch { world, span_s: [0.0, duration_s] }]);
+        };
+        let left_s = leaving.left_s(world, motion, self.space.work)?;
+        Some(leaving.stretches(world, left_s, duration_s).to_vec())
+    }
+
+    /// True when a candidate keeps what it must.
+    fn keeps_apart(&self, motion: &Trajectory) -> bool {
+        let begins = if self.leaving.is_some() { SweepRules::WAY_OUT } else { SweepRules::CANDIDATE };
+        let rules = [begins, SweepRules::CANDIDATE];
+        self.stretches(motion).is_some_and(|stretches| {
+            let mut parts = stretches.iter().zip(&rules);
+            parts.all(|(s, rules)| sweep(s.world, motion, s.span_s, rules, self.space.work).is_ok())
+        })
     }
 
     /// The straight line; true when its motion is proven.
@@ -146,6 +188,10 @@ impl<'a> Pipeline<'a> {
             Ok(_) => {
                 self.tried.push("straight line".to_owned());
                 self.propose(line, "straight line");
+                if self.leaving.is_some() {
+                    // The way out ends in a corner, or on the line: no need to stop there.
+                    self.round(line, "straight line");
+                }
                 self.best.is_some()
             }
             Err(Some((pair, _))) => {
@@ -214,16 +260,18 @@ impl<'a> Pipeline<'a> {
 
     /// Times a path with a stop at every corner and proves the motion.
     fn propose(&mut self, path: &[JointArray], how: &str) {
-        let waits = vec![1.0; path.len().saturating_sub(2)];
-        let timed = self.path(path).fastest(&waits, self.space.work);
+        let corners = self.whole_path(path);
+        let waits = vec![1.0; corners.len().saturating_sub(2)];
+        let timed = self.path(&corners).fastest(&waits, self.space.work);
         if let Some(timed) = timed {
-            self.prove(path, timed, how);
+            self.prove(&corners, timed, how);
         }
     }
 
     /// Rounds the corners of a path as far as that is free and saves time, and proves the motion.
     fn round(&mut self, path: &[JointArray], source: &str) {
-        let corners = path.len().saturating_sub(2);
+        let whole = self.whole_path(path);
+        let corners = whole.len().saturating_sub(2);
         if corners == 0 {
             return self.propose(path, source);
         }
@@ -234,12 +282,10 @@ impl<'a> Pipeline<'a> {
                 return;
             }
             left -= 1;
-            let Some(timed) = self.path(path).fastest(waits, self.space.work) else { return };
+            let Some(timed) = self.path(&whole).fastest(waits, self.space.work) else { return };
             let duration_s = timed.trajectory.duration_s();
             let shorter = best.as_ref().is_none_or(|b| duration_s < b.trajectory.duration_s());
-            let span = [0.0, duration_s];
-            let rules = &SweepRules::CANDIDATE;
-            if shorter && sweep(self.space.world, &timed.trajectory, span, rules, self.space.work).is_ok() {
+            if shorter && self.keeps_apart(&timed.trajectory) {
                 *best = Some(timed);
             }
         };
@@ -256,39 +302,36 @@ impl<'a> Pipeline<'a> {
             }
         }
         if let Some(timed) = best {
-            self.prove(path, timed, &format!("{source}, {corners} corners rounded"));
+            self.prove(&whole, timed, &format!("{source}, {corners} corners rounded"));
         }
     }
 
     /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is shorter
     /// than what there is.
-    fn prove(&mut self, path: &[JointArray], mut timed: Timed, how: &str) {
+    fn prove(&mut self, corners: &[JointArray], mut timed: Timed, how: &str) {
         const SLOWER: f64 = 1.002;
         for _ in 0..6 {
-            match verify_in(self.space.world, &timed.trajectory, self.space.work) {
+            let Some(stretches) = self.stretches(&timed.trajectory) else { return };
+            let left_s = stretches.first().map(|s| s.span_s[1]);
+            match verify_stretches(&stretches, &timed.trajectory, self.space.work) {
                 Ok(proof) => {
                     let shorter = self.best.as_ref().is_none_or(|(_, b, _)| proof.duration_s < b.duration_s);
                     if shorter {
-                        self.best = Some((timed.trajectory, proof, how.to_owned()));
+                        let note = self.leaving.as_ref().and_then(|l| l.note.as_ref());
+                        let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
+                        self.best = Some((timed.trajectory, proof, format!("{note}{how}")));
                     }
                     return;
                 }
                 Err(violation) => {
                     let limit = matches!(violation, Violation::Limit { .. });
                     self.violation = Some(violation);
-                    let Some(slower) = self.path(path).slower(&timed, SLOWER).filter(|_| limit) else {
+                    let Some(slower) = self.path(corners).slower(&timed, SLOWER).filter(|_| limit) else {
                         return;
                     };
                     timed = slower;
                 }
             }
-        }
-    }
-
-    fn keep(&mut self, trajectory: Trajectory, how: &str) {
-        match verify_in(self.space.world, &trajectory, self.space.work) {
-            Ok(proof) => self.best = Some((trajectory, proof, how.to_owned())),
-            Err(violation) => self.violation = Some(violation),
         }
     }
 

@@ -1,4 +1,5 @@
 //! From two poses to a verified motion.
+use crate::leave::{Leaving, Relaxed, is_clear, way_out};
 use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
 use crate::work::Work;
@@ -127,12 +128,20 @@ pub enum PlanError {
         /// Lowest and highest angle.
         range_rad: [f64; 2],
     },
-    /// The arm touches something, or is inside the margin, in a given pose.
+    /// The arm touches something in a given pose.
     #[error("{which} in collision: {contact}; choose another {which} or correct the scene")]
     InCollision {
         /// Which pose.
         which: PoseOf,
         /// What touches what.
+        contact: Contact,
+    },
+    /// The arm touches nothing in a given pose, but is nearer to something than the scene's margin.
+    #[error("{which} nearer than the margin: {contact}; choose another {which} or a smaller margin")]
+    InsideMargin {
+        /// Which pose.
+        which: PoseOf,
+        /// What is near to what.
         contact: Contact,
     },
     /// A shape of the robot or the scene cannot be built.
@@ -173,7 +182,8 @@ pub fn plan(
     goal_rad: &JointArray,
     options: &PlanOptions,
 ) -> Result<Plan, PlanError> {
-    let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad };
+    let (start_rad, goal_rad) = (*start_rad, *goal_rad);
+    let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::Scene };
     plan_until(&task, options, None)
 }
 
@@ -188,6 +198,18 @@ pub struct Task<'a> {
     pub start_rad: JointArray,
     /// Where it shall end.
     pub goal_rad: JointArray,
+    /// What the start must keep.
+    pub margin: StartMargin,
+}
+
+/// What the start of a motion must keep from obstacles. The goal always keeps the scene's margin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartMargin {
+    /// The scene's margin.
+    Scene,
+    /// What it has, down to a millimetre: for an arm that stands where it stands, after a stop or a sag. The motion
+    /// keeps no less than that until it has left the margin, and [`Plan::how`] says so.
+    AsItStands,
 }
 
 /// Like [`plan`], and given up as soon as `cancel` is set.
@@ -203,12 +225,55 @@ pub fn plan_until(
     check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
     check_pose(task.robot, PoseOf::Goal, &task.goal_rad)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
-    for (which, pose_rad) in [(PoseOf::Start, &task.start_rad), (PoseOf::Goal, &task.goal_rad)] {
-        if let Some(contact) = world.contact(pose_rad) {
-            return Err(PlanError::InCollision { which, contact });
+    let (start_rad, goal_rad) = (&task.start_rad, &task.goal_rad);
+    let relaxed = match (task.margin, world.contact(start_rad)) {
+        (StartMargin::Scene, Some(contact)) => return Err(PlanError::too_close(PoseOf::Start, contact)),
+        (StartMargin::Scene, None) => None,
+        (StartMargin::AsItStands, _) => Some(Relaxed::around(&world, start_rad)?),
+    };
+    if let Some(contact) = world.contact(goal_rad) {
+        return Err(PlanError::too_close(PoseOf::Goal, contact));
+    }
+    if is_clear(&world, start_rad) {
+        return Pipeline::new(&world, &work, options).run(start_rad, goal_rad);
+    }
+    plan_out(&world, relaxed.as_ref(), &work, (task, options))
+}
+
+/// Plans from a start inside the margin or at its edge: out of it first.
+fn plan_out(
+    world: &World,
+    relaxed: Option<&Relaxed>,
+    work: &Work,
+    (task, options): (&Task, &PlanOptions),
+) -> Result<Plan, PlanError> {
+    let ends = [&task.start_rad, &task.goal_rad];
+    let full = world.contact(&task.start_rad).is_none().then_some((world, None));
+    let reduced = relaxed.map(|r| (&r.world, Some(r.note.clone())));
+    for (near, note) in full.into_iter().chain(reduced) {
+        if let Some(pose_rad) = way_out([near, world], ends, options.seed, work) {
+            let leaving = Leaving { near, start_rad: task.start_rad, note };
+            return Pipeline::new(world, work, options).leaving(leaving).run(&pose_rad, &task.goal_rad);
         }
     }
-    Pipeline::new(&world, &work, options).run(&task.start_rad, &task.goal_rad)
+    // No way out nearby: the reduced margin all the way, rather than an arm that nobody can move.
+    let Some(relaxed) = relaxed else {
+        return Pipeline::new(world, work, options).run(&task.start_rad, &task.goal_rad);
+    };
+    let mut plan = Pipeline::new(&relaxed.world, work, options).run(&task.start_rad, &task.goal_rad)?;
+    plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
+    Ok(plan)
+}
+
+impl PlanError {
+    /// A pose that touches something, or is nearer to it than it may be.
+    pub(crate) fn too_close(which: PoseOf, contact: Contact) -> Self {
+        if contact.touches() {
+            Self::InCollision { which, contact }
+        } else {
+            Self::InsideMargin { which, contact }
+        }
+    }
 }
 
 fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {

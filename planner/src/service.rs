@@ -4,7 +4,7 @@
 //! commanded pose; while a motion runs, `AfterCurrent` plans from its end and waits until it has ended, and `AtOnce`
 //! asks the streamer to cut, whose answer (this version of it: refused) is handed back. A motion whose requester has
 //! gone in the meantime is not sent: nobody waits for the arm to move.
-use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind, Task, plan_until};
+use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind, StartMargin, Task, plan_until};
 use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
 use crate::timing::stand_still;
 use iceoryx2::active_request::ActiveRequest;
@@ -172,7 +172,9 @@ impl<'a> Service<'a> {
         asked: &CheckedPlanRequest,
         options: &PlanOptions,
     ) -> Result<Plan, String> {
-        let task = Task { robot: self.robot, scene: self.scene, start_rad, goal_rad: asked.goal_rad };
+        // The arm stands where it stands: after a stop or a sag nobody could move it otherwise.
+        let (robot, scene, goal_rad) = (self.robot, self.scene, asked.goal_rad);
+        let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         let result = thread::scope(|scope| {
             let worker = thread::Builder::new().name("plan".to_owned());
             let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(self.stop)));

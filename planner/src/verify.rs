@@ -36,15 +36,22 @@ pub struct Contact {
     pub required_m: f64,
 }
 
+impl Contact {
+    /// True when the two touch; false when they are only nearer than they may be.
+    #[must_use]
+    pub fn touches(&self) -> bool {
+        self.distance_m <= 0.0
+    }
+}
+
 impl std::fmt::Display for Contact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let ((a, b), distance_m, required_m) = (&self.between, self.distance_m, self.required_m);
-        if distance_m <= 0.0 {
-            write!(f, "{a} touches {b}")?;
-        } else {
-            write!(f, "{a} is {distance_m:.4} m from {b}")?;
+        if self.touches() {
+            return write!(f, "{a} touches {b}");
         }
-        write!(f, " ({required_m:.4} m required)")
+        let by_m = (required_m - distance_m).max(0.0);
+        write!(f, "{a} is {distance_m:.4} m from {b}, {by_m:.4} m less than the {required_m:.4} m required")
     }
 }
 
@@ -73,8 +80,9 @@ pub enum Violation {
         /// The joint, quantity, time, value and limit.
         violation: LimitViolation,
     },
-    /// Two things come too close.
-    #[error("collision from t = {from_s:.3} s: {contact} at t = {at_s:.3} s")]
+    /// Two things touch, or come nearer than they may.
+    #[error("{} from t = {from_s:.3} s: {contact} at t = {at_s:.3} s",
+        if contact.touches() { "collision" } else { "nearer than the margin" })]
     Collision {
         /// First instant at which the distance is not proven to be enough.
         from_s: f64,
@@ -107,7 +115,29 @@ pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<P
 /// # Errors
 /// The first violation; `Unresolved` when the clock cut in.
 pub fn verify_in(world: &World, trajectory: &Trajectory, work: &Work) -> Result<Proof, Violation> {
-    let robot = world.robot();
+    verify_stretches(&[Stretch { world, span_s: [0.0, trajectory.duration_s()] }], trajectory, work)
+}
+
+/// A part of a motion, and the world whose distances it must keep.
+#[derive(Clone, Copy)]
+pub struct Stretch<'a> {
+    /// The world.
+    pub world: &'a World<'a>,
+    /// From when to when.
+    pub span_s: [f64; 2],
+}
+
+/// Like [`verify_in`], for a motion whose stretches, which must follow each other, keep different distances.
+///
+/// # Errors
+/// The first violation; `Unresolved` when the clock cut in, or when there is no stretch.
+pub fn verify_stretches(
+    stretches: &[Stretch],
+    trajectory: &Trajectory,
+    work: &Work,
+) -> Result<Proof, Violation> {
+    let Some(first) = stretches.first() else { return Err(Violation::Unresolved { checks: 0, at_s: 0.0 }) };
+    let robot = first.world.robot();
     let (got, expected) = (trajectory.joints(), robot.joints.len());
     if got != expected {
         return Err(Violation::Joints { got, expected });
@@ -118,31 +148,41 @@ pub fn verify_in(world: &World, trajectory: &Trajectory, work: &Work) -> Result<
         Violation::Limit { name, violation }
     })?;
     // Once a motion, with bodies inside of meshes: nothing gets in later without crossing a surface.
-    if let Some(contact) = world.contact(trajectory.base_rad()) {
+    if let Some(contact) = first.world.contact(trajectory.base_rad()) {
         return Err(Violation::Collision { from_s: 0.0, at_s: 0.0, contact });
     }
-    let duration_s = trajectory.duration_s();
-    let clearance = sweep(world, trajectory, [0.0, duration_s], &SweepRules::PROOF, work)
-        .map_err(|blocked| explain(world, trajectory, &blocked))?;
-    Ok(Proof {
-        duration_s,
-        clearance_m: clearance.proven_m,
-        clearance_at_s: clearance.at,
-        clearance_between: clearance.pair.map(|pair| world.names(&pair)).unwrap_or_default(),
+    let mut proof = Proof {
+        duration_s: trajectory.duration_s(),
+        clearance_m: f64::INFINITY,
+        clearance_at_s: 0.0,
+        clearance_between: Default::default(),
         peaks,
-    })
+    };
+    for stretch in stretches {
+        let clearance = sweep(stretch.world, trajectory, stretch.span_s, &SweepRules::PROOF, work)
+            .map_err(|blocked| explain(stretch, trajectory, &blocked, work))?;
+        if clearance.proven_m < proof.clearance_m {
+            let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
+            proof.clearance_m = clearance.proven_m;
+            (proof.clearance_at_s, proof.clearance_between) = (clearance.at, between);
+        }
+    }
+    Ok(proof)
 }
 
 /// States the contact where it is deepest, which tells more than the instant at which it begins.
-fn explain(world: &World, trajectory: &Trajectory, blocked: &Blocked) -> Violation {
+fn explain(stretch: &Stretch, trajectory: &Trajectory, blocked: &Blocked, work: &Work) -> Violation {
     const SAMPLES: u32 = 2_000;
     let Some((mut pair, mut distance_m)) = blocked.pair else {
         return Violation::Unresolved { checks: blocked.checks, at_s: blocked.at };
     };
+    let (world, [begin_s, end_s]) = (stretch.world, stretch.span_s);
     let (from_s, mut at_s) = (blocked.at, blocked.at);
-    let duration_s = trajectory.duration_s();
     for i in 0..=SAMPLES {
-        let t_s = duration_s * f64::from(i) / f64::from(SAMPLES);
+        if work.is_over_after(world.pairs().len()) {
+            break;
+        }
+        let t_s = begin_s + (end_s - begin_s) * f64::from(i) / f64::from(SAMPLES);
         if let Some((p, d)) = world.closest(&trajectory.sample(t_s).position_rad)
             && d - p.required_m < distance_m - pair.required_m
         {

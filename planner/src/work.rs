@@ -6,8 +6,9 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Questions between two looks at the clock: a look costs tens of microseconds on a virtual machine.
-const LOOK_EVERY: u32 = 16;
+/// Evaluations between two looks at the clock: a look costs tens of microseconds on a virtual machine, a distance
+/// of two bodies tenths of one, to a large mesh tens.
+const LOOK_EVERY: usize = 256;
 
 /// The deadline of one plan, and its cancellation.
 #[derive(Debug)]
@@ -15,7 +16,8 @@ pub struct Work<'a> {
     started: Instant,
     deadline: Instant,
     cancel: Option<&'a AtomicBool>,
-    asked: Cell<u32>,
+    /// Evaluations until the next look.
+    left: Cell<usize>,
     cut: Cell<bool>,
 }
 
@@ -26,7 +28,7 @@ impl<'a> Work<'a> {
         let started = Instant::now();
         // A deadline beyond the clock's range is none: a century serves.
         let deadline = started.checked_add(deadline).unwrap_or(started + Duration::from_secs(3_153_600_000));
-        Self { started, deadline, cancel, asked: Cell::new(0), cut: Cell::new(false) }
+        Self { started, deadline, cancel, left: Cell::new(0), cut: Cell::new(false) }
     }
 
     /// Without a deadline that anybody lives to see.
@@ -35,15 +37,22 @@ impl<'a> Work<'a> {
         Self::until(Duration::MAX, None)
     }
 
-    /// True from the deadline on, or when cancelled. Every loop of planning asks.
+    /// True from the deadline on, or when cancelled. Every loop of planning asks; looks at the clock.
     #[must_use]
     pub fn is_over(&self) -> bool {
+        self.is_over_after(LOOK_EVERY)
+    }
+
+    /// Like [`Self::is_over`] for short work: looks at the clock once in a few hundred evaluations.
+    #[must_use]
+    pub fn is_over_after(&self, evaluations: usize) -> bool {
         if self.cut.get() {
             return true;
         }
-        let asked = self.asked.get().wrapping_add(1);
-        self.asked.set(asked);
-        if asked % LOOK_EVERY == 1 {
+        let left = self.left.get().saturating_sub(evaluations);
+        self.left.set(left);
+        if left == 0 {
+            self.left.set(LOOK_EVERY);
             let cancelled = self.cancel.is_some_and(|c| c.load(Ordering::Relaxed));
             self.cut.set(cancelled || Instant::now() >= self.deadline);
         }

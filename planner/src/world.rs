@@ -31,6 +31,7 @@ pub struct Pair {
 }
 
 /// A body of a link.
+#[derive(Clone)]
 struct LinkBody {
     /// Index into [`Robot::links`].
     link: usize,
@@ -40,6 +41,7 @@ struct LinkBody {
 }
 
 /// An obstacle, which stands still.
+#[derive(Clone)]
 struct StillBody {
     name: String,
     body: Body,
@@ -54,6 +56,7 @@ struct Axis {
 }
 
 /// Everything that can collide.
+#[derive(Clone)]
 pub struct World<'a> {
     robot: &'a Robot,
     links: Vec<LinkBody>,
@@ -118,6 +121,24 @@ impl<'a> World<'a> {
             }
         }
         pairs
+    }
+
+    /// The same world for an arm that stands nearer to obstacles than it should: each pair that is nearer in this
+    /// pose need only keep what it has there, less `slack_m`. Pairs that are nearer than `floor_m` keep their
+    /// distance, so that the pose is still refused.
+    #[must_use]
+    pub fn relaxed(&self, position_rad: &JointArray, floor_m: f64, slack_m: f64) -> Self {
+        let mut relaxed = self.clone();
+        let mut snapshot = Snapshot::default();
+        self.place(position_rad, &mut snapshot);
+        for pair in &mut relaxed.pairs {
+            let distance_m = self.solid_distance_m(pair, &snapshot);
+            if distance_m > floor_m.min(pair.required_m) {
+                // Links among themselves keep more than 0 m, whatever they have.
+                pair.required_m = pair.required_m.min((distance_m - slack_m).max(0.0));
+            }
+        }
+        relaxed
     }
 
     /// Furthest that a point of the arm can be from each joint's axis, in any pose (m).
@@ -213,17 +234,20 @@ impl<'a> World<'a> {
         (&self.links[pair.link].body, &snapshot.at[pair.link], b, b_at)
     }
 
+    /// Distance of a pair, 0 for a body wholly inside a mesh.
+    fn solid_distance_m(&self, pair: &Pair, snapshot: &Snapshot) -> f64 {
+        let (a, a_at, b, b_at) = self.sides(pair, snapshot);
+        let distance_m = a.distance_m(a_at, b, b_at);
+        if distance_m > 0.0 && a.is_inside(a_at, b, b_at) { 0.0 } else { distance_m }
+    }
+
     /// The pair that keeps least beyond what it must, with its distance; `None` when nothing can collide. Sees
     /// bodies wholly inside a mesh, too.
     #[must_use]
     pub fn closest(&self, position_rad: &JointArray) -> Option<(Pair, f64)> {
         let mut snapshot = Snapshot::default();
         self.place(position_rad, &mut snapshot);
-        let measured = self.pairs.iter().map(|pair| {
-            let (a, a_at, b, b_at) = self.sides(pair, &snapshot);
-            let d = a.distance_m(a_at, b, b_at);
-            (*pair, if d > 0.0 && a.is_inside(a_at, b, b_at) { 0.0 } else { d })
-        });
+        let measured = self.pairs.iter().map(|pair| (*pair, self.solid_distance_m(pair, &snapshot)));
         measured.min_by(|(p, d), (q, e)| (d - p.required_m).total_cmp(&(e - q.required_m)))
     }
 

@@ -1,7 +1,7 @@
 //! The replan service over real shared memory, with a streamer played by the test.
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
-use common::{pose, scene, ur5};
+use common::{pose, scene, sphere, ur5, ur5_distances_m};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -101,16 +101,20 @@ impl Played {
     }
 }
 
-/// Runs a service and a played streamer around a test.
+/// Runs a service and a played streamer around a test, in the open scene.
 fn with_service(name: &str, played: &Played, test: impl FnOnce(&str, &Robot)) {
-    let (robot, scene): (Robot, Scene) = (ur5(), scene("open"));
+    with_service_in(&scene("open"), name, played, test);
+}
+
+fn with_service_in(scene: &Scene, name: &str, played: &Played, test: impl FnOnce(&str, &Robot)) {
+    let robot = ur5();
     let arm = format!("test-{name}-{}", std::process::id());
     let (stop, ready) = (AtomicBool::new(false), AtomicBool::new(false));
     thread::scope(|s| {
         s.spawn(|| played.play(&arm, &robot));
         s.spawn(|| {
             let wire = Wire::join(&arm, "planner").expect("joins");
-            let mut service = Service::open(&wire, &robot, &scene, &stop).expect("opens");
+            let mut service = Service::open(&wire, &robot, scene, &stop).expect("opens");
             ready.store(true, Ordering::SeqCst);
             service.serve();
         });
@@ -184,6 +188,23 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
         assert!(matches!(error, SendError::WrongRobot { .. }), "{error}");
     });
     assert_eq!(played.accepted.load(Ordering::SeqCst), 3);
+}
+
+/// The operator's way on after a stop: the arm stands nearer to a ball than the margin, and is led away from it.
+#[test]
+fn service_replan_from_inside_the_margin_is_planned_and_says_so() {
+    let played = Played::new(Phase::Holding);
+    let mut ball = sphere("ball", [-0.6, 0.0, 0.1], 1e-6);
+    let one = |ball| Scene { obstacles: vec![ball], ..scene("open") };
+    let (room_m, _) = ur5_distances_m(&ur5(), &one(ball.clone()), &pose(AWAY));
+    ball.shape = taustream_arm::Shape::Sphere { radius_m: room_m - 0.0117 };
+    with_service_in(&one(ball), "margin", &played, |arm, _| {
+        let outcome = ask(arm, &request(When::AtOnce, "", pose([1.2, -1.6, 1.2, -1.57, -1.57, 0.0])), || ());
+        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+        let PlanOutcome::Planned { how, .. } = outcome else { panic!() };
+        let said = "margin 0.0112 m for the first ";
+        assert!(how.starts_with(said) && how.contains("nearer to ball than 0.0200 m"), "{how}");
+    });
 }
 
 #[test]

@@ -69,6 +69,14 @@ impl SweepRules {
     /// For the final proof.
     pub const PROOF: Self =
         Self { extra_m: 0.0, resolution_m: 1e-6, checks_max: 400_000, bracket_m: 1e-3, first_contact: true };
+    /// For the way out of the margin, which begins at its edge: as fine as the proof.
+    pub const WAY_OUT: Self = Self {
+        extra_m: 0.0,
+        resolution_m: 1e-6,
+        checks_max: 20_000,
+        bracket_m: f64::INFINITY,
+        first_contact: false,
+    };
     /// For candidates of timing, whose geometry is new.
     pub const CANDIDATE: Self = Self {
         extra_m: 1e-5,
@@ -159,7 +167,7 @@ impl State<'_> {
         open: std::ops::Range<usize>,
         depth: u32,
     ) -> Result<(), Blocked> {
-        if self.found.checks >= self.rules.checks_max || self.work.is_over() {
+        if self.found.checks >= self.rules.checks_max || self.work.is_over_after(open.len()) {
             return Err(self.blocked(from, None));
         }
         self.found.checks += 1;
