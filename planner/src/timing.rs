@@ -63,7 +63,9 @@ impl Path<'_> {
     /// the clock).
     #[must_use]
     pub fn fastest(&self, waits: &[f64], work: &Work) -> Option<Timed> {
-        let natural_s = self.natural_kernel_s();
+        // A way that is long against the natural kernel takes more strokes than a message holds: the widest kernel
+        // with room for them is then as good, as it is still short against the way.
+        let natural_s = self.natural_kernel_s().max(self.least_kernel_s()?);
         let mut best: Option<(f64, Shape)> = None;
         let mut try_shape = |kernel: f64, n: u32| {
             let shape = Shape { n, kernel_s: kernel * natural_s, waits: waits.to_vec() };
@@ -104,6 +106,15 @@ impl Path<'_> {
                 .max((13.0 * m.velocity_rad_s / m.jerk_rad_s3).sqrt())
         });
         each_s.filter(|s| s.is_finite()).fold(DURATION_S_MIN, f64::max)
+    }
+
+    /// Narrowest kernel with which the whole path takes at most [`MAX_STROKES`] strokes; `None` when a stroke a segment
+    /// is too many already. Each segment rounds its count up, by less than one stroke.
+    fn least_kernel_s(&self) -> Option<f64> {
+        let segments = self.corners_rad.windows(2);
+        let room = MAX_STROKES.checked_sub(segments.len()).filter(|room| *room > 0)?;
+        let way_s: f64 = segments.map(|p| if let [a, b] = p { self.cruise_s(a, b) } else { 0.0 }).sum();
+        Some(way_s * SPACING / room as f64)
     }
 
     /// Time of the reference for a segment at full speed of its slowest joint.

@@ -44,6 +44,26 @@ fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
     assert!(found >= 10 && round >= 4, "{found} found, {round} of them round something");
 }
 
+/// Goal: joints that are slow against what they accelerate at take many strokes a radian; a message holds 512, and
+/// the motion must be found all the same, near the time that its velocity limit asks for.
+#[test]
+fn long_way_of_slow_joints_fits_into_one_message_near_full_speed() {
+    for velocity_rad_s in [0.5, 0.1, 0.01, 1e-3] {
+        let mut robot = ur5();
+        for joint in &mut robot.joints {
+            joint.limits.motion.velocity_rad_s = velocity_rad_s;
+        }
+        let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+        let (start, goal) =
+            (pose([-3.0, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([3.0, -0.7, 0.7, -1.57, -1.57, 0.0]));
+        let plan = plan(&robot, &empty, &start, &goal, &options(0, 500, PlannerKind::Auto))
+            .unwrap_or_else(|e| panic!("{velocity_rad_s} rad/s: {e}"));
+        let (took_s, least_s) = (plan.proof.duration_s, 6.0 / velocity_rad_s);
+        assert!(took_s < 1.05 * least_s + 0.5, "{velocity_rad_s} rad/s: {took_s} s against {least_s} s");
+        assert!(verify(&robot, &empty, &plan.trajectory).is_ok(), "{velocity_rad_s} rad/s");
+    }
+}
+
 #[test]
 fn independent_check_sees_a_motion_through_a_sphere() {
     let robot = ur5();
