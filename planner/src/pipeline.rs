@@ -219,6 +219,10 @@ impl<'a> Pipeline<'a> {
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
+            if found == 1 {
+                // An answer, before time is spent on better ones.
+                self.propose(&path, "RRT-Connect");
+            }
             shorten(&self.space, &mut path, self.budget.shortcuts, &mut draw);
             let estimate_s = self.estimate_s(&path);
             if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {

@@ -7,6 +7,7 @@ use crate::cost::CostModel;
 use crate::draw::Draw;
 use crate::optimize::{Found, Ibfoa, Optimizer, Parameters, Problem, Run};
 use crate::tree::Space;
+use crate::work::Work;
 use crate::world::{Snapshot, World};
 use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -28,7 +29,7 @@ pub fn refine(
     seed: u64,
 ) -> Option<(Vec<JointArray>, Found)> {
     let (start, goal) = (*path.first()?, *path.last()?);
-    let problem = PathProblem::new(space.world, start, goal);
+    let problem = PathProblem::new(space, start, goal);
     let guesses = problem.guesses(path, seed);
     let optimizer = Ibfoa { parameters: Parameters::CASE_1 };
     let (is_over, mut watch) = (|| space.work.is_over(), |_: &crate::optimize::Progress| ());
@@ -40,6 +41,7 @@ pub fn refine(
 /// The paper's problem: where to put the control points.
 pub struct PathProblem<'a> {
     world: &'a World<'a>,
+    work: &'a Work<'a>,
     start_rad: JointArray,
     goal_rad: JointArray,
     weights: [f64; 3],
@@ -51,11 +53,12 @@ pub struct PathProblem<'a> {
 impl<'a> PathProblem<'a> {
     /// The problem between two poses.
     #[must_use]
-    pub fn new(world: &'a World<'a>, start_rad: JointArray, goal_rad: JointArray) -> Self {
+    pub fn new(space: &Space<'a>, start_rad: JointArray, goal_rad: JointArray) -> Self {
+        let (world, work) = (space.world, space.work);
         let one = world.robot().joints.iter().map(|j| j.limits.position_rad);
         let bounds = one.cycle().take(CONTROL_POINTS * world.joints()).collect();
         let (weights, snapshot) = (CostModel::default().weights, RefCell::default());
-        Self { world, start_rad, goal_rad, weights, bounds, snapshot }
+        Self { world, work, start_rad, goal_rad, weights, bounds, snapshot }
     }
 
     /// Start, control points and goal of a decision vector.
@@ -102,6 +105,10 @@ impl Problem for PathProblem<'_> {
             let [from, to] = segment else { continue };
             travel_rad += from.iter().zip(to).map(|(a, b)| (b - a).abs()).sum::<f64>();
             for i in 1..=POSES_PER_SEGMENT {
+                if self.work.is_over_after(self.world.pairs().len()) {
+                    // Not worth anything: the run ends with the next question.
+                    return f64::INFINITY;
+                }
                 let share = f64::from(i) / f64::from(POSES_PER_SEGMENT);
                 self.world.place(&Space::between(from, to, share), snapshot);
                 let tip = snapshot.tip();

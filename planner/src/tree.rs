@@ -3,7 +3,7 @@
 //! Source: Kuffner and `LaValle`, "RRT-Connect: An Efficient Approach to Single-Query Path Planning", ICRA 2000.
 //! Distances between poses weigh each joint with how far it can move a point of the arm, so that a step means about
 //! the same way in space for every joint.
-use crate::collide::{StraightEdge, SweepRules, sweep};
+use crate::collide::{Motion, StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
 use crate::work::Work;
 use crate::world::World;
@@ -63,7 +63,7 @@ impl<'a> Space<'a> {
     /// A pose on the straight line, at a share of the way.
     #[must_use]
     pub fn between(a: &JointArray, b: &JointArray, share: f64) -> JointArray {
-        std::array::from_fn(|j| a[j] + (b[j] - a[j]) * share)
+        StraightEdge { from_rad: a, to_rad: b }.at(share)
     }
 
     /// A uniform pose inside the position limits.
