@@ -68,11 +68,14 @@ fn read_stl(mut bytes: Vec<u8>) -> Result<Soup, Refusal> {
     if bytes.len() as u64 == binary_bytes {
         // The reader looks for `solid` itself; the header of a binary file means nothing.
         bytes.iter_mut().take(5).for_each(|b| *b = b' ');
+    } else if bytes.starts_with(b"solid\n") || bytes.starts_with(b"solid\r\n") {
+        // A name may be absent; the reader knows ASCII by the blank before it.
+        bytes.insert(5, b' ');
     } else if !bytes.starts_with(b"solid ") {
         let value = format!("is {} bytes long, and its header means {binary_bytes}", bytes.len());
         return Err((
             value,
-            "a binary STL file of that length, or an ASCII one that begins with `solid NAME`".to_owned(),
+            "a binary STL file of that length, or an ASCII one that begins with `solid`".to_owned(),
         ));
     }
     let not_stl = |e: std::io::Error| ("is not STL".to_owned(), format!("STL triangles ({e})"));
@@ -181,7 +184,10 @@ mod tests {
 
     #[test]
     fn mesh_of_each_format_has_its_triangles_and_scale() {
-        for (ending, bytes) in [("stl", binary_stl()), ("stl", STL.into()), ("obj", OBJ.into())] {
+        let nameless = STL.replacen("solid roof", "solid", 1);
+        let windows = nameless.replace('\n', "\r\n");
+        let files = [binary_stl(), STL.into(), nameless.into(), windows.into()].map(|bytes| ("stl", bytes));
+        for (ending, bytes) in files.into_iter().chain([("obj", OBJ.into())]) {
             let mesh = parse(ending, bytes, 0.5).unwrap();
             let expected = if ending == "obj" { (5, 4) } else { (4, 2) };
             assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), expected);
