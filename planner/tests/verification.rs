@@ -62,9 +62,10 @@ fn verify_doctored_motions_are_refused_and_the_original_is_not() {
 
     // Beyond the position range, slowly.
     let far = with_strokes(&good, |i, s| {
+        s.start_s *= 20.0;
+        s.duration_s *= 20.0;
         if i == 0 {
             s.delta_rad[5] += 3.5;
-            s.duration_s *= 20.0;
         }
     });
     let error = verify(&robot, &scene, &far).unwrap_err();
@@ -140,7 +141,9 @@ fn verify_needle_thinner_than_any_sampling_step_is_caught_at_the_right_time() {
         let error = verify(&robot, &needle, &motion).unwrap_err();
         let Violation::Collision { from_s, .. } = error else { panic!("seed {seed}: {error}") };
         let there_rad = motion.sample(from_s).position_rad[0];
-        assert!((there_rad - meets_rad).abs() < 2e-5, "seed {seed}: at {there_rad}, expected {meets_rad}");
+        // Never late; early by what is taken away from iterated distances, 0.05 mm, and a resolution.
+        let early_rad = meets_rad - there_rad;
+        assert!((-1e-6..8e-5).contains(&early_rad), "seed {seed}: at {there_rad}, expected {meets_rad}");
     }
     assert!(
         missed_by_sampling > 20,
