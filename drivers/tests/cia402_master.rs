@@ -454,6 +454,35 @@ fn fault_without_an_emergency_message_is_asked_for_its_code() {
     assert_eq!(bench.status(0).error_code, 0x7305);
 }
 
+/// Whoever reports the fault does so in the first cycle of it: by then the code must have been read.
+#[test]
+fn fault_found_at_first_listen_has_its_code_from_the_first_cycle_on() {
+    let mut bench = Bench::new(2);
+    bench.drives[0].status = FAULT;
+    let mut cycles_in_fault = 0;
+    for _ in 0..2_000 {
+        bench.step();
+        if bench.status(0).state == DriveState::Fault {
+            cycles_in_fault += 1;
+            assert_eq!(bench.status(0).error_code, 0x7305, "cycle {cycles_in_fault} of the fault");
+        }
+    }
+    assert!(cycles_in_fault > 100, "seen in fault for {cycles_in_fault} cycles");
+    assert_eq!(bench.status(1).state, DriveState::Disabled);
+    let seen: Vec<String> = bench.drives[0].seen.iter().map(hex).collect();
+    let asked: Vec<usize> = (0..seen.len()).filter(|at| seen[*at].starts_with("601 40 3F 60")).collect();
+    let reset = seen.iter().position(|line| line == "000 82 01").unwrap();
+    assert!(asked.len() == 1 && asked[0] < reset, "asked at {asked:?}, reset at {reset}");
+}
+
+#[test]
+fn fault_found_without_an_error_code_object_does_not_hold_up_bring_up() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].status = FAULT;
+    bench.drives[0].refused.insert((0x603F, 0), 0x0602_0000);
+    bench.until(DriveState::Fault, 2_000);
+}
+
 #[test]
 fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_told_where_to_go() {
     let mut bench = Bench::enabled(2);

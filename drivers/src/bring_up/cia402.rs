@@ -330,7 +330,7 @@ impl Node {
         self.sdo.cancel();
         self.power = Power::new(self.patience.step);
         self.power.watch(self.wished);
-        self.emcy = 0;
+        (self.emcy, self.asked_error) = (0, false);
         self.stage = Stage::Listen { since: now, next: now, trouble };
     }
 
@@ -410,11 +410,19 @@ impl Node {
                     self.listen(now, Some(Trouble::HeartbeatLost));
                 }
             }
-        } else if self.in_fault() && self.emcy == 0 && !self.asked_error && self.sdo.is_idle() {
-            // Its emergency message was lost, or came before we listened.
+        } else {
+            self.ask_error();
+        }
+    }
+
+    /// Asks a drive in fault for its error code, once: its emergency message was lost, or came before we listened.
+    fn ask_error(&mut self) -> bool {
+        let due = self.in_fault() && self.emcy == 0 && !self.asked_error && self.sdo.is_idle();
+        if due {
             self.asked_error = true;
             self.sdo.begin(SdoJob::Read(object::ERROR_CODE));
         }
+        due
     }
 
     /// What an answer means for the stage.
@@ -423,17 +431,23 @@ impl Node {
             // The emergency's own write: the stage asks on, and sees what came of it.
             return;
         }
+        if job.address() == object::ERROR_CODE {
+            // A drive without the object, or that does not answer, stays in fault without a code.
+            if let SdoOutcome::Value(value) = outcome
+                && let Some(Ok(code)) = value.as_unsigned(2).map(u16::try_from)
+            {
+                self.emcy = code;
+            }
+            return;
+        }
         match self.stage {
             Stage::Listen { .. } | Stage::Unowned { .. } => self.settle_look(cycle, job, outcome),
             Stage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
-            Stage::Operational { .. } => {
-                if let SdoOutcome::Value(value) = outcome
-                    && let Some(Ok(code)) = value.as_unsigned(2).map(u16::try_from)
-                {
-                    self.emcy = code;
-                }
-            }
-            Stage::Reset { .. } | Stage::Start { .. } | Stage::Gone(_) | Stage::Refused { .. } => {}
+            Stage::Reset { .. }
+            | Stage::Start { .. }
+            | Stage::Operational { .. }
+            | Stage::Gone(_)
+            | Stage::Refused { .. } => {}
         }
     }
 
@@ -462,6 +476,10 @@ impl Node {
             if wish == DriveWish::TorqueOff {
                 self.torque_off_by_sdo();
             }
+            return;
+        }
+        if self.ask_error() {
+            // Found in fault: its code is read before anything is reset, and stands by when the fault is reported.
             return;
         }
         let since = if let Stage::Listen { since, .. } = self.stage { since } else { now };
