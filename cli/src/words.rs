@@ -41,7 +41,7 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
         | FaultReason::BringUp
         | FaultReason::NotTrusted => format!(": {value:.6}"),
     };
-    format!("{}{joint}{amount}", reason.word())
+    format!("{}{joint}{amount}", reason.word(limit))
 }
 
 /// A code that crossed the wire as a float.
@@ -77,6 +77,7 @@ fn joint_clause(rejection: &Rejection, arm: &ArmName) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taustream_messages::DRIVE_WARNING;
 
     fn arm() -> ArmName {
         ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()] }
@@ -103,6 +104,10 @@ mod tests {
             (
                 report(FaultReason::DriveFault, 0, f64::from(0x8611_u16), 0.0),
                 "drive fault (error code) at joint 1 `pan`: 0x8611",
+            ),
+            (
+                report(FaultReason::DriveFault, 0, f64::from(0x12B7_u16), DRIVE_WARNING),
+                "drive warns (statusword) at joint 1 `pan`: 0x12b7",
             ),
             (report(FaultReason::Operator, u32::MAX, 0.0, 0.0), "fast stop by the operator"),
             (report(FaultReason::Guard, 7, f64::NAN, 1.0), "setpoint failed the guard: NaN against 1.000000"),

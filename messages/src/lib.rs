@@ -15,7 +15,7 @@ pub mod text;
 pub mod trajectory;
 
 pub use command::{Command, CommandReply, CommandRequest};
-pub use phase::{FaultReason, Phase};
+pub use phase::{DRIVE_WARNING, FaultReason, Phase};
 pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
 pub use report::Report;

@@ -81,11 +81,14 @@ impl Phase {
     }
 }
 
+/// The limit that stands beside [`FaultReason::DriveFault`] when the drive has no fault, but set its warning bit.
+pub const DRIVE_WARNING: f64 = 1.0;
+
 /// Why the arm is, or is going, in [`Phase::Fault`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum FaultReason {
-    /// A drive reported a fault; value = its error code.
+    /// A drive reported a fault; value = its error code. With [`DRIVE_WARNING`] as limit: it warns; value = statusword.
     DriveFault = 1,
     /// No feedback of a joint for too long; value = age in s.
     FeedbackLate = 2,
@@ -140,10 +143,11 @@ impl FaultReason {
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|r| r.code() == code)
     }
-    /// What happened and in which unit the value is: "feedback late (s)".
+    /// What happened and in which unit the value is: "feedback late (s)". `limit` is what stands beside the value.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn word(self, limit: f64) -> &'static str {
         match self {
+            Self::DriveFault if limit > 0.0 => "drive warns (statusword)",
             Self::DriveFault => "drive fault (error code)",
             Self::FeedbackLate => "feedback late (s)",
             Self::TrackingError => "tracking error (rad)",

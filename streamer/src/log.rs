@@ -54,7 +54,7 @@ pub fn cause_sentence(cause: &Cause, name: impl Fn(usize) -> String) -> String {
         | FaultReason::TorqueOff
         | FaultReason::Operator => format!("{} against {}", cause.value, cause.limit),
     };
-    format!("{}:{joint} {value}", cause.reason.word())
+    format!("{}:{joint} {value}", cause.reason.word(cause.limit))
 }
 
 fn code(value: f64) -> u32 {

@@ -155,7 +155,7 @@ impl Log {
 }
 
 fn phase_line(t: &Transition) -> Value {
-    let reason = t.cause.map_or(t.event.word(), |cause| cause.reason.word());
+    let reason = t.cause.map_or(t.event.word(), |cause| cause.reason.word(cause.limit));
     json!({
         "event": "phase", "tick": t.tick, "from": t.from.word(), "to": t.to.word(), "reason": reason,
         "joint": t.cause.and_then(|c| c.joint), "value": t.cause.map(|c| c.value),

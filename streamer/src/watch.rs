@@ -6,7 +6,7 @@
 use crate::facts::{Cause, Facts};
 use taustream_arm::settings::Supervision;
 use taustream_drivers::{DriveState, Nanos};
-use taustream_messages::FaultReason;
+use taustream_messages::{DRIVE_WARNING, FaultReason};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// Cycles from a command to the measured position that answers it.
@@ -231,10 +231,11 @@ fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
         limit: 0.0,
     };
     let dropped = Cause { reason: FaultReason::DriveDropped, value: f64::from(servo.status_word), ..fault };
+    let warning = Cause { value: f64::from(servo.status_word), limit: DRIVE_WARNING, ..fault };
     match servo.state {
         DriveState::Fault => Some(fault),
         // A warning is the drive's last word before it drops out: the arm stops while it still can.
-        DriveState::Enabled => servo.warning.then_some(fault),
+        DriveState::Enabled => servo.warning.then_some(warning),
         DriveState::Disabled | DriveState::Enabling => (!enabling).then_some(dropped),
         DriveState::Absent
         | DriveState::Configuring

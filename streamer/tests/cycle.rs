@@ -17,6 +17,7 @@ use taustream_motion::{Stroke, Trajectory};
 use taustream_streamer::cycle::Next;
 use taustream_streamer::facts::Decision;
 use taustream_streamer::intake::Leave;
+use taustream_streamer::log::cause_sentence;
 use taustream_streamer::words::Why;
 
 /// Room for rounding only: a difference over a period averages the derivative, it cannot exceed it.
@@ -148,6 +149,10 @@ fn fault_of_any_kind_while_moving_stops_the_arm_on_the_path_and_names_the_joint(
         rig.run_until(Phase::FastStopping, 40);
         let cause = rig.cause().unwrap();
         assert_eq!((cause.reason, cause.joint), (reason, joint), "{name}");
+        if name == "warning" {
+            let said = cause_sentence(&cause, |joint| joint.to_string());
+            assert_eq!(said, "drive warns (statusword): joint 4, 0x1237");
+        }
         rig.run_until(Phase::Fault, 1_500);
         rig.run(50);
         assert_eq!(rig.phase(), Phase::Fault, "{name}: nothing resumes by itself");
