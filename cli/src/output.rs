@@ -52,6 +52,12 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
     let name = path.file_name().ok_or_else(|| {
         Failure::Usage(format!("{} is no name of a file; give -o the file to write", path.display()))
     })?;
+    // A device or a pipe is written into: the rename below would put a file in its place, and as root `-o /dev/null`
+    // would take that from everybody on the machine.
+    if fs::metadata(path).is_ok_and(|facts| !facts.is_file() && !facts.is_dir()) {
+        let written = fs::OpenOptions::new().write(true).open(path);
+        return written.and_then(|mut file| file.write_all(text.as_bytes())).map_err(fail);
+    }
     let mut beside = name.to_owned();
     beside.push(format!(".{}.part", process::id()));
     let part = path.with_file_name(beside);
@@ -68,6 +74,23 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A pipe stands for every device: a test must not risk a real one.
+    #[test]
+    fn pipe_is_written_into_and_stays_a_pipe() {
+        use std::os::unix::fs::FileTypeExt;
+        let pipe = std::env::temp_dir().join(format!("taustream-output-pipe-{}", process::id()));
+        assert!(process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::read_to_string(pipe)
+        });
+        write_whole(&pipe, "text").unwrap();
+        let is_pipe = fs::metadata(&pipe).unwrap().file_type().is_fifo();
+        fs::remove_file(&pipe).unwrap();
+        assert!(is_pipe, "a file stands where the pipe was");
+        assert_eq!(reader.join().unwrap().unwrap(), "text");
+    }
 
     #[test]
     fn file_that_cannot_be_written_leaves_nothing_behind() {
