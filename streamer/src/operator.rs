@@ -8,7 +8,7 @@ use crate::supervise::{Orders, Supervisor};
 use crate::track::ScaleOrder;
 use crate::watch::REST_RAD_S;
 use crate::words::{Answer, Why};
-use taustream_drivers::{DriveState, ServoStatus};
+use taustream_drivers::{DriveState, LinkFault, ServoStatus};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -181,6 +181,11 @@ impl Supervisor {
             return Err(Why::Wait);
         } else if self.phase != Phase::Fault {
             return Err(Why::NoFault);
+        }
+        // Drives that are off want no frames, so none are lost on a link that has ended: asked of the link itself.
+        // What the drives last said is then old, and nothing may be concluded from it.
+        if facts.buses.iter().any(|bus| bus.fault == Some(LinkFault::Gone)) {
+            return Err(Why::BusGone);
         }
         if self.watch.bus_cause(facts).is_some() {
             return Err(Why::BusFails { lost_in_a_row: facts.lost_in_a_row() });

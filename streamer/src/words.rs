@@ -47,6 +47,7 @@ pub enum Why {
     NoFault,
     TooManyRamps,
     BusFails { lost_in_a_row: u32 },
+    BusGone,
     Unowned { joint: usize },
     PartlyEnergised { joint: usize, state: DriveState },
     StillEnergised { joint: usize },
@@ -116,6 +117,10 @@ impl Why {
             Self::BusFails { lost_in_a_row } => format!(
                 "the bus still fails ({lost_in_a_row} cycles lost in a row); see cables, termination and `ip link`"
             ),
+            Self::BusGone => {
+                "a bus is gone (its interface, or the simulated servos, ended); bring it back, then restart the streamer"
+                    .to_owned()
+            }
             Self::Unowned { joint } => format!(
                 "the drive of joint {} was found energised by somebody else and is left alone; end that program, or `torque-off` (the arm may fall)",
                 name(joint)

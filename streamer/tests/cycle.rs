@@ -253,6 +253,20 @@ fn bus_that_takes_nothing_freezes_the_path_and_becomes_a_bus_fault() {
     assert_eq!(last.1, before.1);
 }
 
+/// Goal: a link that has ended never passes for a bus whose drives are off: what they last said is old.
+#[test]
+fn fault_of_a_bus_that_is_gone_is_not_cleared_and_says_what_helps() {
+    let mut rig = Rig::new();
+    rig.enable();
+    rig.script(|w| (w.link_fault, w.link_takes) = (Some(LinkFault::Gone), 0));
+    rig.run_until(Phase::Fault, 50);
+    let answer = rig.ask(Command::ClearFault);
+    let sentence = answer.why.sentence(|joint| joint.to_string());
+    assert!(!answer.accepted && sentence.contains("restart the streamer"), "{sentence}");
+    rig.run(20);
+    assert_eq!(rig.phase(), Phase::Fault);
+}
+
 #[test]
 fn one_lost_cycle_is_made_up_for_by_a_longer_step() {
     let mut rig = Rig::new();
