@@ -7,7 +7,10 @@ use crate::{CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Repor
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{client::Client, publisher::Publisher, server::Server, subscriber::Subscriber};
-use iceoryx2::prelude::{FileName, Path as IceoryxPath, SemanticString, SignalHandlingMode, ipc};
+use iceoryx2::prelude::{
+    FileName, LogLevel, Path as IceoryxPath, SemanticString, SignalHandlingMode, ipc,
+    set_log_level_from_env_or,
+};
 use std::fs;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
@@ -189,6 +192,9 @@ impl Wire {
         if !is_arm_name(arm) {
             return Err(ServiceError::Name { name: arm.to_owned() });
         }
+        // iceoryx2 writes its own lines to stderr, where `--json` promises JSON; whatever matters comes back as an error.
+        // IOX2_LOG_LEVEL brings them back for whoever looks for a fault in it.
+        set_log_level_from_env_or(LogLevel::Fatal);
         let uid = own_uid()?;
         let refused = |why: String| ServiceError::Refused { arm: arm.to_owned(), what: "join", why };
         let config = config(arm, uid, &runtime_directory()?).map_err(refused)?;
