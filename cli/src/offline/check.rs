@@ -98,7 +98,7 @@ impl fmt::Display for CheckedRobot {
             let [low, high] = j.position_rad;
             writeln!(
                 f,
-                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8.2} rad/s {:>8.2} rad/s2 {:>8.1} rad/s3; {:.2}, {:.1}",
+                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8} rad/s {:>8} rad/s2 {:>8} rad/s3; {}, {}",
                 j.name,
                 j.velocity_rad_s,
                 j.acceleration_rad_s2,
