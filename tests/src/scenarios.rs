@@ -59,9 +59,19 @@ fn enable(stage: &mut Stage) -> Result<()> {
 }
 
 fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
-    let report = stage.await_report("the end of the motion", |report, phase| {
-        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
-    })?;
+    let report = loop {
+        let report = stage.await_report("the end of the motion", |report, phase| {
+            let ended = phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s;
+            ended || phase == Phase::Paused
+        })?;
+        if report.checked().is_some_and(|(_, phase)| phase == Phase::Holding) {
+            break report;
+        }
+        // A host that held the machine up for longer than `stall_resume_ms` leaves the arm paused, for the operator.
+        ensure!(report.stalls > 0, "the arm paused by itself without a stall");
+        println!("       (the host stalled the machine: {} stalls so far; resuming)", report.stalls);
+        stage.cli_done(&["resume"])?;
+    };
     for (joint, goal) in goal_rad.iter().enumerate() {
         let commanded = report.command_rad[joint];
         ensure!(
@@ -143,8 +153,10 @@ fn planner_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
 /// A servo fault ends in `Fault` with the joint named; after the cause is gone the arm is brought back by command only.
 fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
     enable(stage)?;
+    // A joint that loses its drive at full speed coasts before its brake holds it, here into a pillar.
+    stage.cli_done(&["speed", "20"])?;
     stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.2)?;
+    stage.await_under_way(0.1)?;
     stage.simulator.tell(fault)?;
     let report = stage.await_phase(Phase::Fault)?;
     ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
