@@ -59,19 +59,9 @@ fn enable(stage: &mut Stage) -> Result<()> {
 }
 
 fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
-    let report = loop {
-        let report = stage.await_report("the end of the motion", |report, phase| {
-            let ended = phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s;
-            ended || phase == Phase::Paused
-        })?;
-        if report.checked().is_some_and(|(_, phase)| phase == Phase::Holding) {
-            break report;
-        }
-        // A host that held the machine up for longer than `stall_resume_ms` leaves the arm paused, for the operator.
-        ensure!(report.stalls > 0, "the arm paused by itself without a stall");
-        println!("       (the host stalled the machine: {} stalls so far; resuming)", report.stalls);
-        stage.cli_done(&["resume"])?;
-    };
+    let report = stage.await_through_stalls("the end of the motion", |report, phase| {
+        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
+    })?;
     for (joint, goal) in goal_rad.iter().enumerate() {
         let commanded = report.command_rad[joint];
         ensure!(

@@ -162,9 +162,18 @@ fn split_at_syncs(frames: &[BusFrame], encodings: &[Encoding]) -> Vec<Vec<(u8, V
     cycles
 }
 
-/// True when a drive is told to follow: bit 3 of the controlword (CiA 402, "enable operation").
+/// True when any drive is told to follow: bit 3 of the controlword (CiA 402, "enable operation").
 fn is_live(cycle: &[(u8, Vec<u8>)]) -> bool {
-    cycle.iter().any(|(_, data)| data.first().is_some_and(|low| low & 0x08 != 0))
+    cycle.iter().any(|(_, data)| follows_target(data))
+}
+
+fn follows_target(data: &[u8]) -> bool {
+    data.first().is_some_and(|low| low & 0x08 != 0)
+}
+
+/// Phases in which single drives may be off, or on their way on or off.
+fn may_be_off(phase: &str) -> bool {
+    matches!(phase, "enabling" | "fast-stopping" | "braking" | "fault" | "locked" | "disabling")
 }
 
 fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> Verdict {
@@ -229,6 +238,13 @@ fn compare_bus(
         let (Some((_, data)), None) = (of_node.next(), of_node.next()) else {
             return Err(flaw(format!("node {node} has not exactly one setpoint frame")));
         };
+        // A drive that is not told to follow gets its own position as target; that is right only outside of motion.
+        if !follows_target(data) && may_be_off(&cycle.phase) {
+            continue;
+        }
+        if !follows_target(data) {
+            return Err(flaw(format!("node {node} is not told to follow while {}", cycle.phase)));
+        }
         let got = target(data).ok_or_else(|| flaw(format!("node {node} got {} bytes", data.len())))?;
         let wish = cycle.position_rad.get(encoding.joint).copied();
         let wish = wish.ok_or_else(|| flaw(format!("no setpoint of joint {}", encoding.joint + 1)))?;

@@ -371,9 +371,30 @@ impl Stage {
     /// # Errors
     /// When it does not get there.
     pub fn await_under_way(&mut self, share: f64) -> Result<Report> {
-        self.await_report("a motion under way", |r, phase| {
+        self.await_through_stalls("a motion under way", |r, phase| {
             phase == Phase::Moving && r.trajectory_s > share * r.trajectory_duration_s
         })
+    }
+
+    /// Like [`Self::await_report`] for a motion that nobody pauses: a host that held the machine up for longer than
+    /// `stall_resume_ms` leaves the arm paused, and this resumes it, aloud, as an operator would.
+    ///
+    /// # Errors
+    /// When it does not come to hold, or the arm paused without a stall.
+    pub fn await_through_stalls(
+        &mut self,
+        what: &str,
+        wanted: impl Fn(&Report, Phase) -> bool,
+    ) -> Result<Report> {
+        loop {
+            let report = self.await_report(what, |r, phase| phase == Phase::Paused || wanted(r, phase))?;
+            if Phase::from_code(report.phase) != Some(Phase::Paused) {
+                return Ok(report);
+            }
+            ensure!(report.stalls > 0, "the arm paused by itself without a stall");
+            println!("       (the host stalled the machine: {} stalls so far; resuming)", report.stalls);
+            self.cli_done(&["resume"])?;
+        }
     }
 
     /// Ends everything in order and leaves the recording: the candump text and the path of the cycle log.

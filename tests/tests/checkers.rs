@@ -155,6 +155,17 @@ fn frame_missing_passes_only_in_a_fault_and_only_as_a_gap() {
 }
 
 #[test]
+fn drive_not_told_to_follow_fails_in_motion_and_passes_in_a_fault() {
+    let (mut frames, mut log) = recording();
+    let at = place(&frames, 200, 3);
+    frames[at].data = vec![0x06, 0, 1, 2, 3, 0];
+    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a drive that does not follow");
+    assert!(flaw.to_string().contains("not told to follow while moving"), "{flaw}");
+    nth_cycle(&mut log, 199).phase = "fault".into();
+    judge(&frames, &log, 0, &encodings()).expect("a drive that is off in a fault");
+}
+
+#[test]
 fn sync_missing_fails() {
     let (mut frames, log) = recording();
     let at = place(&frames, 120, 1) - 1;
