@@ -46,6 +46,8 @@ pub const ABORT_STORE: u32 = 0x0800_0020;
 pub const ABORT_LOCAL_CONTROL: u32 = 0x0800_0021;
 /// SDO abort: wrong device state, as for a re-map in operational.
 pub const ABORT_DEVICE_STATE: u32 = 0x0800_0022;
+/// SDO abort: there is no data, as in an empty error history.
+pub const ABORT_NO_DATA: u32 = 0x0800_0024;
 
 /// What an SDO abort code says.
 #[must_use]
@@ -73,6 +75,7 @@ pub fn sdo_abort(code: u32) -> &'static str {
         ABORT_STORE => "value cannot be stored",
         ABORT_LOCAL_CONTROL => "value cannot be stored because of local control",
         ABORT_DEVICE_STATE => "not in the present state of the device",
+        ABORT_NO_DATA => "no data there",
         _ => "abort code that CiA 301 does not list",
     }
 }

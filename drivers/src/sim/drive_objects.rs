@@ -27,10 +27,12 @@ impl Objects for Session<'_> {
     fn read(&mut self, address: Address) -> Result<Bytes, AbortCode> {
         self.drive.publish();
         self.drive.publish_history();
+        let value = self.drive.dictionary.read(address)?;
         if address.index == 0x1003 && address.sub > self.drive.errors.count() {
-            return Err(words::ABORT_NO_SUBINDEX);
+            // CiA 301, 0x1003: the subindex exists, but nothing has been entered there.
+            return Err(words::ABORT_NO_DATA);
         }
-        self.drive.dictionary.read(address)
+        Ok(value)
     }
 
     fn write(&mut self, address: Address, bytes: &[u8], sized: bool) -> Result<(), AbortCode> {

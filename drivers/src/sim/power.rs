@@ -163,7 +163,7 @@ impl Power {
             PowerState::SwitchOnDisabled if command == Command::Shutdown => {
                 self.go(PowerState::ReadyToSwitchOn) // 2
             }
-            PowerState::ReadyToSwitchOn => self.ready(command),
+            PowerState::ReadyToSwitchOn => self.ready(command, options),
             PowerState::SwitchedOn => self.switched_on(command, options),
             PowerState::OperationEnabled => self.enabled(command, options),
             PowerState::QuickStopActive => self.quick_stopped(command, options),
@@ -221,10 +221,14 @@ impl Power {
         Action::Release
     }
 
-    fn ready(&mut self, command: Command) -> Action {
+    fn ready(&mut self, command: Command, options: &Options) -> Action {
         match command {
-            // With bit 3 already set, transition 4 follows by itself at the next write.
-            Command::SwitchOn | Command::EnableOperation => self.go(PowerState::SwitchedOn), // 3
+            Command::SwitchOn => self.go(PowerState::SwitchedOn), // 3
+            Command::EnableOperation => {
+                // 3, and then 4 by itself: a master may write "switch on and enable" once, and only once.
+                self.state = PowerState::SwitchedOn;
+                self.switched_on(command, options)
+            }
             Command::DisableVoltage | Command::QuickStop => self.go(PowerState::SwitchOnDisabled), // 7
             Command::Shutdown | Command::None => Action::Continue,
         }

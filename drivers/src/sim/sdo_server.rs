@@ -1,6 +1,6 @@
-//! The SDO server of a simulated drive: expedited transfers both ways, segmented reads.
+//! The SDO server of a simulated drive: expedited and segmented transfers both ways, one at a time.
 //!
-//! No object of the drive is longer than four bytes and writable, so a segmented write is refused by its length.
+//! No writable object of the drive is longer than four bytes, but a client may write short ones by segments too.
 //! Source: CiA 301 section 7.2.4.
 use super::dictionary::{AbortCode, Bytes};
 use crate::codec::canopen::{COB_SDO_REQUEST, node_of};
@@ -29,10 +29,25 @@ struct Upload {
     newest: Nanos,
 }
 
-/// The server and the transfer that is in flight.
+/// Longest value that can be written.
+const WRITTEN_MAX: usize = 4;
+
+/// A write that goes on over several frames.
+#[derive(Clone, Debug)]
+struct Download {
+    address: Address,
+    bytes: Bytes,
+    /// Length that the client announced.
+    size: Option<u32>,
+    toggle: bool,
+    newest: Nanos,
+}
+
+/// The server and the transfer that is in flight: at most one of the two.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SdoServer {
     upload: Option<Upload>,
+    download: Option<Download>,
 }
 
 impl SdoServer {
@@ -49,7 +64,7 @@ impl SdoServer {
         }
         let Some((_, request)) = SdoRequest::decode(frame) else {
             // Block transfer and reserved commands: refused, with the address that the frame names.
-            self.upload = None;
+            self.reset();
             let address = match *frame.data() {
                 [_, low, high, sub, ..] => Address::new(u16::from_le_bytes([low, high]), sub),
                 _ => Address::new(0, 0),
@@ -61,13 +76,16 @@ impl SdoServer {
 
     /// Gives up a transfer whose client has gone quiet.
     pub(crate) fn expire(&mut self, now: Nanos) -> Option<SdoResponse> {
-        let upload = self.upload.take_if(|upload| now.since_s(upload.newest) > TIMEOUT_S)?;
-        Some(SdoResponse::Abort(upload.address, words::ABORT_TIMEOUT))
+        let late = |newest| now.since_s(newest) > TIMEOUT_S;
+        let read = self.upload.take_if(|upload| late(upload.newest)).map(|upload| upload.address);
+        let written =
+            self.download.take_if(|download| late(download.newest)).map(|download| download.address);
+        Some(SdoResponse::Abort(read.or(written)?, words::ABORT_TIMEOUT))
     }
 
     /// Forgets the transfer in flight.
     pub(crate) fn reset(&mut self) {
-        self.upload = None;
+        *self = Self::default();
     }
 
     fn respond(
@@ -80,6 +98,9 @@ impl SdoServer {
         if !matches!(request, SdoRequest::ReadSegment { .. }) {
             self.upload = None;
         }
+        if !matches!(request, SdoRequest::WriteSegment { .. }) {
+            self.download = None;
+        }
         match request {
             SdoRequest::Read(address) => Some(match objects.read(address) {
                 Ok(value) => self.begin(now, address, value),
@@ -91,18 +112,10 @@ impl SdoServer {
                     Err(code) => SdoResponse::Abort(address, code),
                 })
             }
-            SdoRequest::WriteSegmented(address, size) => {
-                // Ask first whether the object could be written at all, then refuse the length.
-                let code = match objects.read(address) {
-                    Err(code) if code != words::ABORT_WRITE_ONLY => code,
-                    _ if size.is_some() => words::ABORT_TOO_LONG,
-                    _ => words::ABORT_LENGTH,
-                };
-                Some(SdoResponse::Abort(address, code))
-            }
+            SdoRequest::WriteSegmented(address, size) => Some(self.begin_write(now, address, size, objects)),
             SdoRequest::ReadSegment { toggle } => Some(self.next_segment(now, toggle)),
-            SdoRequest::WriteSegment { .. } => {
-                Some(SdoResponse::Abort(Address::new(0, 0), words::ABORT_COMMAND))
+            SdoRequest::WriteSegment { toggle, bytes, last } => {
+                Some(self.take_segment(now, (toggle, bytes, last), objects))
             }
             SdoRequest::Abort(..) => None,
         }
@@ -115,6 +128,56 @@ impl SdoServer {
         let size = u32::try_from(value.as_slice().len()).ok();
         self.upload = Some(Upload { address, value, sent: 0, toggle: false, newest: now });
         SdoResponse::ValueSegmented(address, size)
+    }
+
+    fn begin_write(
+        &mut self,
+        now: Nanos,
+        address: Address,
+        size: Option<u32>,
+        objects: &mut impl Objects,
+    ) -> SdoResponse {
+        // An object that is not there is refused at once; all else is judged by the whole value.
+        if let Err(code @ (words::ABORT_NO_OBJECT | words::ABORT_NO_SUBINDEX)) = objects.read(address) {
+            return SdoResponse::Abort(address, code);
+        }
+        if size.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > WRITTEN_MAX)) {
+            return SdoResponse::Abort(address, words::ABORT_TOO_LONG);
+        }
+        self.download = Some(Download { address, bytes: Bytes::new(), size, toggle: false, newest: now });
+        SdoResponse::Written(address)
+    }
+
+    fn take_segment(
+        &mut self,
+        now: Nanos,
+        segment: (bool, SegmentBytes, bool),
+        objects: &mut impl Objects,
+    ) -> SdoResponse {
+        let (toggle, bytes, last) = segment;
+        let Some(mut download) = self.download.take() else {
+            return SdoResponse::Abort(Address::new(0, 0), words::ABORT_COMMAND);
+        };
+        let address = download.address;
+        if toggle != download.toggle {
+            return SdoResponse::Abort(address, words::ABORT_TOGGLE);
+        }
+        if !download.bytes.extend(bytes.as_slice()) || download.bytes.as_slice().len() > WRITTEN_MAX {
+            return SdoResponse::Abort(address, words::ABORT_TOO_LONG);
+        }
+        if !last {
+            (download.toggle, download.newest) = (!toggle, now);
+            self.download = Some(download);
+            return SdoResponse::SegmentWritten { toggle };
+        }
+        let value = download.bytes.as_slice();
+        if download.size.is_some_and(|size| usize::try_from(size) != Ok(value.len())) {
+            return SdoResponse::Abort(address, words::ABORT_LENGTH);
+        }
+        match objects.write(address, value, true) {
+            Ok(()) => SdoResponse::SegmentWritten { toggle },
+            Err(code) => SdoResponse::Abort(address, code),
+        }
     }
 
     fn next_segment(&mut self, now: Nanos, toggle: bool) -> SdoResponse {

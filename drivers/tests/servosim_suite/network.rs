@@ -42,7 +42,7 @@ fn wrong_sdo_requests_are_refused_with_the_code_that_says_why() {
         ([0x23, 0x40, 0x60, 0, 6, 0, 0, 0], 0x0607_0012, "four bytes for two"),
         ([0x2F, 0x40, 0x60, 0, 6, 0, 0, 0], 0x0607_0013, "one byte for two"),
         ([0x21, 0x40, 0x60, 0, 9, 0, 0, 0], 0x0607_0012, "segmented, nine bytes"),
-        ([0x20, 0x40, 0x60, 0, 0, 0, 0, 0], 0x0607_0010, "segmented, length not said"),
+        ([0x21, 0x34, 0x12, 0, 4, 0, 0, 0], 0x0602_0000, "segmented, no such object"),
         ([0x2F, 0x60, 0x60, 0, 1, 0, 0, 0], 0x0609_0030, "profile position mode"),
         ([0x2B, 0x5E, 0x60, 0, 4, 0, 0, 0], 0x0609_0031, "fault reaction 4"),
         ([0x2B, 0x5E, 0x60, 0, 0xFF, 0xFF, 0, 0], 0x0609_0032, "fault reaction -1"),
@@ -83,6 +83,43 @@ fn segmented_read_with_a_wrong_toggle_or_a_pause_is_given_up() {
     assert_eq!(bench.take(0x583).len(), 0);
     bench.pass_ms(20);
     assert_eq!(bench.take(0x583), [vec![0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05]]);
+}
+
+/// Goal: a client may write short values by segments, and is held to length, toggle, access and pace all the same.
+#[test]
+fn segmented_write_takes_a_short_value_and_refuses_what_does_not_fit() {
+    let mut bench = Bench::new(parameters());
+    let taken = [0x20, 0, 0, 0, 0, 0, 0, 0];
+    for (size, begin) in [(4, 0x21), (0, 0x20)] {
+        assert_eq!(bench.sdo([begin, 0x65, 0x60, 0, size, 0, 0, 0]), [0x60, 0x65, 0x60, 0, 0, 0, 0, 0]);
+        assert_eq!(bench.sdo([0x07, 0x44, 0x33, 0x22, size, 0, 0, 0]), taken);
+        assert_eq!(bench.read(0x6065, 0), i64::from(size) << 24 | 0x22_3344);
+    }
+    // Two segments of two bytes, the toggle alternating.
+    bench.sdo([0x21, 0x65, 0x60, 0, 4, 0, 0, 0]);
+    assert_eq!(bench.sdo([0x0A, 1, 2, 0, 0, 0, 0, 0]), taken);
+    assert_eq!(bench.sdo([0x1B, 3, 4, 0, 0, 0, 0, 0]), [0x30, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(bench.read(0x6065, 0), 0x0403_0201);
+    for (begin, segment, code, why) in [
+        ([0x21, 0x65, 0x60, 0, 4, 0, 0, 0], [0x17, 1, 2, 3, 4, 0, 0, 0], 0x0503_0000, "toggle"),
+        ([0x21, 0x65, 0x60, 0, 4, 0, 0, 0], [0x0B, 1, 2, 0, 0, 0, 0, 0], 0x0607_0010, "less than announced"),
+        ([0x20, 0x65, 0x60, 0, 0, 0, 0, 0], [0x05, 1, 2, 3, 4, 5, 0, 0], 0x0607_0012, "five bytes for four"),
+        ([0x20, 0x65, 0x60, 0, 0, 0, 0, 0], [0x0B, 1, 2, 0, 0, 0, 0, 0], 0x0607_0013, "two bytes for four"),
+        ([0x21, 0x41, 0x60, 0, 2, 0, 0, 0], [0x0B, 1, 2, 0, 0, 0, 0, 0], 0x0601_0002, "read-only"),
+    ] {
+        assert_eq!(bench.sdo(begin)[0], 0x60, "{why}");
+        assert_eq!(bench.abort(segment), code, "{why}");
+        assert_eq!(bench.abort(segment), 0x0504_0001, "{why}: given up");
+    }
+    assert_eq!(bench.read(0x6065, 0), 0x0403_0201, "a refused write left something behind");
+    // One that is abandoned, for another transfer and for none.
+    bench.sdo([0x21, 0x65, 0x60, 0, 4, 0, 0, 0]);
+    bench.read(0x6041, 0);
+    assert_eq!(bench.abort([0x07, 1, 2, 3, 4, 0, 0, 0]), 0x0504_0001);
+    bench.sdo([0x21, 0x65, 0x60, 0, 4, 0, 0, 0]);
+    bench.take(0x583);
+    bench.pass_ms(1010);
+    assert_eq!(bench.take(0x583), [vec![0x80, 0x65, 0x60, 0, 0, 0, 0x04, 0x05]]);
 }
 
 #[test]
@@ -322,9 +359,12 @@ fn error_history_holds_the_newest_first_and_is_cleared_by_zero() {
     }
     assert_eq!(bench.read(0x1001, 0), 0);
     assert_eq!((bench.read(0x1003, 0), bench.read(0x1003, 1), bench.read(0x1003, 2)), (2, 0x4310, 0x2310));
-    assert_eq!(bench.abort([0x40, 0x03, 0x10, 3, 0, 0, 0, 0]), 0x0609_0011);
+    // An entry that has not been made is "no data"; one that could never be made is no subindex.
+    assert_eq!(bench.abort([0x40, 0x03, 0x10, 3, 0, 0, 0, 0]), 0x0800_0024);
+    assert_eq!(bench.abort([0x40, 0x03, 0x10, 9, 0, 0, 0, 0]), 0x0609_0011);
     bench.must_write(0x1003, 0, 1, 0);
     assert_eq!(bench.read(0x1003, 0), 0);
+    assert_eq!(bench.abort([0x40, 0x03, 0x10, 1, 0, 0, 0, 0]), 0x0800_0024);
 }
 
 #[test]

@@ -60,7 +60,15 @@ fn every_command_in_every_state_leads_where_the_table_says() {
         ),
         (
             ReadyToSwitchOn,
-            [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, SwitchedOn, ReadyToSwitchOn],
+            // CiA 402: "enable operation" takes transitions 3 and 4, by itself, after one write.
+            [
+                SwitchOnDisabled,
+                SwitchOnDisabled,
+                ReadyToSwitchOn,
+                SwitchedOn,
+                OperationEnabled,
+                ReadyToSwitchOn,
+            ],
         ),
         (
             SwitchedOn,
