@@ -1,5 +1,6 @@
 //! Reports and receipts in words, with the names of the joints.
 use crate::arm::ArmName;
+use taustream_drivers::bring_up::{explain, explain_refusal};
 use taustream_messages::{FaultReason, Outcome, Rejection, Report};
 
 /// What went wrong, where, by how much: "tracking error (rad) at joint elbow: 0.12 against 0.05".
@@ -17,9 +18,14 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
     let (value, limit) = (report.fault_value, report.fault_limit);
     let amount = match reason {
         FaultReason::TorqueOff | FaultReason::Operator => String::new(),
-        FaultReason::DriveFault | FaultReason::DriveDropped | FaultReason::ConfigurationRefused => {
-            format!(": {}", hexadecimal(value))
+        FaultReason::DriveFault => {
+            code(value).map_or_else(String::new, |code| format!(": {}", explain(code)))
         }
+        FaultReason::ConfigurationRefused => {
+            let (code, object) = (code(value).unwrap_or(0), code(limit).unwrap_or(0));
+            format!(": {}", explain_refusal(code, object))
+        }
+        FaultReason::DriveDropped => code(value).map_or_else(String::new, |word| format!(": {word:#06x}")),
         FaultReason::FeedbackLate
         | FaultReason::TrackingError
         | FaultReason::PositionJump
@@ -44,14 +50,10 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
     format!("{}{joint}{amount}", reason.word(limit))
 }
 
-/// A code that crossed the wire as a float.
+/// A code that crossed the wire as a float; `None` when it is none.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be a u32")]
-fn hexadecimal(value: f64) -> String {
-    if (0.0..=f64::from(u32::MAX)).contains(&value) {
-        format!("{:#06x}", value as u32)
-    } else {
-        format!("{value}")
-    }
+fn code(value: f64) -> Option<u32> {
+    (0.0..=f64::from(u32::MAX)).contains(&value).then_some(value as u32)
 }
 
 /// The receipt in one sentence.
@@ -103,7 +105,21 @@ mod tests {
             ),
             (
                 report(FaultReason::DriveFault, 0, f64::from(0x8611_u16), 0.0),
-                "drive fault (error code) at joint 1 `pan`: 0x8611",
+                "drive fault (error code) at joint 1 `pan`: 0x8611 following error too large",
+            ),
+            (
+                report(FaultReason::ConfigurationRefused, 1, f64::from(0x0604_0041), f64::from(0x16_0002)),
+                "drive refused its configuration at joint 2 `lift`: object 0x1600:02: SDO abort 0x06040041 object \
+                 cannot be mapped into a PDO",
+            ),
+            (
+                report(FaultReason::ConfigurationRefused, 0, f64::from(0x1_0008), f64::from(0x65_0200)),
+                "drive refused its configuration at joint 1 `pan`: object 0x6502:00: the drive does not offer cyclic \
+                 synchronous position (object 0x6502, bit 7)",
+            ),
+            (
+                report(FaultReason::DriveDropped, 0, f64::from(0x0250), 0.0),
+                "drive left operation by itself (statusword) at joint 1 `pan`: 0x0250",
             ),
             (
                 report(FaultReason::DriveFault, 0, f64::from(0x12B7_u16), DRIVE_WARNING),

@@ -112,7 +112,7 @@ pub enum FaultReason {
     TorqueOff = 11,
     /// The operator asked for a fast stop.
     Operator = 12,
-    /// A drive refused a configuration step; value = SDO abort code.
+    /// A drive refused a configuration step; value = its error code, limit = the object, `index << 8 | sub` or 0.
     ConfigurationRefused = 13,
 }
 
@@ -160,7 +160,7 @@ impl FaultReason {
             Self::NotTrusted => "arm not at rest (rad/s)",
             Self::TorqueOff => "torque switched off by the operator",
             Self::Operator => "fast stop by the operator",
-            Self::ConfigurationRefused => "drive refused its configuration (SDO abort code)",
+            Self::ConfigurationRefused => "drive refused its configuration",
         }
     }
 }

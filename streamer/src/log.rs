@@ -1,6 +1,7 @@
 //! Notes of the cycle as lines of the log.
 use crate::facts::{Cause, Transition, TripKind};
 use crate::report::Note;
+use taustream_drivers::bring_up::{explain, explain_refusal};
 use taustream_messages::{FaultReason, Phase};
 use tracing::{error, info, warn};
 
@@ -40,9 +41,9 @@ fn write_transition(t: &Transition, name: impl Fn(usize) -> String) {
 pub fn cause_sentence(cause: &Cause, name: impl Fn(usize) -> String) -> String {
     let joint = cause.joint.map_or(String::new(), |joint| format!(" joint {},", name(joint)));
     let value = match cause.reason {
-        FaultReason::DriveFault | FaultReason::DriveDropped | FaultReason::ConfigurationRefused => {
-            format!("{:#06x}", code(cause.value))
-        }
+        FaultReason::DriveFault => explain(code(cause.value)),
+        FaultReason::ConfigurationRefused => explain_refusal(code(cause.value), code(cause.limit)),
+        FaultReason::DriveDropped => format!("{:#06x}", code(cause.value)),
         FaultReason::FeedbackLate
         | FaultReason::TrackingError
         | FaultReason::PositionJump

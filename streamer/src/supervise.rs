@@ -277,10 +277,12 @@ impl Supervisor {
     fn judge_bring_up(&mut self, facts: &Facts, orders: &mut Orders) {
         let bad = self.servos(facts).find_map(|(joint, servo)| {
             let code = f64::from(servo.error_code);
-            let (reason, value) = match servo.state {
-                DriveState::Refused => (FaultReason::ConfigurationRefused, code),
-                DriveState::EnergisedUnowned => (FaultReason::NotTrusted, 0.0),
-                DriveState::Fault => (FaultReason::DriveFault, code),
+            let (reason, value, limit) = match servo.state {
+                DriveState::Refused => {
+                    (FaultReason::ConfigurationRefused, code, f64::from(servo.refused_object))
+                }
+                DriveState::EnergisedUnowned => (FaultReason::NotTrusted, 0.0, 0.0),
+                DriveState::Fault => (FaultReason::DriveFault, code, 0.0),
                 DriveState::Absent
                 | DriveState::Configuring
                 | DriveState::Disabled
@@ -288,7 +290,7 @@ impl Supervisor {
                 | DriveState::Enabled
                 | DriveState::Disabling => return None,
             };
-            Some(Cause { reason, joint: Some(joint), value, limit: 0.0 })
+            Some(Cause { reason, joint: Some(joint), value, limit })
         });
         if let Some(cause) = bad {
             self.raise(Event::HardFault, cause, facts, orders);

@@ -510,6 +510,22 @@ fn drive_that_does_not_get_enabled_in_time_is_a_fault_and_all_go_off() {
     assert_eq!(rig.world.lock().unwrap().wish, Some(DriveWish::Disabled));
 }
 
+/// Goal: who commissions an arm reads which object a drive refused and why, not a bare number.
+#[test]
+fn drive_that_refuses_its_configuration_is_a_fault_that_names_object_and_code() {
+    let mut rig = Rig::new();
+    rig.script(|w| {
+        w.forced[2] = Some(DriveState::Refused);
+        (w.error_code, w.refused_object) = (0x0604_0041, 0x16_0002);
+    });
+    rig.run_until(Phase::Fault, 20);
+    let cause = rig.cause().unwrap();
+    assert_eq!((cause.reason, cause.joint), (FaultReason::ConfigurationRefused, Some(2)));
+    let text = cause_sentence(&cause, |joint| format!("{joint}"));
+    assert!(text.contains("joint 2, object 0x1600:02: SDO abort 0x06040041"), "{text}");
+    assert!(text.contains("cannot be mapped"), "{text}");
+}
+
 #[test]
 fn drive_found_energised_is_reported_and_left_alone() {
     let mut rig = Rig::new();

@@ -7,4 +7,4 @@ pub mod power;
 pub mod trouble;
 
 pub use cia402::Node;
-pub use trouble::Trouble;
+pub use trouble::{Trouble, explain, explain_refusal};

@@ -97,6 +97,18 @@ impl Trouble {
     }
 }
 
+/// Which object was refused and why: "object 0x1600:02: SDO abort 0x06040041 object cannot be mapped into a PDO".
+///
+/// `object` is [`crate::ServoStatus::refused_object`]; 0 when no object is to blame.
+#[must_use]
+pub fn explain_refusal(code: u32, object: u32) -> String {
+    if object == 0 {
+        return explain(code);
+    }
+    let (index, sub) = (object >> 8, object & 0xFF);
+    format!("object 0x{index:04X}:{sub:02}: {}", explain(code))
+}
+
 /// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.
 #[must_use]
 pub fn explain(code: u32) -> String {

@@ -30,6 +30,7 @@ pub struct World {
     /// Overrides the state machine below.
     pub forced: [Option<DriveState>; MAX_JOINTS],
     pub error_code: u32,
+    pub refused_object: u32,
     pub warning: Option<usize>,
     pub silent: Option<usize>,
     /// Added to the measured position of a joint.
@@ -114,7 +115,7 @@ impl ServoDriver for FakeDriver {
             received: self.received[joint],
             status_word: 0x1237,
             error_code: world.error_code,
-            refused_object: 0,
+            refused_object: world.refused_object,
             warning: world.warning == Some(joint),
         }
     }
@@ -202,6 +203,7 @@ impl Rig {
             states: [DriveState::Disabled; MAX_JOINTS],
             forced: [None; MAX_JOINTS],
             error_code: 0,
+            refused_object: 0,
             warning: None,
             silent: None,
             offset_rad: [0.0; MAX_JOINTS],
