@@ -6,6 +6,7 @@ use cia402_suite::{
     Bench, CountingAllocator, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON,
     frame, hex, settings,
 };
+use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, counts_from_rad};
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
 
@@ -142,6 +143,37 @@ fn bring_up_of_a_wrong_device_is_refused_with_the_reason() {
         let words = bench.driver.explain(bench.status(0).error_code);
         assert!(words.contains(word), "{words}");
         assert!(bench.sent.iter().all(|f| f.id().raw() != 0x201), "no setpoint to a refused device");
+    }
+}
+
+/// Goal: an answer that names another object is no answer, be it a value or a confirmation.
+#[test]
+fn bring_up_of_a_drive_that_answers_for_another_object_is_refused_naming_the_asked_one() {
+    for object in [(0x6502, 0), (0x60C2, 1), (0x1600, 2)] {
+        let mut bench = Bench::new(1);
+        bench.drives[0].misnamed = Some(object);
+        bench.until(DriveState::Refused, 4_000);
+        let status = bench.status(0);
+        let packed = u32::from(object.0) << 8 | u32::from(object.1);
+        assert_eq!((status.error_code, status.refused_object), (0x0504_0000, packed));
+        let words = explain_refusal(status.error_code, status.refused_object);
+        assert!(words.starts_with(&format!("object 0x{:04X}:{:02}: ", object.0, object.1)), "{words}");
+        assert!(words.contains("no SDO answer in time"), "{words}");
+    }
+}
+
+/// Goal: a drive slower than one request's time-out, but not than all its tries, comes up with the right mapping.
+///
+/// Answers to repeated requests then arrive while another object is being asked for, and must not count for it.
+#[test]
+fn bring_up_of_a_drive_that_answers_after_the_repetition_takes_time_but_succeeds() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].answer_ms = 700;
+    bench.until(DriveState::Disabled, 60_000);
+    assert!(bench.ms > 20_000, "the answers were not late: {} ms", bench.ms);
+    for write in ["601 2F 00 16 00 02", "601 2F 00 1A 00 02", "601 2F 60 60 00 08"] {
+        let count = bench.drives[0].seen.iter().filter(|sent| hex(sent).starts_with(write)).count();
+        assert_eq!(count, 2, "{write}: asked, and once more when no answer had come");
     }
 }
 

@@ -6,6 +6,9 @@ use std::process::{Command, Stdio};
 /// What the vcan machine needs.
 pub(crate) const MACHINE: [&str; 4] = ["user-mode-linux", "iproute2", "can-utils", "kmod"];
 
+/// What the independent master needs besides.
+pub(crate) const PEERS: [&str; 2] = ["python3", "python3-venv"];
+
 /// Makes sure that all packages are there. What is missing is installed, as root or with sudo, after saying so.
 pub(crate) fn ensure(packages: &[&str]) -> Result<()> {
     let missing: Vec<&str> = packages.iter().copied().filter(|p| !is_installed(p)).collect();

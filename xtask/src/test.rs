@@ -1,5 +1,5 @@
 //! `cargo xtask test`: everything that must hold before a change lands, in one command.
-use crate::packages::{self, MACHINE};
+use crate::packages::{self, MACHINE, PEERS};
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use std::env;
@@ -27,11 +27,13 @@ pub(crate) fn run() -> Result<ExitCode> {
     let since = Instant::now();
     let root = workspace::root()?;
     packages::ensure(&MACHINE)?;
+    packages::ensure(&PEERS)?;
     for (what, words) in STEPS {
         perform(what, cargo(&root).args(words))?;
     }
     let programs = workspace::target(&root).join("debug");
     links_on_vcan(&root, &programs)?;
+    independent_master_on_vcan(&root, &programs)?;
     scenarios_on_vcan(&root, &programs)?;
     figures_on_vcan(&root, &programs)?;
     println!("\nTEST OK: everything passed, nothing was skipped, {:.0} s", since.elapsed().as_secs_f64());
@@ -83,6 +85,27 @@ fn links_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     ]);
     command.args(["--", "--test-threads", "1"]);
     perform("links on a real vcan0", &mut command)
+}
+
+/// Somebody else's CANopen master, in pinned versions, drives the simulated drives.
+fn independent_master_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    let (target, peers) = (workspace::target(root), root.join("tests/peers"));
+    let venv = target.join("venv");
+    perform("a place for the independent master", Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
+    let python = venv.join("bin/python");
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"]);
+    perform("the independent master from PyPI", install.arg(peers.join("requirements.txt")))?;
+    let words = machine(programs, &target.join("peers"))?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command
+        .args(rest)
+        .arg(python)
+        .arg(peers.join("canopen_master.py"))
+        .arg(programs.join("taustream-servosim"));
+    command.arg(root.join("config/settings/vcan6.toml")).current_dir(root);
+    perform("an independent CANopen master on a real vcan0", &mut command)
 }
 
 fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {

@@ -39,6 +39,13 @@ pub(crate) struct Scripted {
     pub(crate) obeys: bool,
     /// Answers reads of four-byte objects by segments.
     pub(crate) segments: bool,
+    /// Requests for this object are answered under the name of the next one.
+    pub(crate) misnamed: Option<(u16, u8)>,
+    /// Time that an SDO answer takes.
+    pub(crate) answer_ms: u64,
+    /// Answers on their way, with the time at which they come.
+    late: Vec<(u64, CanFrame)>,
+    ms: u64,
     pub(crate) control: u16,
     pub(crate) target: i32,
     pub(crate) seen: Vec<CanFrame>,
@@ -66,6 +73,10 @@ impl Scripted {
             silent: false,
             obeys: true,
             segments: false,
+            misnamed: None,
+            answer_ms: 0,
+            late: Vec::new(),
+            ms: 0,
             control: 0,
             target: 0,
             seen: Vec::new(),
@@ -102,7 +113,13 @@ impl Scripted {
                 let target = i32::from_le_bytes(data[2..6].try_into().unwrap());
                 self.latched = Some((u16::from_le_bytes([data[0], data[1]]), target));
             }
-            id if id == self.me(0x600) && self.nmt != 0x04 => self.sdo(data, out),
+            id if id == self.me(0x600) && self.nmt != 0x04 => {
+                let mut answers = Vec::new();
+                self.sdo(data, &mut answers);
+                let due = self.ms + self.answer_ms;
+                self.late.extend(answers.into_iter().map(|answer| (due, answer)));
+                self.release(out);
+            }
             _ => {}
         }
     }
@@ -113,7 +130,14 @@ impl Scripted {
         out.push(frame(self.me(0x700), &[0x00]));
     }
 
+    fn release(&mut self, out: &mut Vec<CanFrame>) {
+        let ms = self.ms;
+        out.extend(self.late.extract_if(.., |(due, _)| *due <= ms).map(|(_, answer)| answer));
+    }
+
     pub(crate) fn tick(&mut self, ms: u64, out: &mut Vec<CanFrame>) {
+        self.ms = ms;
+        self.release(out);
         if self.heartbeat_ms > 0 && ms.is_multiple_of(self.heartbeat_ms) && !self.silent {
             out.push(frame(self.me(0x700), &[self.nmt]));
         }
@@ -151,7 +175,8 @@ impl Scripted {
         let reply = self.me(0x580);
         let (index, sub) = (u16::from_le_bytes([data[1], data[2]]), data[3]);
         let number = u32::from_le_bytes(data[4..8].try_into().unwrap());
-        let head = |command: u8| [command, data[1], data[2], data[3]];
+        let wrong = u8::from(self.misnamed == Some((index, sub)));
+        let head = |command: u8| [command, data[1] + wrong, data[2], data[3]];
         let mut answer = |head: [u8; 4], number: u32| {
             out.push(frame(reply, &[head, number.to_le_bytes()].concat()));
         };
