@@ -18,14 +18,17 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
     let (value, limit) = (report.fault_value, report.fault_limit);
     let amount = match reason {
         FaultReason::TorqueOff | FaultReason::Operator => String::new(),
-        FaultReason::DriveFault => {
+        // With a limit it is a warning, and the value a statusword.
+        FaultReason::DriveFault if limit <= 0.0 => {
             code(value).map_or_else(String::new, |code| format!(": {}", explain(code)))
         }
         FaultReason::ConfigurationRefused => {
             let (code, object) = (code(value).unwrap_or(0), code(limit).unwrap_or(0));
             format!(": {}", explain_refusal(code, object))
         }
-        FaultReason::DriveDropped => code(value).map_or_else(String::new, |word| format!(": {word:#06x}")),
+        FaultReason::DriveFault | FaultReason::DriveDropped => {
+            code(value).map_or_else(String::new, |word| format!(": {word:#06x}"))
+        }
         FaultReason::FeedbackLate
         | FaultReason::TrackingError
         | FaultReason::PositionJump

@@ -41,9 +41,10 @@ fn write_transition(t: &Transition, name: impl Fn(usize) -> String) {
 pub fn cause_sentence(cause: &Cause, name: impl Fn(usize) -> String) -> String {
     let joint = cause.joint.map_or(String::new(), |joint| format!(" joint {},", name(joint)));
     let value = match cause.reason {
-        FaultReason::DriveFault => explain(code(cause.value)),
+        // With a limit it is a warning, and the value a statusword.
+        FaultReason::DriveFault if cause.limit <= 0.0 => explain(code(cause.value)),
         FaultReason::ConfigurationRefused => explain_refusal(code(cause.value), code(cause.limit)),
-        FaultReason::DriveDropped => format!("{:#06x}", code(cause.value)),
+        FaultReason::DriveFault | FaultReason::DriveDropped => format!("{:#06x}", code(cause.value)),
         FaultReason::FeedbackLate
         | FaultReason::TrackingError
         | FaultReason::PositionJump
