@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
-use taustream_arm::Faults;
+use taustream_arm::{Faults, RuntimeError};
 use taustream_messages::service::ServiceError;
 
 /// Every way in which a command ends without having done its work.
@@ -39,6 +39,9 @@ pub(crate) enum Failure {
     /// Shared memory cannot be used, or nobody serves.
     #[error(transparent)]
     Service(#[from] ServiceError),
+    /// There is no runtime directory to meet the streamer in.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
     /// A process took the request and did not answer.
     #[error(
         "{who} of arm `{arm}` did not answer within {waited_s:.1} s; look at its log, and restart it if it hangs"
@@ -98,6 +101,7 @@ impl Failure {
             Self::Usage(_) | Self::File(_) | Self::Unfit { .. } => 2,
             Self::Write { .. }
             | Self::Service(_)
+            | Self::Runtime(_)
             | Self::NoAnswer { .. }
             | Self::Refused(_)
             | Self::Failed(_) => 1,
@@ -113,7 +117,7 @@ impl Failure {
             Self::File(_) | Self::Unfit { .. } => "file",
             Self::Write { .. } | Self::BrokenPipe => "write",
             Self::Service(ServiceError::NotRunning { .. }) => "not-running",
-            Self::Service(_) => "service",
+            Self::Service(_) | Self::Runtime(_) => "service",
             Self::NoAnswer { .. } => "no-answer",
             Self::Refused(_) => "refused",
             Self::Failed(_) => "failed",

@@ -12,8 +12,7 @@ use iceoryx2::prelude::{
     set_log_level_from_env_or,
 };
 use std::fs;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Sends trajectories.
 pub type TrajectoryPublisher = Publisher<ipc::Service, TrajectoryMessage, ()>;
@@ -62,14 +61,6 @@ pub enum ServiceError {
         /// The name that was given.
         name: String,
     },
-    /// The runtime directory is not ours or cannot be made.
-    #[error("runtime directory {}: {why}", path.display())]
-    Directory {
-        /// The directory.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        why: String,
-    },
     /// Nobody serves this arm.
     #[error("{who} of arm `{arm}` is not running for this user (uid {uid}){others}; start {who} first")]
     NotRunning {
@@ -102,58 +93,6 @@ pub struct Wire {
     node: Node<ipc::Service>,
 }
 
-/// The uid that services belong to: this process's.
-///
-/// # Errors
-/// When /proc is not mounted.
-pub fn own_uid() -> Result<u32, ServiceError> {
-    let path = PathBuf::from("/proc/self");
-    let metadata = fs::metadata(&path)
-        .map_err(|e| ServiceError::Directory { path, why: format!("{e}; mount /proc") })?;
-    Ok(metadata.uid())
-}
-
-/// The directory of sockets and service files, made (mode 0700) when it is missing and refused when it belongs
-/// to somebody else: `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (root, or its owner),
-/// else `/run/user/UID/taustream`, else `/tmp/taustream-UID`.
-///
-/// # Errors
-/// When it cannot be made or is not safe to use.
-pub fn runtime_directory() -> Result<PathBuf, ServiceError> {
-    let uid = own_uid()?;
-    let path = choose_directory(uid);
-    let fail = |why: String| ServiceError::Directory { path: path.clone(), why };
-    if let Err(e) = fs::DirBuilder::new().recursive(true).mode(0o700).create(&path) {
-        return Err(fail(format!(
-            "cannot be made: {e}; set TAUSTREAM_RUNTIME_DIR to a directory of your own"
-        )));
-    }
-    let metadata = fs::symlink_metadata(&path).map_err(|e| fail(e.to_string()))?;
-    if !metadata.is_dir() || metadata.uid() != uid {
-        let owner = metadata.uid();
-        return Err(fail(format!(
-            "is no directory of uid {uid} (owner {owner}); remove it or set TAUSTREAM_RUNTIME_DIR"
-        )));
-    }
-    Ok(path)
-}
-
-fn choose_directory(uid: u32) -> PathBuf {
-    if let Some(path) = std::env::var_os("TAUSTREAM_RUNTIME_DIR").filter(|p| !p.is_empty()) {
-        return PathBuf::from(path);
-    }
-    let system = PathBuf::from("/run/taustream");
-    let owned = fs::symlink_metadata(&system).is_ok_and(|m| m.uid() == uid);
-    let user = PathBuf::from(format!("/run/user/{uid}"));
-    if uid == 0 || owned {
-        system
-    } else if user.is_dir() {
-        user.join("taustream")
-    } else {
-        PathBuf::from(format!("/tmp/taustream-{uid}"))
-    }
-}
-
 /// True for a name that may stand in a file name.
 #[must_use]
 pub fn is_arm_name(name: &str) -> bool {
@@ -184,20 +123,21 @@ fn other_users(arm: &str, own: u32) -> Vec<u32> {
 }
 
 impl Wire {
-    /// Joins the services of `arm` (the settings' name) as this user, under `node_name`.
+    /// Joins the services of `arm` (the settings' name) as this user, under `node_name`. `runtime` is the runtime
+    /// directory of all processes of the arm, which must exist and belong to this user.
     ///
     /// # Errors
-    /// When the name or the runtime directory is unfit, or shared memory is not to be had.
-    pub fn join(arm: &str, node_name: &str) -> Result<Self, ServiceError> {
+    /// When the name is unfit, or shared memory is not to be had.
+    pub fn join(arm: &str, node_name: &str, runtime: &Path) -> Result<Self, ServiceError> {
         if !is_arm_name(arm) {
             return Err(ServiceError::Name { name: arm.to_owned() });
         }
         // iceoryx2 writes its own lines to stderr, where `--json` promises JSON; whatever matters comes back as an error.
         // IOX2_LOG_LEVEL brings them back for whoever looks for a fault in it.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let uid = own_uid()?;
+        let uid = rustix::process::geteuid().as_raw();
         let refused = |why: String| ServiceError::Refused { arm: arm.to_owned(), what: "join", why };
-        let config = config(arm, uid, &runtime_directory()?).map_err(refused)?;
+        let config = config(arm, uid, runtime).map_err(refused)?;
         let name = node_name.try_into().map_err(|e| refused(format!("{e:?}")))?;
         let node = NodeBuilder::new()
             .name(&name)

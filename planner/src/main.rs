@@ -69,7 +69,7 @@ fn run(settings: &Settings) -> Result<()> {
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop)).context("cannot take signals")?;
     }
-    let wire = Wire::join(&settings.name, "taustream-planner")?;
+    let wire = Wire::join(&settings.name, "taustream-planner", &taustream_arm::runtime::directory()?)?;
     let mut service = Service::open(&wire, &settings.robot, &settings.scene, &stop)?;
     let (name, robot, obstacles) = (&settings.name, &settings.robot.name, settings.scene.obstacles.len());
     writeln!(std::io::stdout(), "taustream-planner ready: arm {name}, {robot}, {obstacles} obstacles")?;

@@ -5,7 +5,7 @@ use common::{pose, scene, sphere, ur5, ur5_distances_m};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use taustream_arm::{Robot, Scene};
+use taustream_arm::{Robot, Scene, runtime};
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::Wire;
 use taustream_messages::{
@@ -18,6 +18,10 @@ use taustream_planner::service::Service;
 const HOME: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 const AWAY: [f64; 6] = [0.4, -1.4, 1.4, -1.57, -1.57, 0.0];
 const THERE: [f64; 6] = [-0.4, -1.5, 1.5, -1.57, -1.57, 0.0];
+
+fn join(arm: &str, node: &str) -> Wire {
+    Wire::join(arm, node, &runtime::directory().expect("a directory")).expect("joins")
+}
 
 /// What the played streamer shows, and what it saw.
 struct Played {
@@ -65,7 +69,7 @@ impl Played {
 
     /// Reports a hundred times a second and answers trajectories, as the streamer does.
     fn play(&self, arm: &str, robot: &Robot) {
-        let wire = Wire::join(arm, "played-streamer").expect("joins");
+        let wire = join(arm, "played-streamer");
         let reports = wire.report_publisher().expect("port");
         let receipts = wire.receipt_publisher().expect("port");
         let trajectories = wire.trajectory_subscriber().expect("port");
@@ -113,7 +117,7 @@ fn with_service_in(scene: &Scene, name: &str, played: &Played, test: impl FnOnce
     thread::scope(|s| {
         s.spawn(|| played.play(&arm, &robot));
         s.spawn(|| {
-            let wire = Wire::join(&arm, "planner").expect("joins");
+            let wire = join(&arm, "planner");
             let mut service = Service::open(&wire, &robot, scene, &stop).expect("opens");
             ready.store(true, Ordering::SeqCst);
             service.serve();
@@ -141,7 +145,7 @@ fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanReques
 
 /// Asks and waits for the answer.
 fn ask(arm: &str, asked: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> PlanOutcome {
-    let wire = Wire::join(arm, "client").expect("joins");
+    let wire = join(arm, "client");
     let client = wire.plan_client().expect("port");
     let pending = client.send_copy(PlanRequest::from(asked)).expect("sent");
     meanwhile();
@@ -176,7 +180,7 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
 
         // A second one goes on from the report's generation; and a saved motion is sent by the same way.
         receipt_of(&ask(arm, &request(When::AtOnce, "straight", pose(THERE)), || ()));
-        let wire = Wire::join(arm, "cli").expect("joins");
+        let wire = join(arm, "cli");
         let still = taustream_planner::timing::stand_still(6, &pose(AWAY)).expect("a pose");
         let sent = send_trajectory(&wire, robot, &still, Duration::from_secs(5)).expect("sent");
         let receipt = sent.receipt.expect("answered");
@@ -276,7 +280,7 @@ fn service_while_moving_cuts_are_the_streamers_to_refuse_and_after_current_waits
 fn service_motion_whose_requester_has_gone_is_not_sent() {
     let played = Played::new(Phase::Moving);
     with_service("gone", &played, |arm, _| {
-        let wire = Wire::join(arm, "client").expect("joins");
+        let wire = join(arm, "client");
         let client = wire.plan_client().expect("port");
         let asked = PlanRequest::from(&request(When::AfterCurrent, "", pose(THERE)));
         let pending = client.send_copy(asked).expect("sent");
@@ -295,7 +299,7 @@ fn service_second_planner_of_an_arm_is_refused() {
     let played = Played::new(Phase::Holding);
     with_service("second", &played, |arm, robot| {
         let (scene, stop) = (scene("open"), AtomicBool::new(false));
-        let wire = Wire::join(arm, "second").expect("joins");
+        let wire = join(arm, "second");
         let Err(error) = Service::open(&wire, robot, &scene, &stop) else {
             panic!("two planners serve one arm")
         };

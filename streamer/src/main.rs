@@ -13,7 +13,6 @@ use std::thread;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
-use taustream_messages::service::runtime_directory;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
 use taustream_streamer::intake::{self, Desk, Leave, Leaver};
@@ -113,7 +112,7 @@ fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
 }
 
 fn open_buses(settings: &Settings, choice: LinkChoice) -> Result<Buses> {
-    let runtime = runtime_directory()?;
+    let runtime = taustream_arm::runtime::directory()?;
     let mut buses = Vec::new();
     for (index, bus) in settings.buses.iter().enumerate() {
         let link = link::open(bus, choice, LinkRole::Master, &runtime)?;

@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
-use taustream_arm::{Settings, TrajectoryFile};
+use taustream_arm::{RuntimeError, Settings, TrajectoryFile, runtime};
 use taustream_drivers::Nanos;
 use taustream_messages::service::{
     CommandServer, ReceiptPublisher, ReportPublisher, ServiceError, TrajectorySubscriber, Wire,
@@ -73,6 +73,9 @@ pub enum StartError {
     /// Shared memory refuses.
     #[error(transparent)]
     Service(#[from] ServiceError),
+    /// There is no place for shared memory.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
     /// Histograms or threads cannot be made.
     #[error("cannot start the service thread: {0}")]
     System(String),
@@ -89,7 +92,7 @@ impl Service {
         readers: Readers,
         candidates: Option<Sender<Candidate>>,
     ) -> Result<Self, StartError> {
-        let wire = Wire::join(&settings.name, "taustream-streamer")?;
+        let wire = Wire::join(&settings.name, "taustream-streamer", &runtime::directory()?)?;
         // The one that can be had only once comes first: a second streamer ends here.
         let commands = wire.command_server()?;
         let histogram =

@@ -220,7 +220,7 @@ struct Sender {
 
 impl Sender {
     fn join(arm: &str) -> Result<Self> {
-        let wire = Wire::join(arm, "hostile")?;
+        let wire = Wire::join(arm, "hostile", &taustream_arm::runtime::directory()?)?;
         let (trajectories, receipts) = (wire.trajectory_publisher()?, wire.receipt_subscriber()?);
         Ok(Self { trajectories, receipts, _wire: wire })
     }

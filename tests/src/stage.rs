@@ -177,7 +177,7 @@ impl Stage {
             Process::start(&program("taustream-planner"), &["--settings", settings_arg], &dir, "planner")?;
         planner.await_words("taustream-planner ready")?;
 
-        let wire = Wire::join(&settings.name, "scenario")?;
+        let wire = Wire::join(&settings.name, "scenario", &taustream_arm::runtime::directory()?)?;
         let reports = wire.report_subscriber()?;
         let mut stage = Self {
             dir,

@@ -4,11 +4,10 @@
 use anyhow::Context;
 use clap::Parser;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use taustream_arm::{Kind, Settings};
+use taustream_arm::{Kind, Settings, runtime};
 use taustream_drivers::link::{CanLink, LinkChoice, LinkRole};
 use taustream_drivers::sim::serve::{StandardInput, serve};
 use taustream_drivers::sim::settings::drives;
@@ -120,7 +119,7 @@ fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
 
 /// Opens the links and serves until told to stop.
 fn run(args: &Args, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
-    let runtime = runtime_directory();
+    let runtime = runtime::directory()?;
     let mut links: Vec<Box<dyn CanLink>> = Vec::with_capacity(settings.buses.len());
     for bus in &settings.buses {
         links.push(link::open(bus, args.link, LinkRole::Servos, &runtime)?);
@@ -139,23 +138,4 @@ fn run(args: &Args, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
     let served = serve(links, rig, Some(&mut StandardInput::default()), &stop)?;
     tracing::info!("heard {} frames, sent {}, lost {}", served.heard, served.sent, served.lost);
     Ok(())
-}
-
-/// Where local links meet: the directory that the other processes of this user use too.
-fn runtime_directory() -> PathBuf {
-    if let Some(path) = std::env::var_os("TAUSTREAM_RUNTIME_DIR").filter(|path| !path.is_empty()) {
-        return PathBuf::from(path);
-    }
-    let uid = rustix::process::geteuid().as_raw();
-    let system = PathBuf::from("/run/taustream");
-    let owned = std::fs::symlink_metadata(&system)
-        .is_ok_and(|facts| std::os::unix::fs::MetadataExt::uid(&facts) == uid);
-    let user = PathBuf::from(format!("/run/user/{uid}"));
-    if uid == 0 || owned {
-        system
-    } else if user.is_dir() {
-        user.join("taustream")
-    } else {
-        PathBuf::from(format!("/tmp/taustream-{uid}"))
-    }
 }

@@ -1,0 +1,136 @@
+//! The directory where the processes of one user meet: sockets of local links, files of shared memory.
+//!
+//! Every process of an arm has to choose the same one, so the rule stands here only.
+use std::ffi::OsString;
+use std::fs;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+/// The runtime directory cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("runtime directory {}: {why}", path.display())]
+pub struct RuntimeError {
+    /// The directory.
+    pub path: PathBuf,
+    /// What is wrong with it, and what to do.
+    pub why: String,
+}
+
+/// The runtime directory, made (mode 0700) when it is missing and refused when it belongs to somebody else:
+/// `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (root, or its owner), else `/run/user/UID/taustream`,
+/// else `/tmp/taustream-UID`.
+///
+/// # Errors
+/// When it cannot be made or is not this user's.
+pub fn directory() -> Result<PathBuf, RuntimeError> {
+    let uid = rustix::process::geteuid().as_raw();
+    let asked = std::env::var_os("TAUSTREAM_RUNTIME_DIR");
+    prepare(choose(asked, uid, Path::new("/run")), uid)
+}
+
+/// Chooses below `run` (`/run`); nothing is made.
+fn choose(asked: Option<OsString>, uid: u32, run: &Path) -> PathBuf {
+    if let Some(path) = asked.filter(|path| !path.is_empty()) {
+        return PathBuf::from(path);
+    }
+    let system = run.join("taustream");
+    let owned = fs::symlink_metadata(&system).is_ok_and(|facts| facts.uid() == uid);
+    let user = run.join(format!("user/{uid}"));
+    if uid == 0 || owned {
+        system
+    } else if user.is_dir() {
+        user.join("taustream")
+    } else {
+        PathBuf::from(format!("/tmp/taustream-{uid}"))
+    }
+}
+
+fn prepare(path: PathBuf, uid: u32) -> Result<PathBuf, RuntimeError> {
+    if let Err(e) = fs::DirBuilder::new().recursive(true).mode(0o700).create(&path) {
+        let why = format!("cannot be made: {e}; set TAUSTREAM_RUNTIME_DIR to a directory of your own");
+        return Err(RuntimeError { path, why });
+    }
+    // Not through a link: in /tmp anybody can lay one.
+    match fs::symlink_metadata(&path) {
+        Ok(facts) if facts.is_dir() && facts.uid() == uid => Ok(path),
+        Ok(facts) => {
+            let owner = facts.uid();
+            let why = format!(
+                "is no directory of uid {uid} (owner {owner}); remove it or set TAUSTREAM_RUNTIME_DIR"
+            );
+            Err(RuntimeError { path, why })
+        }
+        Err(e) => Err(RuntimeError { path, why: e.to_string() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A directory of its own, gone after the test.
+    struct Scratch(PathBuf);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("taustream-runtime-{name}-{}", std::process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            let _left_behind = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn own_uid() -> u32 {
+        rustix::process::geteuid().as_raw()
+    }
+
+    #[test]
+    fn runtime_directory_is_the_asked_then_the_systems_then_the_users_then_a_temporary_one() {
+        let scratch = Scratch::new("choose");
+        let run = scratch.0.as_path();
+        // Nobody has this uid, and what the test makes does not belong to it.
+        let stranger = own_uid() + 4_242;
+        assert_eq!(choose(Some("/x/y".into()), stranger, run), Path::new("/x/y"));
+        let temporary = PathBuf::from(format!("/tmp/taustream-{stranger}"));
+        assert_eq!(choose(None, stranger, run), temporary);
+        assert_eq!(choose(Some(OsString::new()), stranger, run), temporary, "empty is not asked");
+        fs::create_dir_all(run.join(format!("user/{stranger}"))).unwrap();
+        assert_eq!(choose(None, stranger, run), run.join(format!("user/{stranger}/taustream")));
+        assert_eq!(choose(None, 0, run), run.join("taustream"));
+        fs::create_dir(run.join("taustream")).unwrap();
+        assert_eq!(choose(None, own_uid(), run), run.join("taustream"), "its owner uses it");
+        assert_ne!(choose(None, stranger, run), run.join("taustream"), "others do not");
+    }
+
+    #[test]
+    fn runtime_directory_is_made_for_its_user_alone() {
+        let scratch = Scratch::new("make");
+        let made = prepare(scratch.0.join("a/b"), own_uid()).unwrap();
+        assert_eq!(fs::metadata(&made).unwrap().mode() & 0o777, 0o700);
+        assert_eq!(prepare(made.clone(), own_uid()), Ok(made));
+    }
+
+    #[test]
+    fn runtime_directory_of_somebody_else_or_behind_a_link_is_refused_with_the_cure() {
+        let scratch = Scratch::new("refuse");
+        let link = scratch.0.join("link");
+        std::os::unix::fs::symlink(&scratch.0, &link).unwrap();
+        let file = scratch.0.join("file");
+        fs::write(&file, "").unwrap();
+        let refused = [
+            prepare(scratch.0.clone(), own_uid() + 1),
+            prepare(link, own_uid()),
+            prepare(file.clone(), own_uid()),
+            prepare(file.join("below"), own_uid()),
+        ];
+        for outcome in refused {
+            let sentence = outcome.unwrap_err().to_string();
+            assert!(sentence.contains("TAUSTREAM_RUNTIME_DIR"), "{sentence}");
+        }
+    }
+}
