@@ -350,7 +350,7 @@ const SETTINGS_CASES: &[Case] = &[
     (Settings, "zero_offset_rad = 0.0", "", "servo[0].zero_offset_rad", "missing"),
     (Settings, "[-12.5, 12.5]", "[12.5, -12.5]", "servo[0].feedback_range_rad", "lowest below the highest"),
     (Settings, "limp_is_safe = true", "limp_is_safe = \"no\"", "servo[0].limp_is_safe", "true or false"),
-    (Settings, "name = \"vcan6\"", "name = \"vcan6\"\nsimulator = 3", "simulator", "a table"),
+    (Settings, "\n[simulator]\n", "\n[[simulator]]\n", "simulator", "a table"),
     (Settings, "name = \"vcan6\"", "name = \"vcan6\"\n\"\\u001b[31m\" = 3", "\"\\u{1b}[31m\"", "no such key"),
 ];
 
