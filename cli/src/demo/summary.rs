@@ -158,7 +158,7 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\nmove  planned (s)  executed (s)  clearance (m)  tracking error (mrad)  planning (s)  planner"
+            "\nmove  planned (s)  executed (s)  clearance (m)  tracking error (mrad)  planning (s)  strokes"
         )?;
         for m in &self.moves {
             writeln!(
