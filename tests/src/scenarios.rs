@@ -111,7 +111,7 @@ fn speed_and_stop(stage: &mut Stage, goals: &Goals) -> Result<()> {
     stage.replan(&goals.text(0)?)?;
     stage.await_under_way(0.1)?;
     stage.cli_done(&["speed", "30"])?;
-    stage.await_report("30 % speed", |report, _| (report.sigma - 0.3).abs() < 1e-12)?;
+    stage.await_through_stalls("30 % speed", |report, _| (report.sigma - 0.3).abs() < 1e-12)?;
     stage.cli_done(&["stop"])?;
     let held = stage.await_phase(Phase::Holding)?;
     ensure!(held.command_velocity_rad_s.iter().all(|v| *v == 0.0), "holds with a velocity");
