@@ -10,8 +10,10 @@ use taustream_drivers::{
 };
 
 mod alloc;
+mod bring_up;
 mod encoding;
 mod frames;
+mod operation;
 mod properties;
 mod scripted;
 mod sdo_client;

@@ -1,0 +1,251 @@
+//! Bring-up of drives: what is asked, what is refused, and what an energised drive keeps.
+use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, frame, hex, settings};
+use taustream_drivers::bring_up::explain_refusal;
+use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+
+/// Every frame that node 1 is sent from the first look to NMT start, written out from can-protocols 1.2 to 1.5.
+const BRING_UP_OF_NODE_1: &str = "
+601 40 41 60 00 00 00 00 00
+000 82 01
+601 40 00 10 00 00 00 00 00
+601 40 18 10 01 00 00 00 00
+601 40 02 65 00 00 00 00 00
+601 40 41 60 00 00 00 00 00
+601 2B 17 10 00 64 00 00 00
+601 23 16 10 01 5E 01 7F 00
+601 2B 07 60 00 03 00 00 00
+601 2F C2 60 01 01 00 00 00
+601 2F C2 60 02 FD 00 00 00
+601 23 06 10 00 E8 03 00 00
+601 2B 5A 60 00 06 00 00 00
+601 23 00 14 01 01 02 00 80
+601 2F 00 14 02 01 00 00 00
+601 2F 00 16 00 00 00 00 00
+601 23 00 16 01 10 00 40 60
+601 23 00 16 02 20 00 7A 60
+601 2F 00 16 00 02 00 00 00
+601 23 00 14 01 01 02 00 00
+601 23 00 18 01 81 01 00 C0
+601 2F 00 18 02 01 00 00 00
+601 2F 00 1A 00 00 00 00 00
+601 23 00 1A 01 10 00 41 60
+601 23 00 1A 02 20 00 64 60
+601 2F 00 1A 00 02 00 00 00
+601 23 00 18 01 81 01 00 40
+601 23 01 14 01 01 03 00 80
+601 23 01 18 01 81 02 00 C0
+601 23 02 14 01 01 04 00 80
+601 23 02 18 01 81 03 00 C0
+601 23 03 14 01 01 05 00 80
+601 23 03 18 01 81 04 00 C0
+601 2F 60 60 00 08 00 00 00
+601 40 61 60 00 00 00 00 00
+601 40 64 60 00 00 00 00 00
+000 01 01
+";
+
+#[test]
+fn bring_up_of_one_node_sends_the_golden_frames() {
+    let mut bench = Bench::new(1);
+    bench.until(DriveState::Disabled, 2_000);
+    let mut seen: Vec<String> =
+        bench.drives[0].seen.iter().filter(|f| f.id().raw() != 0x201).map(hex).collect();
+    // The statusword is looked at again for as long as the bus is listened to.
+    let looks = seen.iter().take_while(|line| line.contains(" 40 41 60 ")).count();
+    seen.drain(1..looks);
+    let golden: Vec<&str> = BRING_UP_OF_NODE_1.trim().lines().collect();
+    assert_eq!(seen, golden);
+}
+
+/// Option code 6 of 0x605A stays energised after a quick stop, 2 switches off: that is only for joints that may go limp.
+#[test]
+fn bring_up_of_a_joint_that_may_go_limp_lets_a_quick_stop_end_without_torque() {
+    let mut safe = settings(2);
+    safe.servos[1].limp_is_safe = true;
+    let mut bench = Bench::with(safe);
+    bench.until(DriveState::Disabled, 2_000);
+    let quick_stops: Vec<String> = (bench.drives.iter())
+        .flat_map(|drive| drive.seen.iter().map(hex).filter(|line| line.contains(" 2B 5A 60 ")))
+        .collect();
+    assert_eq!(quick_stops, ["601 2B 5A 60 00 06 00 00 00", "602 2B 5A 60 00 02 00 00 00"]);
+}
+
+#[test]
+fn bring_up_of_six_nodes_keeps_one_sdo_frame_a_node_and_cycle() {
+    let mut bench = Bench::new(6);
+    let mut most = 0;
+    for _ in 0..2_000 {
+        bench.step();
+        for node in 1..=6_u32 {
+            let count = bench.sent.iter().filter(|f| f.id().raw() == 0x600 + node).count();
+            most = most.max(count);
+            assert!(count <= 1, "node {node} got {count} SDO frames in one cycle");
+        }
+    }
+    assert_eq!(most, 1, "no SDO frame was seen at all");
+    assert_eq!(bench.states(), [DriveState::Disabled; 6]);
+}
+
+#[test]
+fn bring_up_takes_segmented_answers_and_missing_optional_objects() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].segments = true;
+    for object in [(0x1401, 1), (0x1802, 1), (0x1803, 1), (0x1006, 0), (0x605A, 0)] {
+        bench.drives[0].refused.insert(object, 0x0602_0000);
+    }
+    bench.until(DriveState::Disabled, 2_000);
+    assert!(bench.drives[0].seen.iter().any(|f| hex(f) == "601 60 00 00 00 00 00 00 00"));
+}
+
+#[test]
+fn bring_up_of_a_refused_mandatory_object_reports_code_and_object() {
+    for (object, code) in [((0x60C2, 1), 0x0609_0030), ((0x1400, 2), 0x0602_0000), ((0x6060, 0), 0x0800_0022)]
+    {
+        let mut bench = Bench::new(2);
+        bench.drives[1].refused.insert(object, code);
+        bench.steps(2_000);
+        let status = bench.status(1);
+        assert_eq!(status.state, DriveState::Refused);
+        assert_eq!(status.error_code, code);
+        assert_eq!(status.refused_object, u32::from(object.0) << 8 | u32::from(object.1));
+        assert_eq!(bench.status(0).state, DriveState::Disabled, "the other drive comes up all the same");
+        let words = bench.driver.explain(code);
+        assert!(words.contains("SDO abort") && !words.contains("does not list"), "{words}");
+
+        // Once the cause is gone, clearing tries again from the start.
+        bench.drives[1].refused.clear();
+        bench.driver.clear_faults();
+        bench.until(DriveState::Disabled, 2_000);
+    }
+}
+
+#[test]
+fn bring_up_of_a_wrong_device_is_refused_with_the_reason() {
+    let cases = [
+        ((0x1000, 0), (4, 0x000F_0191), "CiA 402"),
+        ((0x6502, 0), (4, 0x0000_0061), "cyclic synchronous position"),
+        ((0x1000, 0), (2, 0x0192), "width"),
+    ];
+    for (object, value, word) in cases {
+        let mut bench = Bench::new(1);
+        bench.drives[0].objects.insert(object, value);
+        bench.until(DriveState::Refused, 2_000);
+        let words = bench.driver.explain(bench.status(0).error_code);
+        assert!(words.contains(word), "{words}");
+        assert!(bench.sent.iter().all(|f| f.id().raw() != 0x201), "no setpoint to a refused device");
+    }
+}
+
+/// Goal: an answer that names another object is no answer, be it a value or a confirmation.
+#[test]
+fn bring_up_of_a_drive_that_answers_for_another_object_is_refused_naming_the_asked_one() {
+    for object in [(0x6502, 0), (0x60C2, 1), (0x1600, 2)] {
+        let mut bench = Bench::new(1);
+        bench.drives[0].misnamed = Some(object);
+        bench.until(DriveState::Refused, 4_000);
+        let status = bench.status(0);
+        let packed = u32::from(object.0) << 8 | u32::from(object.1);
+        assert_eq!((status.error_code, status.refused_object), (0x0504_0000, packed));
+        let words = explain_refusal(status.error_code, status.refused_object);
+        assert!(words.starts_with(&format!("object 0x{:04X}:{:02}: ", object.0, object.1)), "{words}");
+        assert!(words.contains("no SDO answer in time"), "{words}");
+    }
+}
+
+/// Goal: a drive slower than one request's time-out, but not than all its tries, comes up with the right mapping.
+///
+/// Answers to repeated requests then arrive while another object is being asked for, and must not count for it.
+#[test]
+fn bring_up_of_a_drive_that_answers_after_the_repetition_takes_time_but_succeeds() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].answer_ms = 700;
+    bench.until(DriveState::Disabled, 60_000);
+    assert!(bench.ms > 20_000, "the answers were not late: {} ms", bench.ms);
+    for write in ["601 2F 00 16 00 02", "601 2F 00 1A 00 02", "601 2F 60 60 00 08"] {
+        let count = bench.drives[0].seen.iter().filter(|sent| hex(sent).starts_with(write)).count();
+        assert_eq!(count, 2, "{write}: asked, and once more when no answer had come");
+    }
+}
+
+#[test]
+fn bring_up_with_one_absent_node_brings_the_others_up_and_takes_it_when_it_comes() {
+    let mut bench = Bench::new(6);
+    bench.drives[3].silent = true;
+    bench.steps(4_000);
+    for joint in 0..6 {
+        let state = bench.status(joint).state;
+        assert_eq!(state, if joint == 3 { DriveState::Absent } else { DriveState::Disabled });
+    }
+    assert!(bench.driver.explain(bench.status(3).error_code).contains("does not answer"));
+    bench.drives[3].silent = false;
+    bench.until(DriveState::Disabled, 4_000);
+}
+
+#[test]
+fn bring_up_of_a_node_that_never_answers_sends_three_requests_in_a_round_and_no_reset() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].silent = true;
+    let mut requests = Vec::new();
+    for _ in 0..1_400 {
+        bench.step();
+        for sent in &bench.sent {
+            assert_ne!(sent.id().raw(), 0x000, "NMT to a drive that nobody has looked at");
+            if sent.id().raw() == 0x601 {
+                requests.push((bench.ms, hex(sent)));
+            }
+        }
+    }
+    assert_eq!(requests.len(), 3, "{requests:?}");
+    assert!(requests.windows(2).all(|pair| pair[1].0 - pair[0].0 == 500), "{requests:?}");
+}
+
+#[test]
+fn listen_finds_an_energised_drive_and_leaves_it_untouched() {
+    for status in [ENABLED, ENABLED | FOLLOWS, QUICK_STOP, 0x021F] {
+        let mut bench = Bench::new(2);
+        (bench.drives[0].status, bench.drives[0].nmt) = (status, 0x05);
+        bench.steps(3_000);
+        assert_eq!(bench.status(0).state, DriveState::EnergisedUnowned, "statusword {status:#06x}");
+        assert_eq!(bench.status(1).state, DriveState::Disabled);
+        let allowed = "601 40 41 60 00 00 00 00 00";
+        assert!(bench.drives[0].seen.len() > 10, "it is watched");
+        assert!(bench.drives[0].seen.iter().all(|f| hex(f) == allowed), "only read");
+
+        // The same wish that the others follow does not reach it.
+        bench.hold();
+        bench.wish = DriveWish::Enabled;
+        bench.steps(200);
+        assert!(bench.drives[0].seen.iter().all(|f| hex(f) == allowed), "only read");
+
+        // The emergency does, at once and by SDO, because nobody knows its process data.
+        bench.wish = DriveWish::TorqueOff;
+        bench.step();
+        assert!(
+            bench.sent.iter().any(|f| hex(f) == "601 2B 40 60 00 00 00 00 00"),
+            "statusword {status:#06x}"
+        );
+    }
+}
+
+#[test]
+fn listen_holds_back_the_reset_while_another_master_sends_sync() {
+    let mut bench = Bench::new(1);
+    for _ in 0..1_000 {
+        bench.decode(&frame(0x080, &[]));
+        bench.step();
+        assert!(bench.sent.iter().all(|f| f.id().raw() != 0x000), "NMT on a bus with another master");
+    }
+    assert!(bench.driver.explain(bench.status(0).error_code).contains("another master"));
+    bench.until(DriveState::Disabled, 2_000);
+}
+
+#[test]
+fn listen_wakes_a_node_in_nmt_stopped_without_a_reset() {
+    let mut bench = Bench::new(1);
+    bench.drives[0].nmt = 0x04;
+    bench.steps(50);
+    bench.decode(&frame(0x701, &[0x04]));
+    bench.step();
+    assert!(bench.sent.iter().any(|f| hex(f) == "000 80 01"));
+    bench.until(DriveState::Disabled, 3_000);
+}
