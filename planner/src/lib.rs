@@ -5,6 +5,7 @@
 //! allocate and use every core, and it never touches a bus.
 #![forbid(unsafe_code)]
 
+pub mod arguments;
 pub mod collide;
 pub mod cost;
 pub mod draw;

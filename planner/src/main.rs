@@ -9,25 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use taustream_arm::{Faults, Kind, Scene, Settings, find};
 use taustream_messages::service::Wire;
+use taustream_planner::arguments::Arguments;
 use taustream_planner::service::Service;
-
-/// Plans motions for one arm: answers `taustream replan` and hands verified motions to the streamer.
-///
-/// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted goes on to its end.
-#[derive(Debug, Parser)]
-#[command(
-    version,
-    after_help = "Example: taustream-planner --settings config/settings/vcan6.toml\n\n\
-    SIGTERM or SIGINT end it. Log lines go to stderr; RUST_LOG=debug shows more."
-)]
-struct Arguments {
-    /// Settings of the arm's controller: a file, or the name of a shipped one.
-    #[arg(long, value_name = "FILE")]
-    settings: String,
-    /// Another scene than the settings name: a file, or the name of a shipped one.
-    #[arg(long, value_name = "FILE")]
-    scene: Option<String>,
-}
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();

@@ -9,6 +9,7 @@
 #![deny(unsafe_code)]
 
 pub mod approach;
+pub mod arguments;
 pub mod bench;
 pub mod buses;
 pub mod check;

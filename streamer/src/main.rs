@@ -4,7 +4,6 @@ use clap::Parser;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,6 +12,7 @@ use std::thread;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
+use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
 use taustream_streamer::intake::{self, Desk, Leave, Leaver};
@@ -21,31 +21,6 @@ use taustream_streamer::report::Readers;
 use taustream_streamer::rt;
 use taustream_streamer::service::Service;
 use tracing::warn;
-
-/// Drives one arm: takes trajectories over shared memory, sends a setpoint to every joint a thousand times a second.
-///
-/// This is not a safety function. A machine needs its own hard-wired emergency stop and safe torque off.
-#[derive(Debug, Parser)]
-#[command(
-    version,
-    after_help = "Example: taustream-streamer --settings config/settings/vcan6.toml\n\n\
-    SIGTERM or SIGINT: stop on the path, hold, de-energise, end. A second one: torque off and end.\n\
-    Log lines go to stderr; RUST_LOG=debug shows more."
-)]
-struct Arguments {
-    /// Settings of the arm's controller: a file, or the name of a shipped one.
-    #[arg(long, value_name = "FILE")]
-    settings: PathBuf,
-    /// What carries frames.
-    #[arg(long, value_enum, default_value_t)]
-    link: LinkChoice,
-    /// Start without real-time rights. For trials: setpoints will be late.
-    #[arg(long)]
-    allow_non_realtime: bool,
-    /// Write every cycle to this file, one JSON object a line.
-    #[arg(long, value_name = "FILE")]
-    cycle_log: Option<PathBuf>,
-}
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();

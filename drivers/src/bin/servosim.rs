@@ -8,53 +8,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use taustream_arm::{Kind, Settings, runtime};
-use taustream_drivers::link::{CanLink, LinkChoice, LinkRole};
+use taustream_drivers::link::{CanLink, LinkRole};
+use taustream_drivers::sim::arguments::Arguments;
 use taustream_drivers::sim::serve::{StandardInput, serve};
 use taustream_drivers::sim::settings::drives;
 use taustream_drivers::sim::{FaultOrder, Rig, priority};
 use taustream_drivers::{Nanos, link};
-
-/// What the manual says beyond the list of options.
-const MANUAL: &str = "\
-Each servo of the settings file becomes one CiA 402 drive (CANopen, cyclic synchronous position) with its own object
-dictionary, motor, gravity load and watchdog. Dynamics and watchdog are set in the file's optional [simulator] section.
-
-A fault is  joint=NAME|NUMBER,kind=KIND[,value=V][,after=start|enable|moving][,at_s=T][,for_s=T]
-  silence   the drive neither sends nor hears            delay    its frames come V ms late (5)
-  drop      each of its frames is lost with chance V     fault    it reports EMCY code V (0x2310)
-  stuck     the joint is jammed                          jump     its encoder reads V rad too far (0.2)
-  warning   it sets the warning bit                      refuse   it refuses SDO writes with abort code V
-  restart   its supply dips and it boots again
-Lines on the standard input do the same while it runs:  fault SPEC | clear | clear joint=NAME | status
-
-Examples:
-  taustream-servosim --settings vcan6 --start-rad \"0,-1.57,1.57,-1.57,-1.57,0\"
-  taustream-servosim --settings vcan6 --link local --fault joint=elbow,kind=silence,after=moving,at_s=0.5
-
-It is no model of a safety function: real arms need their own emergency stop.
-
-Exit status: 0 ended by SIGINT or SIGTERM, 1 the link failed, 2 bad usage or bad file.";
-
-/// Simulated servos on the buses of a settings file: they move, fall, warn and fail as real ones do, and break nothing.
-#[derive(Debug, Parser)]
-#[command(name = "taustream-servosim", version, after_help = MANUAL)]
-struct Args {
-    /// Settings file, or the name of one in the configuration directories.
-    #[arg(long, value_name = "FILE")]
-    settings: String,
-    /// What carries the frames.
-    #[arg(long, value_enum, default_value_t)]
-    link: LinkChoice,
-    /// Joint angles at power-up, base to tip: "q1,q2,..".
-    #[arg(long, value_name = "Q1,Q2,..", allow_hyphen_values = true)]
-    start_rad: Option<String>,
-    /// A fault; may be given several times (see below).
-    #[arg(long = "fault", value_name = "SPEC")]
-    faults: Vec<String>,
-    /// Decides which frames a lossy wire loses.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
@@ -64,7 +23,7 @@ fn main() -> ExitCode {
             tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into()),
         )
         .init();
-    let args = Args::parse();
+    let args = Arguments::parse();
     let rig = match prepare(&args) {
         Ok(prepared) => prepared,
         Err(error) => return fail(&error, 2),
@@ -81,7 +40,7 @@ fn fail(error: &anyhow::Error, code: u8) -> ExitCode {
 }
 
 /// Everything that can be wrong with arguments and files.
-fn prepare(args: &Args) -> anyhow::Result<(Settings, Rig)> {
+fn prepare(args: &Arguments) -> anyhow::Result<(Settings, Rig)> {
     let settings = Settings::load(&taustream_arm::find(Kind::Settings, &args.settings)?)?;
     let start_rad = args.start_rad.as_deref().map(|text| angles(text, &settings)).transpose()?;
     let setups = drives(&settings, start_rad.as_deref())?;
@@ -118,7 +77,7 @@ fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
 }
 
 /// Opens the links and serves until told to stop.
-fn run(args: &Args, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
+fn run(args: &Arguments, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
     let runtime = runtime::directory()?;
     let mut links: Vec<Box<dyn CanLink>> = Vec::with_capacity(settings.buses.len());
     for bus in &settings.buses {

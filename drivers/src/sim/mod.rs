@@ -5,6 +5,7 @@
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; links have no bit
 //! rate; of the modes of operation there is only cyclic synchronous position.
+pub mod arguments;
 mod controller;
 mod dictionary;
 mod drive;

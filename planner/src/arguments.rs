@@ -1,0 +1,22 @@
+//! The words of `taustream-planner`. They stand in the library so that the manual page is made of them.
+use clap::Parser;
+
+/// Plans motions for one arm: answers `taustream replan` and hands verified motions to the streamer.
+///
+/// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted goes on to its end.
+#[derive(Debug, Parser)]
+#[command(
+    name = "taustream-planner",
+    version,
+    after_help = "Example: taustream-planner --settings config/settings/vcan6.toml\n\n\
+    SIGTERM or SIGINT end it. Log lines go to stderr; RUST_LOG=debug shows more.\n\n\
+    Exit status: 0 ended by SIGINT or SIGTERM, 1 not started or failed, 2 bad usage or bad file."
+)]
+pub struct Arguments {
+    /// Settings of the arm's controller: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub settings: String,
+    /// Another scene than the settings name: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<String>,
+}

@@ -1,0 +1,32 @@
+//! The words of `taustream-streamer`. They stand in the library so that the manual page is made of them.
+use clap::Parser;
+use std::path::PathBuf;
+use taustream_drivers::link::LinkChoice;
+
+/// Drives one arm: takes trajectories over shared memory, sends a setpoint to every joint a thousand times a second.
+///
+/// This is not a safety function. A machine needs its own hard-wired emergency stop and safe torque off.
+#[derive(Debug, Parser)]
+#[command(
+    name = "taustream-streamer",
+    version,
+    after_help = "Example: taustream-streamer --settings config/settings/vcan6.toml\n\n\
+    SIGTERM or SIGINT: stop on the path, hold, de-energise, end. A second one: torque off and end.\n\
+    Log lines go to stderr; RUST_LOG=debug shows more.\n\n\
+    Exit status: 0 ended with all drives de-energised, 1 not started, failed, or ended before the drives were seen \
+    to be de-energised, 2 bad usage or bad file."
+)]
+pub struct Arguments {
+    /// Settings of the arm's controller: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub settings: PathBuf,
+    /// What carries frames.
+    #[arg(long, value_enum, default_value_t)]
+    pub link: LinkChoice,
+    /// Start without real-time rights. For trials: setpoints will be late.
+    #[arg(long)]
+    pub allow_non_realtime: bool,
+    /// Write every cycle to this file, one JSON object a line.
+    #[arg(long, value_name = "FILE")]
+    pub cycle_log: Option<PathBuf>,
+}
