@@ -5,7 +5,7 @@
 use crate::document::{Node, shown};
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
-use crate::settings::{Bus, BusKind, Protocol, Servo};
+use crate::settings::{Bus, BusKind, Protocol, Servo, Traffic};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
@@ -13,6 +13,10 @@ use std::f64::consts::TAU;
 const INTERFACE_BYTES_MAX: usize = 15;
 /// CiA 301 lists 10 kbit/s to 1 Mbit/s.
 const BITRATE_BIT_S: [i64; 2] = [10_000, 1_000_000];
+/// ISO 11898-2 specifies transceivers up to 5 Mbit/s, and 8 Mbit/s with signal improvement.
+const DATA_BITRATE_BIT_S_MAX: i64 = 8_000_000;
+/// Slower than a tenth of the cycle, supervision would look at one answer many times over.
+const EVERY: [i64; 2] = [1, 10];
 const NODE_ID: [i64; 2] = [1, 127];
 const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
 const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
@@ -32,6 +36,7 @@ pub(crate) fn read_buses(top: &mut Table<'_>) -> Vec<Option<Bus>> {
         let name = table.name("name");
         let interface = read_interface(&mut table);
         let kind = read_bus_kind(&mut table);
+        let traffic = read_traffic(&mut table);
         if let Some(name) = &name
             && !names.insert(name.clone())
         {
@@ -43,8 +48,8 @@ pub(crate) fn read_buses(top: &mut Table<'_>) -> Vec<Option<Bus>> {
             table.fault("interface", &shown(interface), "each interface on one bus only");
         }
         table.done();
-        let whole = name.zip(interface).zip(kind);
-        buses.push(whole.map(|((name, interface), kind)| Bus { name, interface, kind }));
+        let whole = name.zip(interface).zip(kind).zip(traffic);
+        buses.push(whole.map(|(((name, interface), kind), traffic)| Bus { name, interface, kind, traffic }));
     }
     buses
 }
@@ -65,22 +70,56 @@ fn read_interface(table: &mut Table<'_>) -> Option<String> {
 /// `virtual = true` or a bit rate: a bus whose load cannot be known is only taken where it has none.
 fn read_bus_kind(table: &mut Table<'_>) -> Option<BusKind> {
     let expected = "virtual = true (vcan) or bitrate_bit_s, one of the two";
-    let is_virtual = if table.has("virtual") { Some(table.flag("virtual")?) } else { None };
+    let is_virtual = if table.has("virtual") { table.flag("virtual")? } else { false };
     let [low, high] = BITRATE_BIT_S;
     let bitrate =
         if table.has("bitrate_bit_s") { Some(table.integer("bitrate_bit_s", low, high)?) } else { None };
-    match (is_virtual.unwrap_or(false), bitrate) {
-        (true, None) => Some(BusKind::Virtual),
-        (false, Some(bitrate)) => Some(BusKind::Classic { bitrate_bit_s: u32::try_from(bitrate).ok()? }),
-        (true, Some(_)) => {
+    let data = if table.has("data_bitrate_bit_s") {
+        // The data phase is the faster one, or bit rate switch has no purpose.
+        Some(table.integer("data_bitrate_bit_s", bitrate.unwrap_or(low), DATA_BITRATE_BIT_S_MAX)?)
+    } else {
+        None
+    };
+    let rate = |bit_s: i64| u32::try_from(bit_s).ok();
+    match (is_virtual, bitrate, data) {
+        (true, None, None) => Some(BusKind::Virtual),
+        (false, Some(bitrate), None) => Some(BusKind::Classic { bitrate_bit_s: rate(bitrate)? }),
+        (false, Some(bitrate), Some(data)) => {
+            Some(BusKind::Fd { bitrate_bit_s: rate(bitrate)?, data_bitrate_bit_s: rate(data)? })
+        }
+        (true, Some(_), _) => {
             table.fault("bitrate_bit_s", "given beside virtual = true", expected);
             None
         }
-        (false, None) => {
+        (true, None, Some(_)) => {
+            table.fault("data_bitrate_bit_s", "given beside virtual = true", expected);
+            None
+        }
+        (false, None, _) => {
             table.fault("bitrate_bit_s", "missing", expected);
             None
         }
     }
+}
+
+/// How often setpoints and answers come; without the keys, every cycle.
+fn read_traffic(table: &mut Table<'_>) -> Option<Traffic> {
+    let [low, high] = EVERY;
+    let setpoint_every = table.integer_or("setpoint_every", 1, low, high);
+    let stagger = if table.has("stagger") { table.flag("stagger") } else { Some(false) };
+    let feedback_every = table.integer_or("feedback_every", 1, low, high);
+    let packed = if table.has("packed") { table.flag("packed") } else { Some(false) };
+    if stagger == Some(true) && setpoint_every == Some(1) {
+        let expected =
+            "stagger beside setpoint_every of 2 or more: with one setpoint a cycle there are no turns";
+        table.fault("stagger", "true", expected);
+    }
+    Some(Traffic {
+        setpoint_every: u32::try_from(setpoint_every?).ok()?,
+        stagger: stagger?,
+        feedback_every: u32::try_from(feedback_every?).ok()?,
+        packed: packed?,
+    })
 }
 
 /// Reads the servos and puts them in the order of the joints; complete only when no fault was noted.

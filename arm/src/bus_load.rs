@@ -38,7 +38,7 @@ impl Settings {
         let cycle_bits = if servos == 0 { 0 } else { bits.fold(frame_bits(0), u32::saturating_add) };
         let cycle_s = f64::from(self.cycle.period_us) * 1e-6;
         let percent = match self.buses.get(bus).map(|bus| bus.kind) {
-            Some(BusKind::Classic { bitrate_bit_s }) => {
+            Some(BusKind::Classic { bitrate_bit_s } | BusKind::Fd { bitrate_bit_s, .. }) => {
                 Some(100.0 * f64::from(cycle_bits) / (f64::from(bitrate_bit_s) * cycle_s))
             }
             Some(BusKind::Virtual) | None => None,

@@ -27,5 +27,5 @@ pub use lookup::{Kind, find};
 pub use robot::{LinkShape, Robot, RobotJoint};
 pub use runtime::RuntimeError;
 pub use scene::{Obstacle, Scene, Shape};
-pub use settings::{Bus, BusKind, Servo, Settings};
+pub use settings::{Bus, BusKind, Servo, Settings, Traffic};
 pub use trajectory_file::TrajectoryFile;

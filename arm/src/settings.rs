@@ -9,11 +9,56 @@ use std::path::{Path, PathBuf};
 pub enum BusKind {
     /// vcan: no bit rate. Refused on any other interface.
     Virtual,
-    /// Classic CAN with a bit rate.
+    /// Classic CAN with a bit rate. On a vcan interface the simulator models it.
     Classic {
         /// Nominal bit rate.
         bitrate_bit_s: u32,
     },
+    /// CAN FD with bit rate switch. On a vcan interface the simulator models both rates.
+    Fd {
+        /// Bit rate of arbitration and acknowledgement.
+        bitrate_bit_s: u32,
+        /// Bit rate of the data phase.
+        data_bitrate_bit_s: u32,
+    },
+}
+
+impl BusKind {
+    /// Nominal bit rate; none for a virtual bus.
+    #[must_use]
+    pub const fn bitrate_bit_s(self) -> Option<u32> {
+        match self {
+            Self::Virtual => None,
+            Self::Classic { bitrate_bit_s } | Self::Fd { bitrate_bit_s, .. } => Some(bitrate_bit_s),
+        }
+    }
+    /// Bit rate of the data phase; none but on CAN FD.
+    #[must_use]
+    pub const fn data_bitrate_bit_s(self) -> Option<u32> {
+        match self {
+            Self::Virtual | Self::Classic { .. } => None,
+            Self::Fd { data_bitrate_bit_s, .. } => Some(data_bitrate_bit_s),
+        }
+    }
+}
+
+/// How often a bus carries setpoints and answers, and how they are put into frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Traffic {
+    /// Each servo gets a setpoint in every so many cycles, and interpolates over as many.
+    pub setpoint_every: u32,
+    /// The servos take turns within [`Self::setpoint_every`], so that each cycle carries its share of the setpoints.
+    pub stagger: bool,
+    /// Servos answer every so many SYNCs.
+    pub feedback_every: u32,
+    /// Two servos' targets share a frame; each skips the other's part.
+    pub packed: bool,
+}
+
+impl Traffic {
+    /// One setpoint and one answer a servo in every cycle.
+    pub const EVERY_CYCLE: Self =
+        Self { setpoint_every: 1, stagger: false, feedback_every: 1, packed: false };
 }
 
 /// One bus.
@@ -25,6 +70,16 @@ pub struct Bus {
     pub interface: String,
     /// What carries frames.
     pub kind: BusKind,
+    /// How much it has to carry.
+    pub traffic: Traffic,
+}
+
+impl Bus {
+    /// A bus with one setpoint and one answer a servo in every cycle.
+    #[must_use]
+    pub fn new(name: &str, interface: &str, kind: BusKind) -> Self {
+        Self { name: name.into(), interface: interface.into(), kind, traffic: Traffic::EVERY_CYCLE }
+    }
 }
 
 /// Which protocol a servo speaks.

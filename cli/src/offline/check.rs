@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 use taustream_arm::bus_load::WARNED_PERCENT;
-use taustream_arm::{Bus, BusKind, Robot, Scene, Servo, Settings, TrajectoryFile};
+use taustream_arm::{Bus, Robot, Scene, Servo, Settings, TrajectoryFile};
 use taustream_motion::time_scale::ramp_duration_s;
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
@@ -219,10 +219,7 @@ impl BusLine {
             bus: bus.name.clone(),
             interface: bus.interface.clone(),
             servos: load.servos,
-            bitrate_bit_s: match bus.kind {
-                BusKind::Virtual => None,
-                BusKind::Classic { bitrate_bit_s } => Some(bitrate_bit_s),
-            },
+            bitrate_bit_s: bus.kind.bitrate_bit_s(),
             cycle_bits: load.cycle_bits,
             load_percent: load.percent,
         }

@@ -1,6 +1,6 @@
 //! Opening a link: which one, whether it may be used, and who else uses it.
 use super::local::{LocalMaster, LocalServos};
-use super::socketcan::SocketCan;
+use super::socketcan::{SocketCan, rates_in_words};
 use super::{CanLink, facts};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub enum LinkChoice {
     /// A CAN interface of the kernel.
     #[value(name = "socketcan")]
     SocketCan,
-    /// A socket between the processes of this host, for virtual buses.
+    /// A socket between the processes of this host, behind which there are simulated servos only.
     Local,
 }
 
@@ -131,20 +131,10 @@ pub enum OpenError {
         /// What the kernel calls it.
         kind: String,
     },
-    /// A bus with a bit rate on vcan.
-    #[error(
-        "bus {bus} is declared with a bit rate, but {interface} is a vcan; declare it virtual, or name a real interface"
-    )]
-    NotReal {
-        /// The bus.
-        bus: String,
-        /// Its interface.
-        interface: String,
-    },
     /// The interface runs at another bit rate.
     #[error(
         "bus {bus} is declared with {declared_bit_s} bit/s, but {interface} runs at {actual_bit_s} bit/s; \
-         set it: ip link set {interface} down && ip link set {interface} type can bitrate {declared_bit_s} && ip link set {interface} up"
+         set it: ip link set {interface} down && {command}"
     )]
     OtherBitRate {
         /// The bus.
@@ -155,6 +145,8 @@ pub enum OpenError {
         declared_bit_s: u32,
         /// As the driver says.
         actual_bit_s: u32,
+        /// What sets it.
+        command: String,
     },
     /// A second master.
     #[error(
@@ -173,14 +165,6 @@ pub enum OpenError {
         interface: String,
         /// Who.
         holder: Holder,
-    },
-    /// The local link was asked for a real bus.
-    #[error("bus {bus} on {interface} has a bit rate: only a bus declared virtual may use the local link")]
-    LocalOnReal {
-        /// The bus.
-        bus: String,
-        /// Its interface.
-        interface: String,
     },
     /// Nobody owns the local link's meeting point.
     #[error(
@@ -248,8 +232,9 @@ pub fn open(
     if wants_socketcan(bus, choice)? {
         return Ok(Box::new(SocketCan::open(bus, role)?));
     }
-    if bus.kind != BusKind::Virtual {
-        return Err(OpenError::LocalOnReal { bus: bus.name.clone(), interface: bus.interface.clone() });
+    if let Some(words) = rates_in_words(bus.kind) {
+        // Only when asked for by name: `auto` must not take a real bus for a simulated one.
+        tracing::warn!("the local link {} has no bit rate; the simulator models {words}", bus.interface);
     }
     match role {
         LinkRole::Master => Ok(Box::new(LocalMaster::open(bus, runtime)?)),

@@ -36,6 +36,7 @@ impl SocketCan {
         let name = batch::interface_name(interface)
             .ok_or_else(|| OpenError::BadName { interface: interface.clone() })?;
         check(bus)?;
+        say_what_is_modelled(bus, role);
         // Locked before a socket is there: a refused master must not even take frames.
         let lock = match role {
             LinkRole::Master => Some(InterfaceLock::take(interface)?),
@@ -125,7 +126,7 @@ fn check(bus: &Bus) -> Result<(), OpenError> {
             BusKind::Virtual => {
                 format!("create it: ip link add dev {interface} type vcan && ip link set {interface} up")
             }
-            BusKind::Classic { .. } => {
+            BusKind::Classic { .. } | BusKind::Fd { .. } => {
                 "is its adapter plugged in? (list interfaces: ip link show type can)".into()
             }
         };
@@ -142,20 +143,40 @@ fn check(bus: &Bus) -> Result<(), OpenError> {
             let kind = facts.kind.unwrap_or_default();
             return Err(OpenError::NotVirtual { bus: name, interface, kind });
         }
-        BusKind::Classic { .. } if is_vcan => return Err(OpenError::NotReal { bus: name, interface }),
-        BusKind::Virtual | BusKind::Classic { .. } => {}
+        BusKind::Virtual | BusKind::Classic { .. } | BusKind::Fd { .. } => {}
     }
     if !facts.is_up {
         return Err(OpenError::Down { command: up_command(bus), interface });
     }
-    match (bus.kind, facts.bitrate_bit_s) {
-        (BusKind::Classic { bitrate_bit_s: declared_bit_s }, Some(actual_bit_s))
-            if declared_bit_s != actual_bit_s =>
-        {
-            Err(OpenError::OtherBitRate { bus: name, interface, declared_bit_s, actual_bit_s })
+    match (bus.kind.bitrate_bit_s(), facts.bitrate_bit_s) {
+        (Some(declared_bit_s), Some(actual_bit_s)) if declared_bit_s != actual_bit_s => {
+            let command = up_command(bus);
+            Err(OpenError::OtherBitRate { bus: name, interface, declared_bit_s, actual_bit_s, command })
         }
         _ => Ok(()),
     }
+}
+
+/// A vcan carries whatever it is given: that a declared bit rate is only modelled must not come as a surprise.
+fn say_what_is_modelled(bus: &Bus, role: LinkRole) {
+    let is_vcan = facts::of(&bus.interface).is_ok_and(|facts| facts.kind.as_deref() == Some("vcan"));
+    if let (true, Some(words)) = (is_vcan, rates_in_words(bus.kind)) {
+        let interface = &bus.interface;
+        match role {
+            LinkRole::Master => tracing::warn!("{interface} has no bit rate; the simulator models {words}"),
+            LinkRole::Servos => tracing::info!("{interface} has no bit rate; {words} is modelled here"),
+        }
+    }
+}
+
+/// "1 Mbit/s", or "1 Mbit/s, 5 Mbit/s in the data phase"; none for a virtual bus.
+pub(super) fn rates_in_words(kind: BusKind) -> Option<String> {
+    let mega = |bit_s: u32| f64::from(bit_s) * 1e-6;
+    let nominal = kind.bitrate_bit_s().map(mega)?;
+    Some(match kind.data_bitrate_bit_s().map(mega) {
+        Some(data) => format!("{nominal} Mbit/s, {data} Mbit/s in the data phase"),
+        None => format!("{nominal} Mbit/s"),
+    })
 }
 
 /// What brings the interface of a bus up.
@@ -166,6 +187,9 @@ fn up_command(bus: &Bus) -> String {
         BusKind::Classic { bitrate_bit_s } => {
             format!("ip link set {interface} up type can bitrate {bitrate_bit_s}")
         }
+        BusKind::Fd { bitrate_bit_s, data_bitrate_bit_s } => format!(
+            "ip link set {interface} up type can bitrate {bitrate_bit_s} dbitrate {data_bitrate_bit_s} fd on"
+        ),
     }
 }
 

@@ -149,7 +149,7 @@ fn second_simulator_on_one_link_is_refused() {
 fn master_on_the_local_link_is_answered_by_all_six_drives() {
     let runtime = Runtime::new("master");
     let process = Process::start(&runtime, &[]);
-    let bus = Bus { name: "arm".into(), interface: "vcan0".into(), kind: BusKind::Virtual };
+    let bus = Bus::new("arm", "vcan0", BusKind::Virtual);
     let mut master = link::open(&bus, LinkChoice::Local, LinkRole::Master, &runtime.0).unwrap();
     let mut answered = [false; 6];
     let mut batch = FrameBatch::new();
