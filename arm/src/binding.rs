@@ -6,6 +6,7 @@ use crate::document::{Node, shown};
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
 use crate::settings::{Bus, BusKind, Protocol, Servo, Traffic};
+use crate::trust;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
@@ -142,6 +143,10 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
         }
         if let (Some(servo), Some(robot)) = (&servo, robot) {
             check_counts(&table, servo, robot);
+            if let Some(joint) = robot.joints.get(servo.joint) {
+                trust::check_reaction(&table, servo, joint);
+                trust::check_feedback(&table, servo, joint);
+            }
         }
         table.done();
         servos.extend(servo);
@@ -209,7 +214,9 @@ fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -
     let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
     let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
     let zero_offset_rad = table.number("zero_offset_rad", &ZERO_RAD);
+    let feedback = trust::read_feedback(table);
     let feedback_range_rad = table.interval("feedback_range_rad", &FEEDBACK_RAD);
+    let reaction = trust::read_reaction(table);
     let limp_is_safe = table.flag("limp_is_safe");
     Some(Servo {
         joint: joint?,
@@ -220,7 +227,9 @@ fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -
         gear_ratio: gear_ratio?,
         counts_per_rev: counts_per_rev?,
         zero_offset_rad: zero_offset_rad?,
+        feedback: feedback?,
         feedback_range_rad: feedback_range_rad?,
+        reaction: reaction?,
         limp_is_safe: limp_is_safe?,
     })
 }

@@ -20,6 +20,7 @@ pub mod runtime;
 pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
+pub mod trust;
 
 pub use bus_load::BusLoad;
 pub use fault::{Fault, Faults};
@@ -29,3 +30,4 @@ pub use runtime::RuntimeError;
 pub use scene::{Obstacle, Scene, Shape};
 pub use settings::{Bus, BusKind, Servo, Settings, Traffic};
 pub use trajectory_file::TrajectoryFile;
+pub use trust::{Feedback, Reaction};

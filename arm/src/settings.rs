@@ -1,7 +1,7 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
 use crate::reader::{Book, Bounds, Table};
-use crate::{Faults, Robot, Scene, binding, consistency};
+use crate::{Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
 
 /// What carries frames.
@@ -108,8 +108,12 @@ pub struct Servo {
     pub counts_per_rev: f64,
     /// Link angle at encoder count 0.
     pub zero_offset_rad: f64,
+    /// What the feedback still knows after the drive was without power.
+    pub feedback: Feedback,
     /// Link angles that the feedback can tell apart.
     pub feedback_range_rad: [f64; 2],
+    /// What the drive does when setpoints stop coming.
+    pub reaction: Reaction,
     /// True when the joint may lose torque without harm (a brake, or no load).
     pub limp_is_safe: bool,
 }

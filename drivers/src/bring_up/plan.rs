@@ -5,12 +5,15 @@ use crate::codec::canopen::{
 use crate::codec::object::{self, Address};
 use crate::codec::sdo::SdoBytes;
 use crate::codec::sdo_client::SdoJob;
+use taustream_arm::Reaction;
 
 /// Period of the heartbeats that drives send, and that this master sends.
 pub const HEARTBEAT_MS: u16 = 100;
 /// Silence after which a node, or the master, counts as lost: three missed heartbeats and some jitter.
 pub const HEARTBEAT_LOST_MS: u16 = 350;
 
+/// Reaction to a lost master: torque off at once (object 0x6007).
+const ON_LOST_MASTER_TORQUE_OFF: i16 = 2;
 /// Reaction to a lost master: quick stop (object 0x6007).
 const ON_LOST_MASTER_QUICK_STOP: i16 = 3;
 /// Quick stop that ends de-energised (object 0x605A).
@@ -59,8 +62,8 @@ pub struct NodePlan {
     pub period_us: u32,
     /// The same as value and power of ten (object 0x60C2).
     pub interpolation: (u8, i8),
-    /// The joint may lose torque without harm.
-    pub limp_is_safe: bool,
+    /// What it is to do when its master is lost.
+    pub reaction: Reaction,
 }
 
 impl NodePlan {
@@ -91,15 +94,26 @@ impl NodePlan {
     }
 
     fn supervise(&self, steps: &mut Steps) {
-        let quick_stop = if self.limp_is_safe { QUICK_STOP_THEN_OFF } else { QUICK_STOP_THEN_HOLD };
+        let lost_master = match self.reaction {
+            Reaction::Hold | Reaction::Ramp => ON_LOST_MASTER_QUICK_STOP,
+            Reaction::Limp => ON_LOST_MASTER_TORQUE_OFF,
+        };
         let consumer = u32::from(MASTER_NODE) << 16 | u32::from(HEARTBEAT_LOST_MS);
         steps.write(object::PRODUCER_HEARTBEAT_MS, SdoBytes::from_u16(HEARTBEAT_MS));
         steps.write(object::CONSUMER_HEARTBEAT, SdoBytes::from_u32(consumer));
-        steps.write(object::ABORT_CONNECTION_OPTION, SdoBytes::from_i16(ON_LOST_MASTER_QUICK_STOP));
+        steps.write(object::ABORT_CONNECTION_OPTION, SdoBytes::from_i16(lost_master));
         steps.write(object::INTERPOLATION_VALUE, SdoBytes::from_u8(self.interpolation.0));
         steps.write(object::INTERPOLATION_EXPONENT, SdoBytes::from_i8(self.interpolation.1));
         steps.write_optional(object::SYNC_PERIOD_US, SdoBytes::from_u32(self.period_us));
-        steps.write_optional(object::QUICK_STOP_OPTION, SdoBytes::from_i16(quick_stop));
+        match self.reaction {
+            // A drive that cannot be told to hold would let a joint fall that may not: it is refused.
+            Reaction::Hold => {
+                steps.write(object::QUICK_STOP_OPTION, SdoBytes::from_i16(QUICK_STOP_THEN_HOLD));
+            }
+            Reaction::Ramp | Reaction::Limp => {
+                steps.write_optional(object::QUICK_STOP_OPTION, SdoBytes::from_i16(QUICK_STOP_THEN_OFF));
+            }
+        }
     }
 }
 

@@ -137,8 +137,8 @@ impl Cia402Driver {
             other_master_at: None,
         };
         for servo in settings.servos.iter().filter(|s| s.bus == bus && s.protocol == Protocol::Cia402) {
-            let limp_is_safe = servo.limp_is_safe;
-            let plan = NodePlan { node: servo.node_id, period_us, interpolation, limp_is_safe };
+            let reaction = servo.reaction;
+            let plan = NodePlan { node: servo.node_id, period_us, interpolation, reaction };
             driver.add(servo, Node::new(plan, patience))?;
         }
         Ok(driver)

@@ -16,17 +16,7 @@ use crate::codec::canopen::{NmtCommand, decode_sync};
 use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, words};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
-
-/// What a drive does when setpoints stop coming.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WatchdogReaction {
-    /// It says so (EMCY 0x8250, warning bit) and holds the last setpoint; it follows again when setpoints return.
-    Hold,
-    /// Fault reaction 0x605E: as shipped a ramp, then no torque.
-    Fault,
-    /// No torque at once, then fault.
-    Limp,
-}
+use taustream_arm::Reaction;
 
 /// What a simulated drive is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +49,9 @@ pub struct DriveParameters {
     pub quick_rad_s2: f64,
     /// Time without setpoints after which the watchdog reacts while energised; 0 is never.
     pub watchdog_ms: u16,
-    /// How it reacts.
-    pub watchdog_reaction: WatchdogReaction,
+    /// How it reacts: `Hold` says so (EMCY 0x8250, warning bit) and holds the last setpoint, following again when
+    /// setpoints return; `Ramp` is the fault reaction 0x605E, as shipped a ramp and then no torque; `Limp` lets go.
+    pub reaction: Reaction,
     /// Time from power-up, or a reset, to the boot-up message.
     pub boot_s: f64,
     /// Step of the simulated mechanics, 10,000 to 1,000,000 ns.

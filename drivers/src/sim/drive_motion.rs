@@ -1,10 +1,11 @@
 //! What a simulated drive does with its motor: commands carried out, faults found, time passed on to the mechanics.
-use super::drive::{Drive, WatchdogReaction};
+use super::drive::Drive;
 use super::power::{Action, Options, PowerState, Slowing};
 use crate::codec::object::MODE_CSP;
 use crate::codec::{NmtState, words};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
+use taustream_arm::Reaction;
 
 /// A ramp has ended when the joint was slower than this for a while: one that only turns round is not at rest.
 const STANDSTILL_RAD_S: f64 = 0.01;
@@ -285,11 +286,11 @@ impl Drive {
 }
 
 /// The value that object 0x2000:02 holds for a reaction.
-pub(super) const fn reaction_code(reaction: WatchdogReaction) -> i64 {
+pub(super) const fn reaction_code(reaction: Reaction) -> i64 {
     match reaction {
-        WatchdogReaction::Hold => 0,
-        WatchdogReaction::Fault => 1,
-        WatchdogReaction::Limp => 2,
+        Reaction::Hold => 0,
+        Reaction::Ramp => 1,
+        Reaction::Limp => 2,
     }
 }
 

@@ -72,7 +72,7 @@ impl Drive {
         let thousand = |value: f64| register(value * 1000.0, 1, i32::MAX);
         for (index, sub, value) in [
             (0x2000, 1, i64::from(parameters.watchdog_ms)),
-            (0x2000, 2, reaction_code(parameters.watchdog_reaction)),
+            (0x2000, 2, reaction_code(parameters.reaction)),
             (0x6065, 0, register(window, 0, i32::MAX)),
             (0x6066, 0, i64::from(parameters.following_timeout_ms)),
             (0x6076, 0, register(parameters.plant.torque_nm_max * 1000.0, 0, i32::MAX)),

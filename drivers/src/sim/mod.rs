@@ -24,7 +24,7 @@ pub mod serve;
 pub mod settings;
 
 pub use controller::LoopParameters;
-pub use drive::{Disturbance, Drive, DriveParameters, WatchdogReaction};
+pub use drive::{Disturbance, Drive, DriveParameters};
 pub use faults::{FaultOrder, Order};
 pub use plant::PlantParameters;
 pub use power::PowerState;

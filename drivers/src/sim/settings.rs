@@ -3,7 +3,7 @@
 //! Every key has a default, because nothing here moves metal. A key for joints takes one value for all of them or one
 //! a joint, base to tip. Every fault of the section is reported at once.
 use super::controller::LoopParameters;
-use super::drive::{DriveParameters, WatchdogReaction};
+use super::drive::DriveParameters;
 use super::plant::PlantParameters;
 use std::cell::RefCell;
 use std::path::Path;
@@ -45,7 +45,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
 }
 
 /// Every key, for unknown ones to be found, and for their neighbours to be told.
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 22] = [
     "start_rad",
     "inertia_kg_m2",
     "viscous_nm_s_rad",
@@ -66,7 +66,6 @@ const KEYS: [&str; 23] = [
     "slow_rad_s2",
     "quick_stop_rad_s2",
     "watchdog_ms",
-    "watchdog_reaction",
     "boot_ms",
     "step_us",
 ];
@@ -113,7 +112,7 @@ impl Section<'_> {
                 1e-3..=1e4,
             ),
             watchdog_ms: self.whole("watchdog_ms", at, settings.cycle.drive_watchdog_ms, 0..=65_535),
-            watchdog_reaction: self.reaction(),
+            reaction: servo.reaction,
             boot_s: self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3,
             step_ns: u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000,
         };
@@ -149,20 +148,6 @@ impl Section<'_> {
             velocity_bandwidth_rad_s: self.number("velocity_bandwidth_rad_s", at, 400.0, 10.0..=600.0),
             integral_time_s: self.number("integral_time_ms", at, 20.0, 5.0..=1000.0) * 1e-3,
             torque_lag_s: self.number("torque_lag_ms", at, 0.3, 0.0..=0.5) * 1e-3,
-        }
-    }
-
-    fn reaction(&self) -> WatchdogReaction {
-        const KEY: &str = "watchdog_reaction";
-        match self.table.get(KEY) {
-            None => WatchdogReaction::Fault,
-            Some(Value::String(word)) if word == "fault" => WatchdogReaction::Fault,
-            Some(Value::String(word)) if word == "hold" => WatchdogReaction::Hold,
-            Some(Value::String(word)) if word == "limp" => WatchdogReaction::Limp,
-            Some(other) => {
-                self.fault(KEY, &other.to_string(), "\"fault\", \"hold\" or \"limp\"");
-                WatchdogReaction::Fault
-            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! Bring-up of drives: what is asked, what is refused, and what an energised drive keeps.
 use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, frame, hex, settings};
+use taustream_arm::Reaction;
 use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
 
@@ -57,17 +58,43 @@ fn bring_up_of_one_node_sends_the_golden_frames() {
     assert_eq!(seen, golden);
 }
 
-/// Option code 6 of 0x605A stays energised after a quick stop, 2 switches off: that is only for joints that may go limp.
+/// What each declared reaction writes: option 6 of 0x605A stays energised after a quick stop, 2 switches off; option 3
+/// of 0x6007 is quick stop, 2 torque off.
 #[test]
-fn bring_up_of_a_joint_that_may_go_limp_lets_a_quick_stop_end_without_torque() {
-    let mut safe = settings(2);
-    safe.servos[1].limp_is_safe = true;
-    let mut bench = Bench::with(safe);
+fn bring_up_configures_the_declared_reaction() {
+    let mut settings = settings(3);
+    settings.servos[1].reaction = Reaction::Ramp;
+    settings.servos[2].reaction = Reaction::Limp;
+    let mut bench = Bench::with(settings);
     bench.until(DriveState::Disabled, 2_000);
-    let quick_stops: Vec<String> = (bench.drives.iter())
-        .flat_map(|drive| drive.seen.iter().map(hex).filter(|line| line.contains(" 2B 5A 60 ")))
-        .collect();
-    assert_eq!(quick_stops, ["601 2B 5A 60 00 06 00 00 00", "602 2B 5A 60 00 02 00 00 00"]);
+    let written = |object: &str| -> Vec<String> {
+        let lines = bench.drives.iter().flat_map(|drive| drive.seen.iter().map(hex));
+        lines.filter(|line| line.contains(object)).collect()
+    };
+    assert_eq!(
+        written(" 2B 5A 60 "),
+        ["601 2B 5A 60 00 06 00 00 00", "602 2B 5A 60 00 02 00 00 00", "603 2B 5A 60 00 02 00 00 00"]
+    );
+    assert_eq!(
+        written(" 2B 07 60 "),
+        ["601 2B 07 60 00 03 00 00 00", "602 2B 07 60 00 03 00 00 00", "603 2B 07 60 00 02 00 00 00"]
+    );
+}
+
+/// A joint that must hold is not left to a drive that cannot be told to; one that may fall is.
+#[test]
+fn bring_up_of_a_drive_without_quick_stop_option_is_refused_where_it_must_hold() {
+    let mut settings = settings(2);
+    settings.servos[1].reaction = Reaction::Ramp;
+    let mut bench = Bench::with(settings);
+    for drive in &mut bench.drives {
+        drive.refused.insert((0x605A, 0), 0x0602_0000);
+    }
+    for _ in 0..2_000 {
+        bench.step();
+    }
+    assert_eq!(bench.states(), [DriveState::Refused, DriveState::Disabled]);
+    assert_eq!(bench.driver.status(0).refused_object, 0x60_5A00);
 }
 
 #[test]
@@ -90,7 +117,7 @@ fn bring_up_of_six_nodes_keeps_one_sdo_frame_a_node_and_cycle() {
 fn bring_up_takes_segmented_answers_and_missing_optional_objects() {
     let mut bench = Bench::new(1);
     bench.drives[0].segments = true;
-    for object in [(0x1401, 1), (0x1802, 1), (0x1803, 1), (0x1006, 0), (0x605A, 0)] {
+    for object in [(0x1401, 1), (0x1802, 1), (0x1803, 1), (0x1006, 0)] {
         bench.drives[0].refused.insert(object, 0x0602_0000);
     }
     bench.until(DriveState::Disabled, 2_000);

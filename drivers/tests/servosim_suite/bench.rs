@@ -1,7 +1,5 @@
 //! A drive on a bench, with frames written out by hand, byte by byte, so that a mistake in the shared encoders shows.
-use taustream_drivers::sim::{
-    Drive, DriveParameters, LoopParameters, PlantParameters, PowerState, WatchdogReaction,
-};
+use taustream_drivers::sim::{Drive, DriveParameters, LoopParameters, PlantParameters, PowerState};
 use taustream_drivers::{CanFrame, CanId, Nanos};
 
 pub(crate) const NODE: u8 = 3;
@@ -41,7 +39,7 @@ pub(crate) fn parameters() -> DriveParameters {
         slow_rad_s2: 15.0,
         quick_rad_s2: 30.0,
         watchdog_ms: 100,
-        watchdog_reaction: WatchdogReaction::Fault,
+        reaction: taustream_arm::Reaction::Ramp,
         boot_s: 0.02,
         step_ns: 250_000,
     }

@@ -118,7 +118,7 @@ fn settings_with(section: &str) -> Settings {
 fn every_fault_of_the_simulator_section_is_reported_at_once() {
     let settings = settings_with(
         "inertia_kg_m2 = 0\ngravity_nm = [1, 2]\nbrake = \"yes\"\nwatchdog_ms = 1.5\n\
-         watchdog_reaction = \"explode\"\ncolour = 3\ncoulomb_nm = [1, 1, -1, 1, nan, 1]\nstep_us = 5000",
+         watchdog_reaction = \"limp\"\ncolour = 3\ncoulomb_nm = [1, 1, -1, 1, nan, 1]\nstep_us = 5000",
     );
     let text = drives(&settings, None).unwrap_err().to_string();
     for words in [
@@ -126,7 +126,8 @@ fn every_fault_of_the_simulator_section_is_reported_at_once() {
         "simulator.gravity_nm = a list of 2",
         "simulator.brake = \"yes\"",
         "simulator.watchdog_ms = 1.5",
-        "simulator.watchdog_reaction = \"explode\"",
+        // The servo's `reaction` is the one truth.
+        "simulator.watchdog_reaction = \"limp\"",
         "simulator.colour = 3",
         "simulator.coulomb_nm[2] = -1",
         "simulator.coulomb_nm[4] = nan",

@@ -1,6 +1,7 @@
 //! What the motor does: tracking, steps, limits, gravity, watchdog.
 use super::bench::{Bench, COUNTS_PER_RAD, START_RAD, ZERO_RAD, counts, enabled, parameters};
-use taustream_drivers::sim::{Disturbance, DriveParameters, PlantParameters, PowerState, WatchdogReaction};
+use taustream_arm::Reaction;
+use taustream_drivers::sim::{Disturbance, DriveParameters, PlantParameters, PowerState};
 
 #[test]
 fn drive_that_is_enabled_follows_a_motion_within_a_milliradian() {
@@ -172,11 +173,11 @@ fn brake_that_is_still_closed_keeps_bit_12_back() {
 #[test]
 fn watchdog_reacts_as_set_when_setpoints_end() {
     for (reaction, end, emergency) in [
-        (WatchdogReaction::Fault, PowerState::Fault, 1),
-        (WatchdogReaction::Limp, PowerState::Fault, 1),
-        (WatchdogReaction::Hold, PowerState::OperationEnabled, 1),
+        (Reaction::Ramp, PowerState::Fault, 1),
+        (Reaction::Limp, PowerState::Fault, 1),
+        (Reaction::Hold, PowerState::OperationEnabled, 1),
     ] {
-        let mut bench = enabled(DriveParameters { watchdog_reaction: reaction, ..parameters() });
+        let mut bench = enabled(DriveParameters { reaction, ..parameters() });
         for tick in 0..300 {
             bench.cycle(0x0F, counts(START_RAD + f64::from(tick) * 1e-3));
         }
@@ -193,7 +194,7 @@ fn watchdog_reacts_as_set_when_setpoints_end() {
         assert_eq!(word & 0x1000, 0, "{reaction:?}: follows again before a new setpoint was applied");
         bench.cycle(0x0F, counts(bench.drive.position_rad()));
         let (word, _) = bench.cycle(0x0F, counts(bench.drive.position_rad()));
-        assert_eq!(word & 0x1000 != 0, reaction == WatchdogReaction::Hold, "{reaction:?}: {word:04X}");
+        assert_eq!(word & 0x1000 != 0, reaction == Reaction::Hold, "{reaction:?}: {word:04X}");
     }
 }
 
