@@ -168,7 +168,14 @@ impl Wire {
     }
 
     fn refused(&self, what: &'static str, why: &dyn std::fmt::Debug) -> ServiceError {
-        ServiceError::Refused { arm: self.arm.clone(), what, why: format!("{why:?}") }
+        let mut why = format!("{why:?}");
+        // The one refusal that users bring about by themselves, and can mend.
+        if why.contains("ExceedsMaxSupportedSubscribers") {
+            why = format!(
+                "all {SUBSCRIBERS_MAX} places for readers are taken; end one, such as a `taustream watch`"
+            );
+        }
+        ServiceError::Refused { arm: self.arm.clone(), what, why }
     }
 }
 

@@ -10,9 +10,10 @@
 //! energised, and reports the commanded pose as measured. The arm swings along a trajectory all the time, so sampling,
 //! guard, encoding and supervision do their full work; decoding of answers is not in the figures, since nobody answers.
 mod peers;
+mod stages;
 
 use crate::buses::{Bus, Buses};
-use crate::cycle::{Core, Next, NoProbe, Probe, Stage, run_cycle};
+use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
 use crate::facts::Asked;
 use crate::intake::{self, Desk};
 use crate::rt;
@@ -20,6 +21,8 @@ use crate::tick::Schedule;
 use hdrhistogram::Histogram;
 use peers::Peers;
 use serde::Serialize;
+use stages::StageClock;
+pub use stages::StageTime;
 use taustream_arm::Settings;
 use taustream_drivers::codec::canopen::sync;
 use taustream_drivers::codec::cia402::{counts_from_rad, encode_rpdo};
@@ -32,6 +35,8 @@ use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
 /// Cycles at the start of each slice that do not count: caches fill, and a slice begins at a new grid.
 const WARM_UP: u64 = 20;
+/// Slices in which stages are timed, streamer and bare in turns.
+const STAGE_SLICES: u64 = 4;
 /// Cycles within which the arm must be ready.
 const READY_MAX: u64 = 2_000;
 
@@ -90,15 +95,6 @@ pub struct Quantiles {
     pub max_ns: u64,
 }
 
-/// One stage's share of the cycle.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct StageTime {
-    /// Its word.
-    pub stage: &'static str,
-    /// Its times, a clock read included.
-    pub time: Quantiles,
-}
-
 /// What was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct CycleBench {
@@ -126,6 +122,8 @@ pub struct CycleBench {
     pub cycle_p99_ratio: f64,
     /// Deadlines skipped by either loop.
     pub skipped: u64,
+    /// What one clock read takes; every stage's times include one.
+    pub clock_read: Quantiles,
     /// Time of every stage, measured apart: the clock reads in between cost time themselves.
     pub stages: Vec<StageTime>,
 }
@@ -218,23 +216,6 @@ impl Times {
             self.lateness.saturating_record(lateness_ns);
             self.cycle.saturating_record(time_ns);
         }
-    }
-}
-
-/// Times every stage by a clock read after it.
-struct StageClock {
-    last: Nanos,
-    stages: Vec<Histogram<u64>>,
-}
-
-impl Probe for StageClock {
-    fn ended(&mut self, stage: Stage) {
-        let now = rt::now();
-        let index = Stage::ALL.iter().position(|s| *s == stage);
-        if let Some(times) = index.and_then(|i| self.stages.get_mut(i)) {
-            times.saturating_record(now.0.saturating_sub(self.last.0));
-        }
-        self.last = now;
     }
 }
 
@@ -362,17 +343,32 @@ impl Bench {
         }
     }
 
-    fn stage_slice(&mut self, period_us: u32, cycles: u64) -> Result<Vec<StageTime>, BenchError> {
-        let stages: Result<Vec<_>, _> = Stage::ALL.iter().map(|_| histogram()).collect();
-        let mut clock = StageClock { last: Nanos(0), stages: stages? };
-        let mut schedule = Schedule::starting_after(rt::now(), period_us);
-        for _ in 0..cycles {
-            rt::sleep_until(schedule.deadline());
-            clock.last = rt::now();
-            self.cycle(&mut schedule, &mut clock);
+    /// Like the two slices above, with a clock read after every stage and every bare call.
+    fn stage_slices(&mut self, period_us: u32, cycles: u64) -> Result<StageClock, BenchError> {
+        let mut clock = StageClock::new()?;
+        for slice in 0..STAGE_SLICES {
+            let mut schedule = Schedule::starting_after(rt::now(), period_us);
+            clock.begin_slice();
+            for _ in 0..(cycles / STAGE_SLICES).max(2 * WARM_UP) {
+                rt::sleep_until(schedule.deadline());
+                clock.begin_cycle();
+                if slice % 2 == 0 {
+                    self.cycle(&mut schedule, &mut clock);
+                } else {
+                    for link in self.core.links_mut() {
+                        link.send(&self.frames);
+                    }
+                    clock.sent();
+                    for link in self.core.links_mut() {
+                        link.receive(&mut self.batch);
+                    }
+                    clock.received();
+                    schedule.wake(rt::now());
+                }
+            }
+            self.empty_queues();
         }
-        let named = Stage::ALL.iter().zip(&clock.stages);
-        Ok(named.map(|(stage, times)| StageTime { stage: stage.word(), time: quantiles(times) }).collect())
+        Ok(clock)
     }
 
     fn empty_queues(&self) {
@@ -397,7 +393,7 @@ impl Bench {
             }
         }
         let skipped = self.skipped;
-        let stages = self.stage_slice(period_us, cycles)?;
+        let clock = self.stage_slices(period_us, STAGE_SLICES * cycles / 2)?;
         let phase = self.core.supervisor().phase();
         if !matches!(phase, Phase::Moving | Phase::Holding) {
             return Err(BenchError::NotMoving(phase.word()));
@@ -418,7 +414,8 @@ impl Bench {
             cycle_p50_ratio: ratio(streamer_cycle.p50_ns, bare_cycle.p50_ns),
             cycle_p99_ratio: ratio(streamer_cycle.p99_ns, bare_cycle.p99_ns),
             skipped,
-            stages,
+            clock_read: clock.clock_read(),
+            stages: clock.times(),
         })
     }
 }

@@ -18,6 +18,13 @@ fn bench_counts_every_slice_and_stage() {
         assert!(result.streamer_cycle.count >= 190 && result.bare_cycle.count >= 190, "{result:?}");
         assert_eq!(result.stages.len(), 9);
         assert!(result.stages.iter().all(|s| s.time.count > 0 && s.time.p50_ns > 0), "{result:?}");
+        let whole: f64 = result.stages.iter().map(|s| s.share_percent).sum();
+        assert!((whole - 100.0).abs() < 1e-6, "the stages are {whole} % of the cycle: {result:?}");
+        for stage in &result.stages {
+            let has_calls = matches!(stage.stage, "send" | "receive");
+            assert_eq!(stage.bare.is_some_and(|b| b.count > 0), has_calls, "{stage:?}");
+        }
+        assert!(result.clock_read.count > 0);
         assert!(result.cycle_p50_ratio.is_finite() && result.lateness_p99_ratio > 0.0);
     }
 }

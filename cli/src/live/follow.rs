@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::words::fault_sentence;
 use serde::Serialize;
+use std::fmt;
 use std::thread;
 use std::time::Duration;
 use taustream_messages::{Phase, Report};
@@ -21,6 +22,13 @@ pub(crate) struct Executed {
     pub(crate) executed_s: f64,
     /// Largest tracking error of any joint while it moved.
     pub(crate) tracking_error_rad_max: f64,
+}
+
+impl fmt::Display for Executed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let error_mrad = self.tracking_error_rad_max * 1e3;
+        write!(f, "executed      in {:.3} s, largest tracking error {error_mrad:.3} mrad", self.executed_s)
+    }
 }
 
 /// Waits until the motion has ended; `see` gets every report on the way.

@@ -45,12 +45,7 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.planned)?;
         if let Some(e) = &self.executed {
-            let error_mrad = e.tracking_error_rad_max * 1e3;
-            write!(
-                f,
-                "\nexecuted      in {:.3} s, largest tracking error {error_mrad:.3} mrad",
-                e.executed_s
-            )?;
+            write!(f, "\n{e}")?;
         }
         Ok(())
     }

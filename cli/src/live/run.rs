@@ -47,12 +47,7 @@ impl fmt::Display for Answer {
             self.trajectory_id, self.generation, self.from_s, self.tick
         )?;
         if let Some(e) = &self.executed {
-            let error_mrad = e.tracking_error_rad_max * 1e3;
-            write!(
-                f,
-                "\nexecuted      in {:.3} s, largest tracking error {error_mrad:.3} mrad",
-                e.executed_s
-            )?;
+            write!(f, "\n{e}")?;
         }
         Ok(())
     }

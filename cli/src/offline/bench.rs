@@ -47,20 +47,51 @@ impl fmt::Display for Answer {
         row(f, "wake-up lateness, bare", &b.bare_lateness)?;
         row(f, "whole cycle, streamer", &b.streamer_cycle)?;
         row(f, "same calls, bare", &b.bare_cycle)?;
-        for stage in &b.stages {
-            row(f, &format!("  stage {}", stage.stage), &stage.time)?;
-        }
         writeln!(f, "ratios, streamer over bare: lateness p99 {:.3}", b.lateness_p99_ratio)?;
-        write!(
+        writeln!(
             f,
             "                            cycle p50 {:.3}, p99 {:.3}",
             b.cycle_p50_ratio, b.cycle_p99_ratio
-        )
+        )?;
+        write!(f, "{}", StageTable(b))
     }
 }
 
+/// The stages of the cycle beside the same system calls in the bare loop.
+struct StageTable<'a>(&'a CycleBench);
+
+impl fmt::Display for StageTable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let read_ns = self.0.clock_read.p50_ns;
+        writeln!(
+            f,
+            "stages, in slices of their own; each time includes one clock read, which takes {read_ns} ns (p50):"
+        )?;
+        writeln!(
+            f,
+            "  stage       p50 (us)  p99 (us)  max (us)  of the cycle   bare loop: p50 (us)  p99 (us)  max (us)"
+        )?;
+        for s in &self.0.stages {
+            let (p50, p99, max) = (us(s.time.p50_ns), us(s.time.p99_ns), us(s.time.max_ns));
+            write!(f, "  {:<10} {p50:>9.2} {p99:>9.2} {max:>9.2} {:>11.1} %", s.stage, s.share_percent)?;
+            match s.bare {
+                Some(b) => {
+                    let (p50, p99, max) = (us(b.p50_ns), us(b.p99_ns), us(b.max_ns));
+                    writeln!(f, "   {p50:>19.2} {p99:>9.2} {max:>9.2}")?;
+                }
+                None => writeln!(f, "   {:>19} {:>9} {:>9}", "-", "-", "-")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Nanoseconds as microseconds.
+fn us(ns: u64) -> f64 {
+    std::time::Duration::from_nanos(ns).as_secs_f64() * 1e6
+}
+
 fn row(f: &mut fmt::Formatter<'_>, name: &str, q: &Quantiles) -> fmt::Result {
-    let us = |ns: u64| std::time::Duration::from_nanos(ns).as_secs_f64() * 1e6;
     let (p50, p99, p999, max) = (us(q.p50_ns), us(q.p99_ns), us(q.p999_ns), us(q.max_ns));
     writeln!(f, "{name:<27} {p50:>9.2}  {p99:>9.2}  {p999:>10.2}  {max:>10.2} {:>10}", q.count)
 }

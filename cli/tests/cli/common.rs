@@ -1,5 +1,6 @@
 //! Runs the real `taustream` as a user would, in a directory of its own.
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests, outside of any #[test] function")]
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,7 @@ pub(crate) fn config() -> PathBuf {
 /// A directory that goes with the test.
 pub(crate) struct Scratch {
     pub(crate) dir: PathBuf,
+    arms: RefCell<Vec<String>>,
 }
 
 impl Scratch {
@@ -25,7 +27,7 @@ impl Scratch {
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let dir = std::env::temp_dir().join(format!("taustream-cli-{}-{number}", std::process::id()));
         fs::create_dir_all(&dir).expect("a scratch directory");
-        Self { dir }
+        Self { dir, arms: RefCell::default() }
     }
 
     /// Writes a file; its name.
@@ -44,6 +46,7 @@ impl Scratch {
 
     /// Settings of an arm that nobody else has: vcan6 under another name.
     pub(crate) fn settings(&self, arm: &str) -> PathBuf {
+        self.arms.borrow_mut().push(arm.to_owned());
         let text = fs::read_to_string(config().join("settings/vcan6.toml")).expect("shipped settings");
         let dir = config();
         let text = text
@@ -73,6 +76,15 @@ impl Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         let _left = fs::remove_dir_all(&self.dir);
+        // iceoryx2 leaves a small file of every arm that somebody asked for.
+        for arm in self.arms.borrow().iter() {
+            let mine = format!(".{arm}.");
+            for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+                if entry.file_name().to_string_lossy().contains(&mine) {
+                    let _left = fs::remove_file(entry.path());
+                }
+            }
+        }
     }
 }
 
