@@ -3,12 +3,13 @@
 //! A wrong sign, gear or zero sends a joint the wrong way at full speed, so none of them has a default, and every
 //! angle that the joint may be told must be a position that the servo can be told.
 use crate::document::{Node, shown};
+use crate::identifiers::{self, Use};
+use crate::protocol;
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
-use crate::settings::{Bus, BusKind, Protocol, Servo, Traffic};
+use crate::settings::{Bus, BusKind, Servo, Traffic};
 use crate::trust;
 use std::collections::BTreeSet;
-use std::f64::consts::TAU;
 
 /// Longest interface name of Linux (IFNAMSIZ without its closing zero).
 const INTERFACE_BYTES_MAX: usize = 15;
@@ -18,9 +19,6 @@ const BITRATE_BIT_S: [i64; 2] = [10_000, 1_000_000];
 const DATA_BITRATE_BIT_S_MAX: i64 = 8_000_000;
 /// Slower than a tenth of the cycle, supervision would look at one answer many times over.
 const EVERY: [i64; 2] = [1, 10];
-const NODE_ID: [i64; 2] = [1, 127];
-const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
-const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
 const ZERO_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const FEEDBACK_RAD: Bounds = Bounds::within(-1e6, 1e6, "rad");
 
@@ -128,6 +126,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
     let tables = top.tables("servo");
     let mut bound_joints = BTreeSet::new();
     let mut nodes = BTreeSet::new();
+    let mut uses = Vec::new();
     // Buses that carry a servo.
     let mut busy = BTreeSet::new();
     let mut servos = Vec::new();
@@ -136,14 +135,15 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
         let bus = read_bus(&mut table, buses);
         let servo = read_servo(&mut table, joint, bus);
         busy.extend(bus);
-        if let (Some(bus), Some(id)) = (bus, servo.as_ref().map(|servo| servo.node_id))
-            && !nodes.insert((bus, id))
-        {
-            table.fault("node_id", &id.to_string(), "each node id once on a bus: two servos would answer");
-        }
-        if let (Some(servo), Some(robot)) = (&servo, robot) {
-            check_counts(&table, servo, robot);
-            if let Some(joint) = robot.joints.get(servo.joint) {
+        if let Some(servo) = &servo {
+            if nodes.insert((servo.bus, servo.node_id)) {
+                check_identifiers(&table, servo, robot, &mut uses);
+            } else {
+                let id = servo.node_id.to_string();
+                table.fault("node_id", &id, "each node id once on a bus: two servos would answer");
+            }
+            if let Some(joint) = robot.and_then(|robot| robot.joints.get(servo.joint)) {
+                protocol::check_joint(&table, &servo.protocol, joint, [servo.sign, servo.zero_offset_rad]);
                 trust::check_reaction(&table, servo, joint);
                 trust::check_feedback(&table, servo, joint);
             }
@@ -208,11 +208,8 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
 
 /// Nothing here has a default: each of these moves metal, or says how it falls.
 fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -> Option<Servo> {
-    let node_id = table.integer("node_id", NODE_ID[0], NODE_ID[1]);
-    let protocol = read_protocol(table);
+    let (node_id, protocol) = protocol::read(table);
     let sign = table.need("sign", SIGN_WORDS).and_then(|node| sign_of(table, &node));
-    let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
-    let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
     let zero_offset_rad = table.number("zero_offset_rad", &ZERO_RAD);
     let feedback = trust::read_feedback(table);
     let feedback_range_rad = table.interval("feedback_range_rad", &FEEDBACK_RAD);
@@ -221,17 +218,44 @@ fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -
     Some(Servo {
         joint: joint?,
         bus: bus?,
-        node_id: u8::try_from(node_id?).ok()?,
+        node_id: node_id?,
         protocol: protocol?,
         sign: sign?,
-        gear_ratio: gear_ratio?,
-        counts_per_rev: counts_per_rev?,
         zero_offset_rad: zero_offset_rad?,
         feedback: feedback?,
         feedback_range_rad: feedback_range_rad?,
         reaction: reaction?,
         limp_is_safe: limp_is_safe?,
     })
+}
+
+/// An identifier in use, by joint and bus.
+struct Taken {
+    bus: usize,
+    joint: usize,
+    by: Use,
+}
+
+/// Holds every identifier of a servo against those of the servos before it, and against its own.
+fn check_identifiers(table: &Table<'_>, servo: &Servo, robot: Option<&Robot>, taken: &mut Vec<Taken>) {
+    let mut clashed = false;
+    for mine in identifiers::of(servo.node_id, &servo.protocol) {
+        let clash = taken.iter().find(|other| other.bus == servo.bus && other.by.clashes(&mine));
+        let Some(other) = clash else {
+            taken.push(Taken { bus: servo.bus, joint: servo.joint, by: mine });
+            continue;
+        };
+        // One sentence a servo: another id mends all of them.
+        if !clashed {
+            clashed = true;
+            let joint = robot.and_then(|robot| robot.joints.get(other.joint));
+            let name = joint.map_or_else(|| format!("{}", other.joint), |joint| joint.name.clone());
+            let value = format!("identifier 0x{:03X} for {}", mine.id, mine.what);
+            let expected =
+                format!("an identifier of its own on the bus: joint {name} has it for {}", other.by.what);
+            table.fault(mine.key, &value, &expected);
+        }
+    }
 }
 
 const SIGN_WORDS: &str = "1 or -1: the servo's direction against the link's";
@@ -244,35 +268,6 @@ fn sign_of(table: &Table<'_>, node: &Node) -> Option<f64> {
         other => {
             table.fault("sign", other, SIGN_WORDS);
             None
-        }
-    }
-}
-
-fn read_protocol(table: &mut Table<'_>) -> Option<Protocol> {
-    let expected = "\"cia402\" (CANopen CiA 402, cyclic synchronous position)";
-    let name = table.text("protocol", expected)?;
-    if name == "cia402" {
-        return Some(Protocol::Cia402);
-    }
-    table.fault("protocol", &shown(&name), expected);
-    None
-}
-
-/// Both ends of the joint's range as a CiA 402 target position (0x607A), which is an i32.
-fn check_counts(table: &Table<'_>, servo: &Servo, robot: &Robot) {
-    let Some(joint) = robot.joints.get(servo.joint) else { return };
-    let counts_per_rad = servo.sign * servo.gear_ratio * servo.counts_per_rev / TAU;
-    for position_rad in joint.limits.position_rad {
-        // The same arithmetic as the codec's; rounding moves it by half a count at most.
-        let counts = (position_rad - servo.zero_offset_rad) * counts_per_rad;
-        if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts.round()) {
-            let value = format!("{:?}", servo.counts_per_rev);
-            let expected = format!(
-                "counts that fit 32 bits: joint {} at {position_rad} rad would be {counts:.0} counts",
-                joint.name
-            );
-            table.fault("counts_per_rev", &value, &expected);
-            return;
         }
     }
 }

@@ -5,7 +5,8 @@
 //!
 //! Source: Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN) schedulability analysis: refuted, revisited
 //! and revised", Real-Time Systems 35, 2007, equation 1 (11-bit identifiers).
-use crate::settings::{BusKind, Protocol, Settings};
+use crate::protocol::Protocol;
+use crate::settings::{BusKind, Settings};
 
 /// Above this, settings are refused: the cycle's frames do not fit into the cycle.
 pub const REFUSED_PERCENT: f64 = 100.0;
@@ -14,6 +15,8 @@ pub const WARNED_PERCENT: f64 = 80.0;
 
 /// Control or status word and a 32-bit position.
 const CIA402_PDO_BYTES: u32 = 6;
+/// Every command and every feedback.
+const DAMIAO_BYTES: u32 = 8;
 
 /// The load of one bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,10 +35,13 @@ impl Settings {
     pub fn bus_load(&self, bus: usize) -> BusLoad {
         let mine = self.servos.iter().filter(|servo| servo.bus == bus);
         let bits = mine.clone().map(|servo| match servo.protocol {
-            Protocol::Cia402 => 2 * frame_bits(CIA402_PDO_BYTES),
+            Protocol::Cia402(_) => 2 * frame_bits(CIA402_PDO_BYTES),
+            Protocol::Damiao(_) => 2 * frame_bits(DAMIAO_BYTES),
         });
+        let sync = mine.clone().any(|servo| servo.protocol.as_cia402().is_some());
+        let sync_bits = if sync { frame_bits(0) } else { 0 };
+        let cycle_bits = bits.fold(sync_bits, u32::saturating_add);
         let servos = mine.count();
-        let cycle_bits = if servos == 0 { 0 } else { bits.fold(frame_bits(0), u32::saturating_add) };
         let cycle_s = f64::from(self.cycle.period_us) * 1e-6;
         let percent = match self.buses.get(bus).map(|bus| bus.kind) {
             Some(BusKind::Classic { bitrate_bit_s } | BusKind::Fd { bitrate_bit_s, .. }) => {

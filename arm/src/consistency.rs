@@ -59,6 +59,20 @@ pub(crate) fn check_jump(book: &Book, settings: &Settings) {
     }
 }
 
+/// A motor that lets go before the streamer counts it as gone would be found limp in the middle of a motion.
+pub(crate) fn check_watchdogs(book: &Book, settings: &Settings) {
+    let counted_ms = settings.cycle.drive_watchdog_ms;
+    for (i, servo) in settings.servos.iter().enumerate() {
+        let Some(damiao) = servo.protocol.as_damiao() else { continue };
+        if damiao.watchdog_ms < counted_ms {
+            let expected = format!(
+                "at least cycle.drive_watchdog_ms = {counted_ms}: until then the streamer counts on the motor"
+            );
+            book.add(None, &format!("servo[{i}].watchdog_ms"), &damiao.watchdog_ms.to_string(), &expected);
+        }
+    }
+}
+
 /// A bus that its own cycle does not fit on would lose setpoints from the first second.
 pub(crate) fn check_loads(book: &Book, settings: &Settings) {
     for (i, bus) in settings.buses.iter().enumerate() {

@@ -1,5 +1,6 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
+use crate::protocol::Protocol;
 use crate::reader::{Book, Bounds, Table};
 use crate::{Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
@@ -82,13 +83,6 @@ impl Bus {
     }
 }
 
-/// Which protocol a servo speaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Protocol {
-    /// CANopen CiA 402, cyclic synchronous position.
-    Cia402,
-}
-
 /// One servo: the binding of a joint to a node on a bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Servo {
@@ -96,17 +90,13 @@ pub struct Servo {
     pub joint: usize,
     /// Index into [`Settings::buses`].
     pub bus: usize,
-    /// Node id, 1 to 127.
+    /// Node id: 1 to 127 in CANopen, 1 to 15 of a Damiao motor (`ESC_ID`).
     pub node_id: u8,
-    /// Its protocol.
+    /// Its protocol, with what is the protocol's own.
     pub protocol: Protocol,
     /// +1.0 or -1.0: motor direction against link direction.
     pub sign: f64,
-    /// Motor revolutions a link revolution.
-    pub gear_ratio: f64,
-    /// Encoder counts a motor revolution.
-    pub counts_per_rev: f64,
-    /// Link angle at encoder count 0.
+    /// Link angle where the servo says 0.
     pub zero_offset_rad: f64,
     /// What the feedback still knows after the drive was without power.
     pub feedback: Feedback,
@@ -251,6 +241,7 @@ impl Settings {
             simulator,
         };
         consistency::check_jump(book, &settings);
+        consistency::check_watchdogs(book, &settings);
         consistency::check_loads(book, &settings);
         Some(settings)
     }

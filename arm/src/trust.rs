@@ -108,11 +108,19 @@ pub(crate) fn read_feedback(table: &mut Table<'_>) -> Option<Feedback> {
 
 /// Arms fall when torque goes: a reaction that ends without torque is taken only where somebody says that it may.
 pub(crate) fn check_reaction(table: &Table<'_>, servo: &Servo, joint: &RobotJoint) {
+    let known = servo.protocol.reactions();
+    if !known.contains(&servo.reaction) {
+        let names: Vec<String> = known.iter().map(|reaction| format!("{:?}", reaction.word())).collect();
+        let expected = format!("{}: a {} servo knows no other", names.join(" or "), servo.protocol.name());
+        table.fault("reaction", &shown(servo.reaction.word()), &expected);
+        return;
+    }
     if !servo.reaction.ends_limp() || servo.limp_is_safe {
         return;
     }
+    let hold = if known.contains(&Reaction::Hold) { "\"hold\"" } else { "a servo that can hold" };
     let expected = format!(
-        "\"hold\", as joint {} may not lose its torque (limp_is_safe = false) and with this reaction it {}; or fit a \
+        "{hold}, as joint {} may not lose its torque (limp_is_safe = false) and with this reaction it {}; or fit a \
          brake or a counterweight and state limp_is_safe = true",
         joint.name,
         servo.reaction.sentence()
@@ -130,7 +138,7 @@ pub(crate) fn check_feedback(table: &Table<'_>, servo: &Servo, joint: &RobotJoin
         "a range that holds [{joint_low:?}, {joint_high:?}] of joint {}, or feedback = \"wraps\" with the angles that \
          the feedback tells apart (a single turn of the motor is {:.6} rad of the link)",
         joint.name,
-        TAU / servo.gear_ratio
+        TAU / servo.protocol.gear_ratio()
     );
     table.fault("feedback_range_rad", &format!("[{low:?}, {high:?}]"), &expected);
 }

@@ -1,6 +1,6 @@
 //! A long table of bad files: each is refused under the key that is wrong, with words that help.
 mod common;
-use common::Reader::{Robot, Scene, Settings, Trajectory};
+use common::Reader::{Damiao, Robot, Scene, Settings, Trajectory};
 use common::{Reader, edited, faults_of};
 
 /// Reader, text to replace, replacement, key of the fault, words that its sentence must have.
@@ -372,7 +372,9 @@ const SETTINGS_CASES: &[Case] = &[
     (Settings, "node_id = 3", "node_id = 2", "servo[2].node_id", "each node id once on a bus"),
     (Settings, "node_id = 3", "node_id = 0", "servo[2].node_id", "from 1 to 127"),
     (Settings, "node_id = 3", "node_id = 128", "servo[2].node_id", "from 1 to 127"),
-    (Settings, "protocol = \"cia402\"", "protocol = \"damiao\"", "servo[0].protocol", "\"cia402\""),
+    (Settings, "protocol = \"cia402\"", "protocol = \"ethercat\"", "servo[0].protocol", "\"cia402\""),
+    (Settings, "protocol = \"cia402\"", "protocol = \"damiao\"", "servo[0].gear_ratio", "no such key"),
+    (Settings, "protocol = \"cia402\"", "protocol = \"damiao\"", "servo[0].feedback_id", "missing"),
     (Settings, "sign = -1", "sign = 0", "servo[1].sign", "1 or -1"),
     (Settings, "sign = -1", "sign = -1.5", "servo[1].sign", "1 or -1"),
     (Settings, "sign = -1", "", "servo[1].sign", "missing"),
@@ -407,6 +409,116 @@ const SETTINGS_CASES: &[Case] = &[
     (Settings, "[-12.5, 12.5]", "[-12.5, 3.0]", "servo[0].feedback_range_rad", "of joint shoulder_pan"),
     (Settings, "\n[simulator]\n", "\n[[simulator]]\n", "simulator", "a table"),
     (Settings, "name = \"vcan6\"", "name = \"vcan6\"\n\"\\u001b[31m\" = 3", "\"\\u{1b}[31m\"", "no such key"),
+];
+
+const DAMIAO_CASES: &[Case] = &[
+    (Damiao, "protocol = \"damiao\"", "protocol = \"cia402\"", "servo[0].stiffness_nm_rad", "no such key"),
+    (Damiao, "protocol = \"damiao\"", "protocol = \"cia402\"", "servo[0].gear_ratio", "missing"),
+    (Damiao, "node_id = 3", "node_id = 16", "servo[2].node_id", "from 1 to 15"),
+    (Damiao, "node_id = 3", "node_id = 0", "servo[2].node_id", "from 1 to 15"),
+    (Damiao, "node_id = 3", "node_id = 2", "servo[2].node_id", "each node id once on a bus"),
+    (Damiao, "feedback_id = 0x11", "feedback_id = 0", "servo[0].feedback_id", "from 1 to 2046"),
+    (Damiao, "feedback_id = 0x11", "feedback_id = 0x7FF", "servo[0].feedback_id", "from 1 to 2046"),
+    (Damiao, "feedback_id = 0x11", "", "servo[0].feedback_id", "missing"),
+    (
+        Damiao,
+        "feedback_id = 0x13",
+        "feedback_id = 0x12",
+        "servo[2].feedback_id",
+        "0x012 for feedback: expected an identifier of its own on the bus: joint shoulder_lift has it for feedback",
+    ),
+    (
+        Damiao,
+        "feedback_id = 0x13",
+        "feedback_id = 0x102",
+        "servo[2].feedback_id",
+        "joint shoulder_lift has it for POS_VEL commands",
+    ),
+    (
+        Damiao,
+        "feedback_id = 0x13",
+        "feedback_id = 0x003",
+        "servo[2].feedback_id",
+        "joint elbow has it for MIT commands",
+    ),
+    (
+        Damiao,
+        "feedback_id = 0x12",
+        "feedback_id = 0x003",
+        "servo[2].node_id",
+        "joint shoulder_lift has it for feedback",
+    ),
+    (Damiao, "mode = \"mit\"", "mode = \"vel\"", "servo[0].mode", "\"mit\""),
+    (Damiao, "mode = \"mit\"", "", "servo[0].mode", "missing"),
+    (Damiao, "mode = \"mit\"", "mode = \"pos_vel\"", "servo[0].stiffness_nm_rad", "no such key"),
+    (Damiao, "stiffness_nm_rad = 400.0", "", "servo[0].stiffness_nm_rad", "missing"),
+    (Damiao, "stiffness_nm_rad = 400.0", "stiffness_nm_rad = 0.0", "servo[0].stiffness_nm_rad", "above 0"),
+    (Damiao, "stiffness_nm_rad = 400.0", "stiffness_nm_rad = 501", "servo[0].stiffness_nm_rad", "up to 500"),
+    (Damiao, "stiffness_nm_rad = 400.0", "stiffness_nm_rad = nan", "servo[0].stiffness_nm_rad", "finite"),
+    (
+        Damiao,
+        "damping_nm_s_rad = 5.0",
+        "damping_nm_s_rad = 0",
+        "servo[0].damping_nm_s_rad",
+        "above 0 up to 5",
+    ),
+    (Damiao, "damping_nm_s_rad = 5.0", "damping_nm_s_rad = 5.1", "servo[0].damping_nm_s_rad", "up to 5"),
+    (Damiao, "damping_nm_s_rad = 5.0", "", "servo[0].damping_nm_s_rad", "missing"),
+    (
+        Damiao,
+        "reaction = \"limp\"",
+        "reaction = \"hold\"",
+        "servo[0].reaction",
+        "\"limp\": a damiao servo knows no other",
+    ),
+    (Damiao, "limp_is_safe = true", "limp_is_safe = false", "servo[0].reaction", "a servo that can hold"),
+    (Damiao, "gain_ramp_ms = 200", "gain_ramp_ms = 0", "servo[0].gain_ramp_ms", "from 1 to 10000"),
+    (Damiao, "gain_ramp_ms = 200", "gain_ramp_ms = 2.5", "servo[0].gain_ramp_ms", "an integer"),
+    (
+        Damiao,
+        "position_range_rad = 12.5",
+        "position_range_rad = 3.0",
+        "servo[0].position_range_rad",
+        "joint shoulder_pan at -3.1416 rad is -3.1416 rad of its motor, 0.1416 rad outside",
+    ),
+    (
+        Damiao,
+        "position_range_rad = 12.5",
+        "position_range_rad = -12.5",
+        "servo[0].position_range_rad",
+        "above 0",
+    ),
+    (
+        Damiao,
+        "position_range_rad = 12.5",
+        "position_range_rad = inf",
+        "servo[0].position_range_rad",
+        "finite",
+    ),
+    (
+        Damiao,
+        "zero_offset_rad = 0.0",
+        "zero_offset_rad = 10.0",
+        "servo[0].position_range_rad",
+        "0.6416 rad outside",
+    ),
+    (
+        Damiao,
+        "velocity_range_rad_s = 45.0",
+        "velocity_range_rad_s = 3.0",
+        "servo[0].velocity_range_rad_s",
+        "the limit of joint shoulder_pan",
+    ),
+    (Damiao, "torque_range_nm = 54.0", "torque_range_nm = 0.0", "servo[0].torque_range_nm", "above 0"),
+    (Damiao, "watchdog_ms = 100\nstiff", "watchdog_ms = 0\nstiff", "servo[0].watchdog_ms", "from 1 to 10000"),
+    (
+        Damiao,
+        "watchdog_ms = 100\nstiff",
+        "watchdog_ms = 99\nstiff",
+        "servo[0].watchdog_ms",
+        "at least cycle.drive_watchdog_ms = 100",
+    ),
+    (Damiao, "watchdog_ms = 100\nstiff", "stiff", "servo[0].watchdog_ms", "missing"),
 ];
 
 const TRAJECTORY_CASES: &[Case] = &[
@@ -467,7 +579,7 @@ const TRAJECTORY_CASES: &[Case] = &[
 
 #[test]
 fn bad_file_is_refused_under_its_key_with_words_that_help() {
-    for table in [ROBOT_CASES, SCENE_CASES, SETTINGS_CASES, TRAJECTORY_CASES] {
+    for table in [ROBOT_CASES, SCENE_CASES, SETTINGS_CASES, DAMIAO_CASES, TRAJECTORY_CASES] {
         for (reader, from, to, key, words) in table {
             let faults = faults_of(*reader, &edited(&reader.good_text(), from, to));
             let hit = faults.0.iter().any(|fault| fault.key == *key && fault.to_string().contains(words));

@@ -2,7 +2,7 @@
 #![expect(clippy::panic, clippy::unwrap_used, reason = "a test ends by panicking")]
 use std::path::Path;
 use taustream_arm::Settings;
-use taustream_drivers::codec::cia402::{Cia402Driver, rad_from_counts};
+use taustream_drivers::codec::cia402::{Cia402Driver, CountScale, rad_from_counts};
 use taustream_drivers::sim::{Rig, settings::drives};
 use taustream_drivers::{CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver};
 
@@ -123,8 +123,8 @@ fn simulated_drive_and_master_agree_on_sign_gear_and_zero() {
     let mut arm = Arm::new();
     arm.until(DriveState::Disabled);
     for (joint, start_rad) in START_RAD.iter().enumerate() {
-        let servo = &arm.settings.servos[joint];
-        let count_rad = (rad_from_counts(servo, 1) - rad_from_counts(servo, 0)).abs();
+        let scale = CountScale::of(&arm.settings.servos[joint]).unwrap();
+        let count_rad = (rad_from_counts(&scale, 1) - rad_from_counts(&scale, 0)).abs();
         // Not energised, a joint may fall: the feedback is up to two cycles older than the drive's own angle.
         let drive = arm.rig.drive(joint).unwrap();
         let aged_rad = drive.velocity_rad_s().abs() * 2e-3 + 1e-4;

@@ -25,7 +25,7 @@ use stages::StageClock;
 pub use stages::StageTime;
 use taustream_arm::Settings;
 use taustream_drivers::codec::canopen::sync;
-use taustream_drivers::codec::cia402::{counts_from_rad, encode_rpdo};
+use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, encode_rpdo};
 use taustream_drivers::link::LinkChoice;
 use taustream_drivers::{
     CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
@@ -177,8 +177,9 @@ impl ServoDriver for BenchDriver {
         (self.commands, self.wish, self.now) = (*commands, wish, now);
         out.push(sync());
         for servo in &self.servos {
+            let Some(scale) = CountScale::of(servo) else { continue };
             let position = commands.get(servo.joint).map_or(0.0, |c| c.position_rad);
-            out.push(encode_rpdo(servo.node_id, 0x000F, counts_from_rad(servo, position)));
+            out.push(encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, position)));
         }
     }
     fn decode(&mut self, _now: Nanos, _frame: &CanFrame) {}

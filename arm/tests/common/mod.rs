@@ -9,6 +9,8 @@ pub(crate) enum Reader {
     Robot,
     Scene,
     Settings,
+    /// Settings of Damiao motors.
+    Damiao,
     Trajectory,
 }
 
@@ -28,6 +30,7 @@ impl Reader {
             Self::Robot => config().join("robots/ur5.toml"),
             Self::Scene => config().join("scenes/shelf.toml"),
             Self::Settings => config().join("settings/vcan6.toml"),
+            Self::Damiao => config().join("settings/damiao6.toml"),
             Self::Trajectory => config().join("trajectory.json"),
         }
     }
@@ -35,7 +38,7 @@ impl Reader {
     pub(crate) fn good_text(self) -> String {
         match self {
             Self::Trajectory => TRAJECTORY.to_owned(),
-            Self::Robot | Self::Scene | Self::Settings => {
+            Self::Robot | Self::Scene | Self::Settings | Self::Damiao => {
                 std::fs::read_to_string(self.file()).expect("shipped files are readable")
             }
         }
@@ -46,7 +49,7 @@ impl Reader {
         match self {
             Self::Robot => Robot::from_toml(&file, text).map(drop),
             Self::Scene => Scene::from_toml(&file, text).map(drop),
-            Self::Settings => Settings::from_toml(&file, text).map(drop),
+            Self::Settings | Self::Damiao => Settings::from_toml(&file, text).map(drop),
             Self::Trajectory => TrajectoryFile::from_json(&file, text).map(drop),
         }
     }

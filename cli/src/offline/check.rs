@@ -1,4 +1,5 @@
 //! `taustream check`: is a configuration sound, and what does it mean?
+use super::protocol_line::ProtocolLine;
 use crate::args::CheckArgs;
 use crate::arm;
 use crate::failure::Failure;
@@ -254,8 +255,8 @@ struct ServoLine {
     node_id: u8,
     protocol: String,
     sign: f64,
-    gear_ratio: f64,
-    counts_per_rev: f64,
+    #[serde(flatten)]
+    own: ProtocolLine,
     zero_offset_rad: f64,
     limp_is_safe: bool,
 }
@@ -281,10 +282,9 @@ impl CheckedSettings {
             joint: settings.robot.joints.get(servo.joint).map(|j| j.name.clone()).unwrap_or_default(),
             bus: settings.buses.get(servo.bus).map(|b| b.name.clone()).unwrap_or_default(),
             node_id: servo.node_id,
-            protocol: format!("{:?}", servo.protocol).to_lowercase(),
+            protocol: servo.protocol.name().to_owned(),
             sign: servo.sign,
-            gear_ratio: servo.gear_ratio,
-            counts_per_rev: servo.counts_per_rev,
+            own: ProtocolLine(servo.protocol),
             zero_offset_rad: servo.zero_offset_rad,
             limp_is_safe: servo.limp_is_safe,
         };
@@ -315,21 +315,14 @@ impl fmt::Display for CheckedSettings {
         }
         writeln!(
             f,
-            "  joint              bus        node  protocol  sign  gear ratio  counts/rev   zero (rad)  without torque"
+            "  joint              bus        node  protocol  sign   zero (rad)  without torque  of the protocol"
         )?;
         for s in &self.servos {
             let limp = if s.limp_is_safe { "safe" } else { "MAY FALL" };
             writeln!(
                 f,
-                "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>11} {:>11} {:>12.6}  {limp}",
-                s.joint,
-                s.bus,
-                s.node_id,
-                s.protocol,
-                s.sign,
-                s.gear_ratio,
-                s.counts_per_rev,
-                s.zero_offset_rad
+                "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>12.6}  {limp:<14}  {}",
+                s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
         }
         write!(f, "no faults")

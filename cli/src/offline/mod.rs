@@ -3,5 +3,6 @@ pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod cost;
 pub(crate) mod plan;
+mod protocol_line;
 pub(crate) mod sample;
 pub(crate) mod verify;

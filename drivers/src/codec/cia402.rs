@@ -10,12 +10,12 @@ use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, 
 use crate::codec::sdo::SdoResponse;
 use crate::frame::{CanFrame, FrameBatch};
 use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};
-use taustream_arm::settings::Protocol;
 use taustream_arm::{Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
 pub use crate::codec::cia402_words::{
-    DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo, rad_from_counts,
+    CountScale, DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo,
+    rad_from_counts,
 };
 
 /// Silence of other masters after which the bus counts as ours.
@@ -80,10 +80,12 @@ pub enum Cia402Error {
     },
 }
 
-/// One drive: its servo description, node and newest feedback.
+/// One drive: the joint that it moves, how it counts, its node and newest feedback.
 #[derive(Clone, Debug)]
 struct Drive {
-    servo: Servo,
+    joint: usize,
+    node_id: u8,
+    scale: CountScale,
     node: Node,
     received: Option<Nanos>,
 }
@@ -136,15 +138,16 @@ impl Cia402Driver {
             heartbeat_at: None,
             other_master_at: None,
         };
-        for servo in settings.servos.iter().filter(|s| s.bus == bus && s.protocol == Protocol::Cia402) {
+        for servo in settings.servos.iter().filter(|s| s.bus == bus) {
+            let Some(scale) = CountScale::of(servo) else { continue };
             let reaction = servo.reaction;
             let plan = NodePlan { node: servo.node_id, period_us, interpolation, reaction };
-            driver.add(servo, Node::new(plan, patience))?;
+            driver.add(servo, scale, Node::new(plan, patience))?;
         }
         Ok(driver)
     }
 
-    fn add(&mut self, servo: &Servo, node: Node) -> Result<(), Cia402Error> {
+    fn add(&mut self, servo: &Servo, scale: CountScale, node: Node) -> Result<(), Cia402Error> {
         let (joint, node_id) = (servo.joint, servo.node_id);
         if joint >= MAX_JOINTS || self.drives.len() >= MAX_JOINTS {
             return Err(Cia402Error::JointBeyond { joint });
@@ -157,7 +160,7 @@ impl Cia402Driver {
             return Err(Cia402Error::NodeTwice { joint, other, node_id });
         }
         *slot = Some(self.drives.len());
-        self.drives.push(Drive { servo: servo.clone(), node, received: None });
+        self.drives.push(Drive { joint, node_id, scale, node, received: None });
         self.joints.push(joint);
         Ok(())
     }
@@ -227,7 +230,7 @@ impl ServoDriver for Cia402Driver {
                 out.push(nmt.encode());
             }
             if let Some(request) = service.sdo {
-                out.push(request.encode(drive.servo.node_id));
+                out.push(request.encode(drive.node_id));
             }
         }
         self.push_heartbeat(now, out);
@@ -263,7 +266,7 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn status(&self, joint: usize) -> ServoStatus {
-        let Some(drive) = self.drives.iter().find(|drive| drive.servo.joint == joint) else {
+        let Some(drive) = self.drives.iter().find(|drive| drive.joint == joint) else {
             return ServoStatus::UNKNOWN;
         };
         let node = &drive.node;
@@ -295,12 +298,12 @@ impl ServoDriver for Cia402Driver {
 
 impl Drive {
     fn position_rad(&self) -> f64 {
-        self.node.position().map_or(f64::NAN, |counts| rad_from_counts(&self.servo, counts))
+        self.node.position().map_or(f64::NAN, |counts| rad_from_counts(&self.scale, counts))
     }
 
     fn target(&self, commands: &[JointCommand; MAX_JOINTS], near_rad: f64) -> Target {
-        let position_rad = commands.get(self.servo.joint).map_or(f64::NAN, |command| command.position_rad);
-        let counts = position_rad.is_finite().then(|| counts_from_rad(&self.servo, position_rad));
+        let position_rad = commands.get(self.joint).map_or(f64::NAN, |command| command.position_rad);
+        let counts = position_rad.is_finite().then(|| counts_from_rad(&self.scale, position_rad));
         // False for a position that is not known.
         let near = (position_rad - self.position_rad()).abs() <= near_rad;
         Target { counts, near }

@@ -4,7 +4,7 @@
 use crate::codec::canopen::{COB_RPDO1, COB_TPDO1, cob, node_of};
 use crate::frame::CanFrame;
 use std::f64::consts::TAU;
-use taustream_arm::Servo;
+use taustream_arm::{Cia402, Servo};
 
 /// Where the finite state automaton of a drive stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +101,28 @@ fn six_of(frame: &CanFrame, base: u16) -> Option<(u8, u16, i32)> {
     Some((node, u16::from_le_bytes([a, b]), i32::from_le_bytes([c, d, e, f])))
 }
 
+/// How one servo counts: everything between its link angles and its encoder counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CountScale {
+    /// +1.0 or -1.0: motor direction against link direction.
+    pub sign: f64,
+    /// Motor revolutions a link revolution.
+    pub gear_ratio: f64,
+    /// Encoder counts a motor revolution.
+    pub counts_per_rev: f64,
+    /// Link angle at count 0.
+    pub zero_offset_rad: f64,
+}
+
+impl CountScale {
+    /// Of a servo; none when it speaks another protocol and has no counts.
+    #[must_use]
+    pub fn of(servo: &Servo) -> Option<Self> {
+        let Cia402 { gear_ratio, counts_per_rev } = *servo.protocol.as_cia402()?;
+        Some(Self { sign: servo.sign, gear_ratio, counts_per_rev, zero_offset_rad: servo.zero_offset_rad })
+    }
+}
+
 /// Encoder counts of a link angle: `round_half_away((position - zero) * sign * gear * counts_per_rev / 2 pi)`.
 ///
 /// This is the one place where setpoints become counts; recordings are checked against it bit by bit, so the order
@@ -109,9 +131,9 @@ fn six_of(frame: &CanFrame, base: u16) -> Option<(u8, u16, i32)> {
 ///
 /// Real time: arithmetic only.
 #[must_use]
-pub fn counts_from_rad(servo: &Servo, position_rad: f64) -> i32 {
-    let turns = (position_rad - servo.zero_offset_rad) * servo.sign * servo.gear_ratio;
-    let counts = (turns * servo.counts_per_rev / TAU).round();
+pub fn counts_from_rad(scale: &CountScale, position_rad: f64) -> i32 {
+    let turns = (position_rad - scale.zero_offset_rad) * scale.sign * scale.gear_ratio;
+    let counts = (turns * scale.counts_per_rev / TAU).round();
     #[expect(clippy::cast_possible_truncation, reason = "saturation is the documented behaviour")]
     let counts = counts as i32;
     counts
@@ -121,8 +143,8 @@ pub fn counts_from_rad(servo: &Servo, position_rad: f64) -> i32 {
 ///
 /// Real time: arithmetic only.
 #[must_use]
-pub fn rad_from_counts(servo: &Servo, counts: i32) -> f64 {
-    f64::from(counts) * TAU / (servo.sign * servo.gear_ratio * servo.counts_per_rev) + servo.zero_offset_rad
+pub fn rad_from_counts(scale: &CountScale, counts: i32) -> f64 {
+    f64::from(counts) * TAU / (scale.sign * scale.gear_ratio * scale.counts_per_rev) + scale.zero_offset_rad
 }
 
 /// Value and power of ten of object 0x60C2 for a period; `None` when it cannot be stated exactly.

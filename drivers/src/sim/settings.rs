@@ -7,7 +7,7 @@ use super::drive::DriveParameters;
 use super::plant::PlantParameters;
 use std::cell::RefCell;
 use std::path::Path;
-use taustream_arm::{Fault, Faults, Servo, Settings};
+use taustream_arm::{Cia402, Fault, Faults, Servo, Settings};
 use toml::{Table, Value};
 
 /// One drive and the joint that it moves.
@@ -31,7 +31,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let joints = settings.robot.joints.len();
     let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
     let mut setups: Vec<DriveSetup> =
-        settings.servos.iter().map(|servo| section.setup(settings, servo)).collect();
+        settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
     section.unknown_keys();
     let faults = section.faults.into_inner();
@@ -79,7 +79,7 @@ struct Section<'a> {
 }
 
 impl Section<'_> {
-    fn setup(&self, settings: &Settings, servo: &Servo) -> DriveSetup {
+    fn setup(&self, settings: &Settings, servo: &Servo) -> Option<DriveSetup> {
         let joint = settings.robot.joints.get(servo.joint);
         let limits = joint.map(|joint| joint.limits).unwrap_or_default();
         let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
@@ -87,11 +87,16 @@ impl Section<'_> {
         let [low_rad, high_rad] = limits.position_rad;
         let margin_rad = self.number("soft_limit_margin_rad", at, 0.02, 0.0..=3.0);
         let plant = self.plant(at, servo, &limits);
+        let Some(Cia402 { gear_ratio, counts_per_rev }) = servo.protocol.as_cia402().copied() else {
+            let (protocol, at) = (servo.protocol.name(), servo.joint);
+            self.fault(&format!("servo[{at}].protocol"), protocol, "a protocol that is simulated: cia402");
+            return None;
+        };
         let parameters = DriveParameters {
             node_id: servo.node_id,
             sign: servo.sign,
-            gear_ratio: servo.gear_ratio,
-            counts_per_rev: servo.counts_per_rev,
+            gear_ratio,
+            counts_per_rev,
             zero_offset_rad: servo.zero_offset_rad,
             start_rad: self.number("start_rad", at, 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad),
             plant,
@@ -116,7 +121,7 @@ impl Section<'_> {
             boot_s: self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3,
             step_ns: u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000,
         };
-        DriveSetup { joint: name, bus: servo.bus, parameters }
+        Some(DriveSetup { joint: name, bus: servo.bus, parameters })
     }
 
     /// Mechanics; torque and speed that the motor has by default suffice for the joint's stop limits.

@@ -1,13 +1,11 @@
 //! Counts and angles: the one formula that turns setpoints into what a drive is told.
-use super::{Draw, settings};
+use super::Draw;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use taustream_arm::Servo;
-use taustream_drivers::codec::cia402::{counts_from_rad, rad_from_counts};
+use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, rad_from_counts};
 use taustream_drivers::codec::cia402_words::interpolation_period;
 
-fn servo(sign: f64, gear_ratio: f64, counts_per_rev: f64, zero_offset_rad: f64) -> Servo {
-    let shipped = settings(1).servos.remove(0);
-    Servo { sign, gear_ratio, counts_per_rev, zero_offset_rad, ..shipped }
+fn servo(sign: f64, gear_ratio: f64, counts_per_rev: f64, zero_offset_rad: f64) -> CountScale {
+    CountScale { sign, gear_ratio, counts_per_rev, zero_offset_rad }
 }
 
 #[test]

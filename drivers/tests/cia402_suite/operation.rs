@@ -2,7 +2,7 @@
 use super::{
     Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, frame, hex, settings,
 };
-use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, counts_from_rad};
+use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, CountScale, counts_from_rad};
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
 
 #[test]
@@ -104,7 +104,12 @@ fn enabled_drives_get_the_encoded_commands_and_keep_the_last_when_one_is_no_numb
     }
     bench.step();
     let expected: Vec<i32> = (0..6)
-        .map(|joint| counts_from_rad(&bench.settings.servos[joint], bench.commands[joint].position_rad))
+        .map(|joint| {
+            counts_from_rad(
+                &CountScale::of(&bench.settings.servos[joint]).unwrap(),
+                bench.commands[joint].position_rad,
+            )
+        })
         .collect();
     for (joint, counts) in expected.iter().enumerate() {
         assert_eq!(bench.rpdo(joint), Some((0x000F, *counts)), "joint {joint}");
@@ -275,7 +280,8 @@ fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_told_where_to_go() {
     assert!(bench.driver.explain(bench.status(0).error_code).contains("heartbeat"));
     bench.commands[0].position_rad += 1e-3;
     bench.step();
-    let wanted = counts_from_rad(&bench.settings.servos[0], bench.commands[0].position_rad);
+    let wanted =
+        counts_from_rad(&CountScale::of(&bench.settings.servos[0]).unwrap(), bench.commands[0].position_rad);
     assert_eq!(bench.rpdo(0), Some((0x000F, wanted)));
 
     // Disabled by wish: voltage off is sent, then the node is absent, and it is taken again when it returns.

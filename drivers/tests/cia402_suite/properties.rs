@@ -1,6 +1,6 @@
 //! What must hold whatever the drives say: random statusword walks, random frames.
 use super::{Bench, Draw, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON};
-use taustream_drivers::codec::cia402::counts_from_rad;
+use taustream_drivers::codec::cia402::{CountScale, counts_from_rad};
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
 
 /// What one setpoint is judged by.
@@ -94,11 +94,11 @@ fn random_statuswords_wishes_and_commands_never_break_the_rules_of_setpoints() {
             reached += usize::from(bench.status(0).state == DriveState::Enabled);
             for drive in 0..2 {
                 let Some((control, target)) = bench.rpdo(drive) else { continue };
-                let servo = &bench.settings.servos[drive];
+                let scale = CountScale::of(&bench.settings.servos[drive]).unwrap();
                 let position_rad = bench.commands[drive].position_rad;
-                let command = position_rad.is_finite().then(|| counts_from_rad(servo, position_rad));
+                let command = position_rad.is_finite().then(|| counts_from_rad(&scale, position_rad));
                 // 0.05 rad, the shipped position_jump_rad_max, and one count for rounding.
-                let near = counts_from_rad(servo, servo.zero_offset_rad + 0.05).abs() + 1;
+                let near = counts_from_rad(&scale, scale.zero_offset_rad + 0.05).abs() + 1;
                 let Some(heard) = heard[drive] else { panic!("setpoints before feedback") };
                 let (wish, before_it) = (bench.wish, before[drive]);
                 let setpoint = Setpoint { wish, heard, command, near, before: before_it, control, target };

@@ -112,13 +112,16 @@ fn frames(recording: &str) -> Result<Vec<BusFrame>> {
 }
 
 fn encodings(settings: &Settings) -> Vec<Encoding> {
-    let encoding = |servo: &taustream_arm::Servo| Encoding {
-        joint: servo.joint,
-        node_id: servo.node_id,
-        counts_per_rad: servo.sign * servo.gear_ratio * servo.counts_per_rev / std::f64::consts::TAU,
-        zero_rad: servo.zero_offset_rad,
+    let encoding = |servo: &taustream_arm::Servo| {
+        let cia402 = servo.protocol.as_cia402()?;
+        Some(Encoding {
+            joint: servo.joint,
+            node_id: servo.node_id,
+            counts_per_rad: servo.sign * cia402.gear_ratio * cia402.counts_per_rev / std::f64::consts::TAU,
+            zero_rad: servo.zero_offset_rad,
+        })
     };
-    settings.servos.iter().map(encoding).collect()
+    settings.servos.iter().filter_map(encoding).collect()
 }
 
 fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
