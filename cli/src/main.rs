@@ -8,6 +8,7 @@ mod demo;
 mod failure;
 mod interrupt;
 mod live;
+mod manual;
 mod offline;
 mod output;
 mod plot;
@@ -15,12 +16,10 @@ mod words;
 
 use args::{Action, Cli};
 use arm::ArmName;
-use clap::{CommandFactory, Parser};
+use clap::Parser;
 use failure::Failure;
 use output::{Form, note};
-use serde::Serialize;
 use std::env;
-use std::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 use taustream_messages::Command;
@@ -59,33 +58,14 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Bench(args) => offline::bench::run(form, settings, args),
         Action::Demo(args) => demo::run(form, args),
-        Action::Completions { shell } => completions(form, *shell),
+        Action::Completions { shell } => manual::completions(form, *shell),
+        Action::Man(args) => manual::run(form, args),
     }
 }
 
 fn command(form: Form, settings: Option<&Path>, command: Command, wait_s: f64) -> Result<(), Failure> {
     interrupt::watch()?;
     live::command::run(form, &ArmName::read(settings)?, command, wait_s)
-}
-
-/// A completion script.
-#[derive(Serialize)]
-struct Completions {
-    shell: String,
-    script: String,
-}
-
-impl fmt::Display for Completions {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.script)
-    }
-}
-
-fn completions(form: Form, shell: clap_complete::Shell) -> Result<(), Failure> {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "taustream", &mut script);
-    let script = String::from_utf8_lossy(&script).into_owned();
-    form.print(&Completions { shell: shell.to_string(), script })
 }
 
 /// Says why on stderr, in the form that was asked for.

@@ -5,3 +5,5 @@ mod bad_input;
 mod common;
 #[path = "cli/good_path.rs"]
 mod good_path;
+#[path = "cli/manual.rs"]
+mod manual;

@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask demo` and `cargo xtask test`.
+//! The project's chores: `cargo xtask demo`, `cargo xtask man` and `cargo xtask test`.
 //!
 //! Each task installs what it needs on a fresh Debian machine, says so before it does, and ends with a verdict.
 mod demo;
+mod manual;
 mod packages;
 mod test;
 mod workspace;
@@ -23,6 +24,8 @@ struct Arguments {
 enum Task {
     /// Build, then move a simulated arm round obstacles and show it.
     Demo(demo::Arguments),
+    /// Write manual pages and shell completions.
+    Man(manual::Arguments),
     /// Check everything: format, lints, tests, documentation, and the scenarios on a real vcan0.
     Test,
 }
@@ -30,6 +33,7 @@ enum Task {
 fn main() -> ExitCode {
     let (verdict, outcome) = match Arguments::parse().task {
         Task::Demo(arguments) => ("DEMO FAILED", demo::run(&arguments)),
+        Task::Man(arguments) => ("MAN FAILED", manual::run(&arguments)),
         Task::Test => ("TEST FAILED", test::run()),
     };
     match outcome {

@@ -3,7 +3,9 @@ mod live;
 mod offline;
 
 pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs};
-pub(crate) use offline::{BenchArgs, BenchName, CheckArgs, CostArgs, MotionArgs, PlanArgs, SampleArgs};
+pub(crate) use offline::{
+    BenchArgs, BenchName, CheckArgs, CostArgs, ManArgs, MotionArgs, PlanArgs, SampleArgs,
+};
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -20,17 +22,25 @@ Examples:
   taustream status --json | jq .phase
 
 Units: angles are rad, times s, lengths m. Robots, scenes and settings are given by path, or by the name of a
-shipped file (`ur5`, `pillars`, `vcan6`).
+shipped file (`ur5`, `pillars`, `vcan6`).";
 
+/// What a program's end tells scripts; help, manual pages and `failure.rs` agree.
+pub(crate) const EXIT_CODES: &str = "\
 Exit codes: 0 done; 1 refused or failed, with the reason on stderr; 2 bad usage or bad file; 130 interrupted.
-With --json, errors are JSON on stderr too: {\"error\":{\"kind\":\"..\",\"message\":\"..\"}}.
+With --json, errors are JSON on stderr too: {\"error\":{\"kind\":\"..\",\"message\":\"..\"}}.";
 
+/// Stands in the help, in every manual page and in what `doctor` says.
+pub(crate) const SAFETY: &str = "\
 taustream is not a safety function: its stops are best effort by software over a bus. A machine needs its own
 hard-wired emergency stop and safe torque off.";
 
+fn after_help() -> String {
+    format!("{EXAMPLES}\n\n{EXIT_CODES}\n\n{SAFETY}")
+}
+
 /// Plans, runs and watches the motion of CAN-connected robot arms.
 #[derive(Debug, Parser)]
-#[command(name = "taustream", version, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "taustream", version, after_help = after_help(), arg_required_else_help = true)]
 #[command(max_term_width = 110)]
 pub(crate) struct Cli {
     /// Answer with one JSON object on stdout, and with errors as JSON on stderr.
@@ -93,6 +103,8 @@ pub(crate) enum Action {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write the manual pages of all programs into a directory, or print that of taustream.
+    Man(ManArgs),
 }
 
 #[cfg(test)]

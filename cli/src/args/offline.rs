@@ -128,6 +128,17 @@ pub(crate) struct CheckArgs {
     pub(crate) config: PathBuf,
 }
 
+/// `taustream man`
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  taustream man | man -l -\n  taustream man /usr/local/share/man/man1 && man taustream-plan"
+)]
+pub(crate) struct ManArgs {
+    /// Directory to write one page a program and command into; made when it is missing.
+    #[arg(value_name = "DIR")]
+    pub(crate) directory: Option<PathBuf>,
+}
+
 /// `taustream bench`
 #[derive(Args, Debug)]
 pub(crate) struct BenchArgs {
