@@ -48,7 +48,7 @@ struct MotionStatus {
 
 /// What the streamer says.
 #[derive(Debug, Serialize)]
-struct Status {
+pub(crate) struct Status {
     arm: String,
     robot_digest: String,
     phase: &'static str,
@@ -58,6 +58,8 @@ struct Status {
     speed_percent: f64,
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
+    /// Number of the report; gaps are reports that this reader missed.
+    sequence: u64,
     tick: u64,
     time_ns: u64,
     cycles: u64,
@@ -85,7 +87,7 @@ pub(crate) fn run(form: Form, arm: &ArmName) -> Result<(), Failure> {
 }
 
 impl Status {
-    fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
+    pub(crate) fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
         let fault = (r.fault_reason != 0).then(|| FaultStatus {
             code: r.fault_reason,
             joint: (r.fault_joint != u32::MAX).then_some(r.fault_joint),
@@ -110,6 +112,7 @@ impl Status {
             speed_percent: r.speed_percent,
             motion,
             joints: joints(r, arm),
+            sequence: r.sequence,
             tick: r.tick,
             time_ns: r.time_ns,
             cycles: r.cycles,
