@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 use taustream_arm::{Kind, Robot, Scene, Settings, TrajectoryFile};
 use taustream_messages::service::is_arm_name;
+use taustream_streamer::names::{BusName, Names};
 
 /// Where an installed controller keeps its settings.
 const INSTALLED: &str = "/etc/taustream/settings.toml";
@@ -18,21 +19,25 @@ pub(crate) struct ArmName {
     pub(crate) name: String,
     /// Names of the joints, base to tip; empty when the robot file could not be read.
     pub(crate) joints: Vec<String>,
+    /// Names of the buses; empty when the settings could not be read.
+    pub(crate) buses: Vec<BusName>,
 }
 
 impl ArmName {
     /// A joint in words, by its zero-based index.
     pub(crate) fn joint(&self, joint: usize) -> String {
-        match self.joints.get(joint) {
-            Some(name) => format!("joint {} `{name}`", joint + 1),
-            None => format!("joint {}", joint + 1),
-        }
+        self.names().joint(joint)
+    }
+
+    /// The names, for sentences about joints and buses.
+    pub(crate) fn names(&self) -> Names {
+        Names { joints: self.joints.clone(), buses: self.buses.clone() }
     }
 
     /// The arm of settings that were read as a whole.
     pub(crate) fn of(settings: &Settings) -> Self {
-        let joints = settings.robot.joints.iter().map(|j| j.name.clone()).collect();
-        Self { name: settings.name.clone(), joints }
+        let Names { joints, buses } = Names::of(settings);
+        Self { name: settings.name.clone(), joints, buses }
     }
 
     /// The arm that settings name. A fault elsewhere in them must not keep anybody from stopping the arm: the name
@@ -47,7 +52,7 @@ impl ArmName {
                     "note: {} has faults (`taustream check` shows them); using only its name `{name}`",
                     path.display()
                 ));
-                Ok(Self { name, joints: Vec::new() })
+                Ok(Self { name, joints: Vec::new(), buses: Vec::new() })
             }
         }
     }

@@ -7,5 +7,3 @@ mod common;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
-#[path = "cli/watch.rs"]
-mod watch;

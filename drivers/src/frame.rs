@@ -143,17 +143,18 @@ pub const BATCH_MAX: usize = 64;
 pub struct FrameBatch {
     frames: [CanFrame; BATCH_MAX],
     count: usize,
+    more: bool,
 }
 
 impl FrameBatch {
     /// Empty.
     #[must_use]
     pub fn new() -> Self {
-        Self { frames: [CanFrame::default(); BATCH_MAX], count: 0 }
+        Self { frames: [CanFrame::default(); BATCH_MAX], count: 0, more: false }
     }
     /// Forgets all frames.
     pub fn clear(&mut self) {
-        self.count = 0;
+        (self.count, self.more) = (0, false);
     }
     /// Appends a frame; false when the batch is full.
     pub fn push(&mut self, frame: CanFrame) -> bool {
@@ -174,6 +175,15 @@ impl FrameBatch {
     /// How many slots hold a frame; more than fit are cut off.
     pub fn set_count(&mut self, count: usize) {
         self.count = count.min(BATCH_MAX);
+    }
+    /// True when the link that filled it may hold more: it took as much as one call takes.
+    #[must_use]
+    pub fn may_have_more(&self) -> bool {
+        self.more
+    }
+    /// For a link: whether it may hold more.
+    pub fn set_more(&mut self, more: bool) {
+        self.more = more;
     }
 }
 

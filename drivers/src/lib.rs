@@ -12,5 +12,5 @@ pub mod servo;
 pub mod sim;
 
 pub use frame::{CanFrame, CanId, FrameBatch};
-pub use link::{CanLink, LinkFault};
+pub use link::{CanLink, ErrorFrame, LinkFault};
 pub use servo::{DriveState, DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};

@@ -129,6 +129,12 @@ pub trait ServoDriver: Send {
     /// Real time: no allocation.
     fn clear_faults(&mut self);
 
+    /// Forgets everything that is known of the drives, as at start: nothing is changed before they were looked at
+    /// again. For a bus that comes back after it was lost: drives may have been restarted, replaced or moved.
+    ///
+    /// Real time: no allocation.
+    fn start_over(&mut self);
+
     /// The sentence for an error code of this protocol: "0x8611 following error too large".
     fn explain(&self, error_code: u32) -> String;
 }

@@ -5,7 +5,9 @@
 //! [`TrajectoryMessage`]; the one door is [`CheckedTrajectory`].
 #![deny(unsafe_code)]
 
+pub mod bus;
 pub mod command;
+pub mod fault;
 pub mod phase;
 pub mod plan;
 pub mod receipt;
@@ -14,8 +16,10 @@ pub mod service;
 pub mod text;
 pub mod trajectory;
 
+pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
-pub use phase::{DRIVE_WARNING, FaultReason, Phase};
+pub use fault::{BusTrouble, Cause, Evidence, FaultReason};
+pub use phase::Phase;
 pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
 pub use report::Report;
@@ -23,4 +27,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 1;
+pub const LAYOUT_VERSION: u32 = 2;

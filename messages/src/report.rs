@@ -1,5 +1,5 @@
 //! The streamer's state, published off the real-time thread at a settable rate.
-use crate::{FaultReason, LAYOUT_VERSION, Phase, RobotDigest};
+use crate::{BUSES_MAX, BusReport, Cause, FaultReason, LAYOUT_VERSION, Phase, RobotDigest};
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::MAX_JOINTS;
 
@@ -25,6 +25,14 @@ pub struct Report {
     pub fault_reason: u32,
     /// Zero-based joint of the fault; `u32::MAX` for none.
     pub fault_joint: u32,
+    /// Index of the bus of the fault; `u32::MAX` for none.
+    pub fault_bus: u32,
+    /// [`Cause::code`].
+    pub fault_code: u32,
+    /// [`Cause::object`].
+    pub fault_object: u32,
+    /// How many buses the arm has.
+    pub bus_count: u32,
     /// 1 when at least one drive is energised.
     pub energised: u32,
     /// The number that belongs to the fault reason.
@@ -67,6 +75,8 @@ pub struct Report {
     pub drive_status: [u32; MAX_JOINTS],
     /// Drive error codes, 0 for none.
     pub drive_error: [u32; MAX_JOINTS],
+    /// The buses, in the order of the settings.
+    pub buses: [BusReport; BUSES_MAX],
     /// Cycles since start.
     pub cycles: u64,
     /// Cycles that woke up more than half a period late.
@@ -114,6 +124,38 @@ impl Report {
     #[must_use]
     pub fn joints(&self) -> usize {
         usize::try_from(self.joint_count).unwrap_or(MAX_JOINTS).min(MAX_JOINTS)
+    }
+
+    /// The buses that the arm has, in the order of the settings.
+    #[must_use]
+    pub fn buses(&self) -> &[BusReport] {
+        let count = usize::try_from(self.bus_count).unwrap_or(BUSES_MAX).min(BUSES_MAX);
+        self.buses.get(..count).unwrap_or(&self.buses)
+    }
+
+    /// Writes why the arm stopped; `None` for no fault.
+    pub fn set_cause(&mut self, cause: Option<Cause>) {
+        let index = |part: Option<usize>| part.and_then(|i| u32::try_from(i).ok()).unwrap_or(u32::MAX);
+        self.fault_reason = cause.map_or(0, |c| c.reason.code());
+        self.fault_joint = index(cause.and_then(|c| c.joint));
+        self.fault_bus = index(cause.and_then(|c| c.bus));
+        (self.fault_code, self.fault_object) = cause.map_or((0, 0), |c| (c.code, c.object));
+        (self.fault_value, self.fault_limit) = cause.map_or((0.0, 0.0), |c| (c.value, c.limit));
+    }
+
+    /// Why the arm stopped, with its evidence; joints and buses that the arm does not have are left out.
+    #[must_use]
+    pub fn cause(&self) -> Option<Cause> {
+        let index = |raw: u32, count: usize| usize::try_from(raw).ok().filter(|i| *i < count);
+        Some(Cause {
+            reason: self.fault()?,
+            joint: index(self.fault_joint, self.joints()),
+            bus: index(self.fault_bus, self.buses().len()),
+            code: self.fault_code,
+            object: self.fault_object,
+            value: self.fault_value,
+            limit: self.fault_limit,
+        })
     }
 
     /// The fault, if there is one.

@@ -11,7 +11,6 @@ pub mod cost;
 pub mod draw;
 pub mod leave;
 pub mod optimize;
-pub mod papers;
 pub mod pipeline;
 pub mod plan;
 pub mod refine;

@@ -196,6 +196,7 @@ impl ServoDriver for BenchDriver {
         }
     }
     fn clear_faults(&mut self) {}
+    fn start_over(&mut self) {}
     fn explain(&self, error_code: u32) -> String {
         format!("{error_code:#06x}")
     }
@@ -249,7 +250,8 @@ impl Bench {
             let joints = servos.iter().map(|s| s.joint).collect();
             let (wish, now) = (DriveWish::Disabled, Nanos(0));
             let driver = BenchDriver { servos, joints, commands: at_base, wish, now };
-            buses.push(Bus::new(peers.master(bus)?, Box::new(driver)));
+            let lost_cycles_max = settings.supervision.lost_cycles_max;
+            buses.push(Bus::new(peers.master(bus)?, Box::new(driver), lost_cycles_max));
         }
         let buses = Buses::new(buses).map_err(|e| BenchError::System(e.to_string()))?;
         let link = buses.describe();

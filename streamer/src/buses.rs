@@ -1,9 +1,13 @@
 //! The buses: drivers that write and read frames, links that move them.
 //!
 //! One cycle makes one `sendmmsg` and one or two `recvmmsg` a bus, whatever arrives. A frame that was not
-//! taken is counted, never sent again: an old setpoint is worse than none.
-use crate::facts::{BUSES_MAX, BusTrouble, Facts};
-use taustream_drivers::{CanFrame, CanId, CanLink, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver};
+//! taken is counted, never sent again: an old setpoint is worse than none. A bus that has failed is silent
+//! (`health.rs`) until its link was started over by the service thread.
+use crate::facts::{BUSES_MAX, Facts};
+use crate::health::{Health, Seen};
+use taustream_drivers::{
+    CanId, CanLink, DriveWish, ErrorFrame, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
+};
 use taustream_motion::MAX_JOINTS;
 
 /// SYNC's id (CiA 301, 7.2.5).
@@ -11,33 +15,41 @@ const SYNC: CanId = CanId::standard(0x080);
 /// Batches taken from a link in one cycle; more wait for the next.
 const RECEIVES_MAX: usize = 2;
 
+/// Links of failed buses, by bus, on their way to the service thread or back.
+pub type Links = [Option<Box<dyn CanLink>>; BUSES_MAX];
+
 /// One bus: its link and the drivers of its servos.
 pub struct Bus {
-    link: Box<dyn CanLink>,
+    /// `None` while the service thread starts it over.
+    link: Option<Box<dyn CanLink>>,
     driver: Box<dyn ServoDriver>,
+    health: Health,
     outgoing: FrameBatch,
     incoming: FrameBatch,
     syncs: u64,
-    lost_in_a_row: u32,
+    live: bool,
 }
 
 impl std::fmt::Debug for Bus {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bus").field("link", &self.link.describe()).finish_non_exhaustive()
+        let link = self.link.as_ref().map(|link| link.describe());
+        f.debug_struct("Bus").field("link", &link).field("health", &self.health).finish_non_exhaustive()
     }
 }
 
 impl Bus {
-    /// A bus of which nothing was sent or heard.
+    /// A bus of which nothing was sent or heard. It fails after `lost_cycles_max` cycles in a row without all their
+    /// frames.
     #[must_use]
-    pub fn new(link: Box<dyn CanLink>, driver: Box<dyn ServoDriver>) -> Self {
+    pub fn new(link: Box<dyn CanLink>, driver: Box<dyn ServoDriver>, lost_cycles_max: u32) -> Self {
         Self {
-            link,
+            link: Some(link),
             driver,
+            health: Health::new(lost_cycles_max),
             outgoing: FrameBatch::new(),
             incoming: FrameBatch::new(),
             syncs: 0,
-            lost_in_a_row: 0,
+            live: false,
         }
     }
 }
@@ -63,21 +75,24 @@ impl Buses {
     /// What the links are, for people.
     #[must_use]
     pub fn describe(&self) -> String {
-        let links: Vec<String> = self.0.iter().map(|b| b.link.describe()).collect();
+        let links: Vec<String> = self.0.iter().flat_map(|b| &b.link).map(|link| link.describe()).collect();
         links.join(", ")
     }
 
     pub(crate) fn links_mut(&mut self) -> impl Iterator<Item = &mut dyn CanLink> {
-        self.0.iter_mut().map(|bus| &mut *bus.link as &mut dyn CanLink)
+        self.0.iter_mut().flat_map(|bus| &mut bus.link).map(|link| &mut **link as &mut dyn CanLink)
     }
 
-    /// Writes every bus's frames.
+    /// Writes every bus's frames. On a failed bus nothing is said but torque off.
     ///
     /// Real time: no allocation.
     pub fn encode(&mut self, now: Nanos, wish: DriveWish, commands: &[JointCommand; MAX_JOINTS]) {
         for bus in &mut self.0 {
+            bus.live = wish == DriveWish::Enabled;
             bus.outgoing.clear();
-            bus.driver.encode(now, wish, commands, &mut bus.outgoing);
+            if !bus.health.is_silent() || wish == DriveWish::TorqueOff {
+                bus.driver.encode(now, wish, commands, &mut bus.outgoing);
+            }
         }
     }
 
@@ -87,43 +102,54 @@ impl Buses {
     pub fn send(&mut self, facts: &mut Facts) {
         for (bus, found) in self.0.iter_mut().zip(&mut facts.buses) {
             let frames = bus.outgoing.frames();
-            let sent = if frames.is_empty() { Default::default() } else { bus.link.send(frames) };
+            let sent = match &mut bus.link {
+                Some(link) if !frames.is_empty() => link.send(frames),
+                Some(_) | None => Default::default(),
+            };
             let taken = frames.get(..sent.count).unwrap_or(frames);
             for frame in taken {
                 bus.syncs += u64::from(frame.id() == SYNC);
             }
             let complete = taken.len() == frames.len();
-            bus.lost_in_a_row = if complete { 0 } else { bus.lost_in_a_row.saturating_add(1) };
             (found.wanted, found.sent) = (count(frames.len()), count(taken.len()));
             found.fault = sent.fault.filter(|_| !complete);
-            (found.lost_in_a_row, found.syncs) = (bus.lost_in_a_row, bus.syncs);
+            found.syncs = bus.syncs;
+            // Known before the commanded pose is: a bus that is silent has carried nothing.
+            found.failed = bus.health.failed();
         }
     }
 
-    /// Takes what has arrived, and asks the drivers what they know now.
+    /// Takes what has arrived, judges each bus, and asks the drivers what they know now.
     ///
     /// Real time: at most `RECEIVES_MAX` system calls a bus, never waits.
     pub fn receive(&mut self, now: Nanos, facts: &mut Facts) {
         for (bus, found) in self.0.iter_mut().zip(&mut facts.buses) {
-            for _ in 0..RECEIVES_MAX {
-                let fault = bus.link.receive(&mut bus.incoming);
-                found.fault = found.fault.or(fault);
-                for frame in bus.incoming.frames() {
-                    if frame.id().is_error() {
-                        found.trouble = found.trouble.or(trouble(frame));
-                    } else {
-                        bus.driver.decode(now, frame);
+            let Bus { link, driver, health, incoming, live, .. } = bus;
+            let mut confirmed = None;
+            if let Some(link) = link {
+                for _ in 0..RECEIVES_MAX {
+                    let fault = link.receive(incoming);
+                    found.fault = worse(found.fault, fault);
+                    for frame in incoming.frames() {
+                        match ErrorFrame::of(frame) {
+                            Some(error) => health.take_error(error, found),
+                            None => driver.decode(now, frame),
+                        }
+                    }
+                    found.received = found.received.saturating_add(count(incoming.frames().len()));
+                    if !incoming.may_have_more() {
+                        break;
                     }
                 }
-                let received = bus.incoming.frames().len();
-                found.received += count(received);
-                if received < taustream_drivers::frame::BATCH_MAX {
-                    break;
-                }
+                confirmed = link.confirmed();
             }
-            for joint in bus.driver.joints() {
+            health.judge(Seen { live: *live, confirmed }, found);
+            for joint in driver.joints() {
                 if let Some(servo) = facts.servos.get_mut(*joint) {
-                    *servo = bus.driver.status(*joint);
+                    *servo = driver.status(*joint);
+                }
+                if let Some(out) = facts.out_of_reach.get_mut(*joint) {
+                    *out = found.failed.is_some();
                 }
             }
         }
@@ -137,25 +163,43 @@ impl Buses {
             bus.driver.clear_faults();
         }
     }
+
+    /// Hands out the links of failed buses, to be started over.
+    ///
+    /// Real time: moves pointers.
+    pub fn hand_out(&mut self) -> Links {
+        let mut links: Links = Default::default();
+        for (bus, slot) in self.0.iter_mut().zip(&mut links) {
+            if bus.health.is_silent() {
+                *slot = bus.link.take();
+            }
+        }
+        links
+    }
+
+    /// Takes links back. When they are `well`, their buses begin anew: drives are looked at before anything is said.
+    ///
+    /// Real time: moves pointers, frees nothing.
+    pub fn take_back(&mut self, links: Links, well: bool) {
+        for (bus, link) in self.0.iter_mut().zip(links) {
+            let Some(link) = link else { continue };
+            bus.link = Some(link);
+            if well {
+                bus.health.start_over();
+                bus.driver.start_over();
+            }
+        }
+    }
 }
 
 fn count(frames: usize) -> u32 {
     u32::try_from(frames).unwrap_or(u32::MAX)
 }
 
-/// What an error frame says (linux/can/error.h): class bits in the id, controller states in byte 1.
-fn trouble(frame: &CanFrame) -> Option<BusTrouble> {
-    const CONTROLLER: u32 = 0x004;
-    const BUS_OFF: u32 = 0x040;
-    const RESTARTED: u32 = 0x100;
-    const PASSIVE: u8 = 0x10 | 0x20;
-    let class = frame.id().raw();
-    let passive = frame.data().get(1).is_some_and(|state| state & PASSIVE != 0);
-    if class & BUS_OFF != 0 {
-        Some(BusTrouble::BusOff)
-    } else if class & RESTARTED != 0 {
-        Some(BusTrouble::Restarted)
-    } else {
-        (class & CONTROLLER != 0 && passive).then_some(BusTrouble::ErrorPassive)
+/// Which of two faults of one cycle says more: a lost interface hides behind a full queue.
+fn worse(sent: Option<LinkFault>, received: Option<LinkFault>) -> Option<LinkFault> {
+    match (sent, received) {
+        (Some(LinkFault::QueueFull | LinkFault::Os(_)) | None, Some(_)) => received,
+        (Some(_), _) | (None, None) => sent,
     }
 }

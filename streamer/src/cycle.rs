@@ -4,9 +4,9 @@
 //! another, none returns early, none reads a clock: everything is a function of the tick and of what arrived, so a
 //! recorded run replays exactly.
 use crate::buses::Buses;
-use crate::facts::{COMMANDS_MAX, Facts};
+use crate::facts::Facts;
 use crate::guard::Guard;
-use crate::intake::Intake;
+use crate::intake::{Answers, Handover, Intake};
 use crate::report::Reporter;
 use crate::supervise::{Orders, Supervisor};
 use crate::tick::Tick;
@@ -106,7 +106,7 @@ impl Core {
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
             supervisor: Supervisor::new(limits, joints, cycle, rules),
-            reporter: Reporter::new(settings.robot.digest, joints, cycle, recording),
+            reporter: Reporter::new(settings.robot.digest, (joints, settings.buses.len()), cycle, recording),
         }
     }
 
@@ -143,6 +143,12 @@ impl Core {
         if orders.clear_faults {
             self.buses.clear_faults();
         }
+        if let Some(sequence) = orders.restore_buses {
+            let links = Handover { sequence, links: self.buses.hand_out(), well: false };
+            if let Some(refused) = self.intake.hand_out(links) {
+                self.buses.take_back(refused.links, false);
+            }
+        }
     }
 }
 
@@ -168,6 +174,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     let wish = core.supervisor.wish();
 
     let offer = core.intake.subscribe(&mut facts);
+    let restored = core.intake.take_back(&mut facts);
     probe.ended(Stage::Subscribe);
     let (phase, speed) = (core.supervisor.phase(), core.supervisor.speed());
     let spare = core.track.splice(offer, phase, speed, &mut facts);
@@ -187,12 +194,15 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     core.buses.receive(tick.woke, &mut facts);
     probe.ended(Stage::Receive);
 
-    let mut answers = [None; COMMANDS_MAX];
+    let mut answers: Answers = [None; _];
     let orders = core.supervisor.judge(&facts, core.intake.leave(), &mut answers);
     probe.ended(Stage::Supervise);
     core.reporter.write(&facts, &command, &core.track, (&core.supervisor, &orders));
     core.intake.answer(facts.verdict, &answers);
     core.obey(&orders);
+    if let Some(back) = restored {
+        core.buses.take_back(back.links, back.well);
+    }
     probe.ended(Stage::Report);
     match orders.leave {
         None => Next::Go,

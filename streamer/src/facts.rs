@@ -1,14 +1,13 @@
 //! What one cycle has found out: every stage writes down what happened, `supervise` alone draws conclusions.
 use crate::phases::Event;
 use crate::tick::Tick;
-use taustream_drivers::{LinkFault, ServoStatus};
-use taustream_messages::{Command, FaultReason, Phase};
+use taustream_drivers::{ErrorFrame, LinkFault, ServoStatus};
+pub use taustream_messages::{BUSES_MAX, Cause};
+use taustream_messages::{BusTrouble, Command, Phase};
 use taustream_motion::limits::Quantity;
 use taustream_motion::time_scale::Scale;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
-/// Most buses of one arm.
-pub const BUSES_MAX: usize = 8;
 /// Most commands taken in one cycle; more wait for the next.
 pub const COMMANDS_MAX: usize = 4;
 /// Most changes of phase in one cycle: a few commands and an event of each kind.
@@ -99,17 +98,6 @@ pub enum Braking {
     Rested,
 }
 
-/// What the kernel says about a bus in an error frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BusTrouble {
-    /// The controller has left the bus.
-    BusOff,
-    /// The controller may only listen.
-    ErrorPassive,
-    /// The controller came back by itself: queued setpoints may be old.
-    Restarted,
-}
-
 /// One bus in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusFacts {
@@ -119,27 +107,33 @@ pub struct BusFacts {
     pub sent: u32,
     /// Why not all, or why nothing could be received.
     pub fault: Option<LinkFault>,
-    /// Frames received.
+    /// Frames received, own ones not counted.
     pub received: u32,
-    /// What an error frame said.
-    pub trouble: Option<BusTrouble>,
+    /// Error frames received.
+    pub errors: u32,
+    /// Why nothing leaves on it any more, from its failure to `clear-fault`.
+    pub failed: Option<BusTrouble>,
+    /// Its controller is error-passive.
+    pub passive: bool,
     /// Cycles in a row in which not everything was taken.
     pub lost_in_a_row: u32,
+    /// Frames handed over and not yet seen on the wire.
+    pub in_flight: u32,
+    /// The newest error frame since start.
+    pub newest_error: ErrorFrame,
+    /// Error frames since start.
+    pub error_frames: u64,
     /// SYNCs handed over since start.
     pub syncs: u64,
 }
 
-/// Why the arm stopped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cause {
-    /// The kind.
-    pub reason: FaultReason,
-    /// Zero-based joint, where one is to blame.
-    pub joint: Option<usize>,
-    /// The number that belongs to the reason.
-    pub value: f64,
-    /// The limit that it broke; 0 where there is none.
-    pub limit: f64,
+/// What became of starting the failed buses over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Restored {
+    /// The `clear-fault` that asked for it.
+    pub sequence: u64,
+    /// Every one of them is there again. If not, the one who asked was told why.
+    pub well: bool,
 }
 
 /// One change of phase.
@@ -192,6 +186,10 @@ pub struct Facts {
     pub sweep_rad: [[f64; 2]; MAX_JOINTS],
     /// The buses.
     pub buses: [BusFacts; BUSES_MAX],
+    /// Failed buses came back from being started over.
+    pub restored: Option<Restored>,
+    /// Joints on failed buses: what is known of them is old, and no command reaches them.
+    pub out_of_reach: [bool; MAX_JOINTS],
     /// The drives, after receiving.
     pub servos: [ServoStatus; MAX_JOINTS],
     /// Pose of the last setpoint that left.
@@ -219,21 +217,24 @@ impl Facts {
             braking: Braking::No,
             sweep_rad: [[0.0; 2]; MAX_JOINTS],
             buses: [BusFacts::default(); BUSES_MAX],
+            restored: None,
+            out_of_reach: [false; MAX_JOINTS],
             servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
             commanded_rad: [0.0; MAX_JOINTS],
         }
     }
 
-    /// Cycles in a row that the worst bus has lost.
+    /// The first bus that has failed, and why.
     #[must_use]
-    pub fn lost_in_a_row(&self) -> u32 {
-        self.buses.iter().map(|b| b.lost_in_a_row).max().unwrap_or(0)
+    pub fn failed_bus(&self) -> Option<(usize, BusTrouble)> {
+        self.buses.iter().enumerate().find_map(|(bus, found)| Some((bus, found.failed?)))
     }
 
-    /// True when at least one frame left, or none was wanted.
+    /// True when at least one frame left, or none was wanted because nothing has to be said. A failed bus is silent
+    /// because nothing can be.
     #[must_use]
     pub fn setpoints_left(&self) -> bool {
-        let wanted: u32 = self.buses.iter().map(|b| b.wanted).sum();
-        wanted == 0 || self.buses.iter().any(|b| b.sent > 0)
+        let quiet = self.buses.iter().all(|b| b.wanted == 0 && b.failed.is_none());
+        quiet || self.buses.iter().any(|b| b.sent > 0)
     }
 }

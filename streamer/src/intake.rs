@@ -2,7 +2,8 @@
 //!
 //! Trajectories travel in boxes that are made at start and go round: empty from the cycle to the service thread,
 //! filled back. So nothing is allocated or freed on the real-time thread, and a sender that floods finds no box.
-use crate::facts::{Asked, COMMANDS_MAX, Facts, Verdict};
+use crate::buses::Links;
+use crate::facts::{Asked, COMMANDS_MAX, Facts, Restored, Verdict};
 use crate::words::Answer;
 use crossbeam_queue::ArrayQueue;
 use std::sync::Arc;
@@ -14,6 +15,9 @@ use taustream_motion::{MAX_JOINTS, Trajectory};
 const BOXES: usize = 4;
 /// Commands that may be on their way at one time.
 pub const COMMANDS_PENDING_MAX: usize = 16;
+
+/// The answers of one cycle: to its commands, and to a `clear-fault` of before that waited for a bus.
+pub type Answers = [Option<Answer>; COMMANDS_MAX + 1];
 
 /// A trajectory in its box.
 pub type Boxed = Box<CheckedTrajectory>;
@@ -30,14 +34,31 @@ pub enum Leave {
     AtOnce,
 }
 
-#[derive(Debug)]
+/// Links of failed buses, on their way to be started over or back. One at a time is on its way.
+pub struct Handover {
+    /// The `clear-fault` that asked for it.
+    pub sequence: u64,
+    /// The links; none of the buses that are well.
+    pub links: Links,
+    /// On the way back: every one of them was started over.
+    pub well: bool,
+}
+
 struct Queues {
     leave: AtomicU8,
+    failed_links: ArrayQueue<Handover>,
+    restored_links: ArrayQueue<Handover>,
     empty: ArrayQueue<Boxed>,
     filled: ArrayQueue<Boxed>,
     verdicts: ArrayQueue<Verdict>,
     asked: ArrayQueue<Asked>,
     answers: ArrayQueue<Answer>,
+}
+
+impl std::fmt::Debug for Queues {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Queues").field("leave", &self.leave).finish_non_exhaustive()
+    }
 }
 
 /// The cycle's end of the queues.
@@ -53,6 +74,8 @@ pub struct Desk(Arc<Queues>);
 pub fn pair() -> (Intake, Desk) {
     let queues = Arc::new(Queues {
         leave: AtomicU8::new(0),
+        failed_links: ArrayQueue::new(1),
+        restored_links: ArrayQueue::new(1),
         empty: ArrayQueue::new(BOXES),
         filled: ArrayQueue::new(BOXES),
         verdicts: ArrayQueue::new(BOXES),
@@ -95,6 +118,22 @@ impl Intake {
         }
     }
 
+    /// Hands links out to be started over; gives them back when others are still on their way.
+    ///
+    /// Real time: moves pointers.
+    pub fn hand_out(&mut self, links: Handover) -> Option<Handover> {
+        self.0.failed_links.push(links).err()
+    }
+
+    /// Takes links that come back.
+    ///
+    /// Real time: moves pointers.
+    pub fn take_back(&mut self, facts: &mut Facts) -> Option<Handover> {
+        let back = self.0.restored_links.pop()?;
+        facts.restored = Some(Restored { sequence: back.sequence, well: back.well });
+        Some(back)
+    }
+
     /// How the streamer is asked to end.
     ///
     /// Real time: one atomic load.
@@ -110,7 +149,7 @@ impl Intake {
     /// Answers the trajectory and the commands of a cycle. Every box and every command has room for its answer.
     ///
     /// Real time: no allocation.
-    pub fn answer(&mut self, verdict: Option<Verdict>, answers: &[Option<Answer>; COMMANDS_MAX]) {
+    pub fn answer(&mut self, verdict: Option<Verdict>, answers: &Answers) {
         if let Some(verdict) = verdict {
             self.0.verdicts.force_push(verdict);
         }
@@ -144,6 +183,18 @@ impl Desk {
     #[must_use]
     pub fn ask(&self, asked: Asked) -> bool {
         self.0.asked.push(asked).is_ok()
+    }
+
+    /// Links that are to be started over.
+    #[must_use]
+    pub fn failed_links(&self) -> Option<Handover> {
+        self.0.failed_links.pop()
+    }
+
+    /// Gives links back to the cycle.
+    pub fn give_back_links(&self, links: Handover) {
+        // One handover is on its way at a time, so there is room.
+        drop(self.0.restored_links.push(links));
     }
 
     /// A handle by which another thread asks the cycle to end.

@@ -4,19 +4,22 @@
 use crate::facts::{Asked, Cause, Facts};
 use crate::intake::Leave;
 use crate::phases::Event;
-use crate::supervise::{Orders, Supervisor};
+use crate::supervise::{Orders, Supervisor, is_energised};
 use crate::track::ScaleOrder;
 use crate::watch::REST_RAD_S;
 use crate::words::{Answer, Why};
-use taustream_drivers::{DriveState, LinkFault, ServoStatus};
+use taustream_drivers::{DriveState, ServoStatus};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 impl Supervisor {
-    /// Takes a command over, or says why not.
+    /// Takes a command over, or says why not; `None` when the answer has to wait for a bus.
     ///
     /// Real time: bounded work, no allocation.
-    pub(crate) fn command(&mut self, asked: Asked, facts: &Facts, orders: &mut Orders) -> Answer {
+    pub(crate) fn command(&mut self, asked: Asked, facts: &Facts, orders: &mut Orders) -> Option<Answer> {
+        if asked.command == Command::ClearFault && self.begin_restoring(asked.sequence, facts, orders) {
+            return None;
+        }
         let result = match asked.command {
             Command::Enable | Command::Resume if self.leaving != Leave::No => Err(Why::Leaving),
             Command::Enable => self.enable(facts, orders),
@@ -36,7 +39,26 @@ impl Supervisor {
             Ok(why) => (true, why),
             Err(why) => (false, why),
         };
-        Answer { sequence: asked.sequence, accepted, phase: self.phase, why }
+        Some(Answer { sequence: asked.sequence, accepted, phase: self.phase, why })
+    }
+
+    /// Whether clearing the fault is a matter of failed buses alone; if so, has them started over.
+    fn begin_restoring(&mut self, sequence: u64, facts: &Facts, orders: &mut Orders) -> bool {
+        let begins = self.phase == Phase::Fault
+            && self.restoring.is_none()
+            && facts.failed_bus().is_some()
+            && self.held_in_reach(facts).is_none();
+        if begins {
+            self.restoring = Some(sequence);
+            orders.restore_buses = Some(sequence);
+        }
+        begins
+    }
+
+    /// A drive that carries torque on a bus that is well.
+    fn held_in_reach(&self, facts: &Facts) -> Option<usize> {
+        let (mut servos, out_of_reach) = (self.servos(facts), &facts.out_of_reach);
+        servos.find(|(joint, s)| !out_of_reach[*joint] && is_energised(s.state)).map(|(joint, _)| joint)
     }
 
     fn enable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
@@ -96,7 +118,11 @@ impl Supervisor {
         match self.phase {
             Phase::Fault if self.holds => {
                 self.holds = false;
-                Ok(Why::Disabling)
+                // Nothing is said on a failed bus: its drives are where their own watchdogs have left them.
+                match facts.failed_bus() {
+                    Some((bus, _)) if self.held_in_reach(facts).is_none() => Err(Why::OutOfReach { bus }),
+                    Some(_) | None => Ok(Why::Disabling),
+                }
             }
             Phase::Configuring | Phase::Disabled | Phase::Disabling | Phase::Fault => Ok(Why::Already),
             Phase::Enabling | Phase::Holding | Phase::Paused | Phase::Locked => {
@@ -157,8 +183,7 @@ impl Supervisor {
             | Phase::Paused
             | Phase::Stopping
             | Phase::Locked => {
-                let cause = Cause { reason: FaultReason::Operator, joint: None, value: 0.0, limit: 0.0 };
-                self.raise(Event::StopFault, cause, facts, orders);
+                self.raise(Event::StopFault, Cause::new(FaultReason::Operator), facts, orders);
                 Ok(Why::FastStopping)
             }
         }
@@ -182,13 +207,16 @@ impl Supervisor {
         } else if self.phase != Phase::Fault {
             return Err(Why::NoFault);
         }
-        // Drives that are off want no frames, so none are lost on a link that has ended: asked of the link itself.
-        // What the drives last said is then old, and nothing may be concluded from it.
-        if facts.buses.iter().any(|bus| bus.fault == Some(LinkFault::Gone)) {
-            return Err(Why::BusGone);
+        if self.restoring.is_some() {
+            return Err(Why::Wait);
         }
-        if self.watch.bus_cause(facts).is_some() {
-            return Err(Why::BusFails { lost_in_a_row: facts.lost_in_a_row() });
+        if let Some((bus, _)) = facts.failed_bus()
+            && let Some(joint) = self.held_in_reach(facts)
+        {
+            return Err(Why::HoldsBesideFailed { joint, bus });
+        }
+        if let Some(bus) = facts.buses.iter().position(|b| b.passive) {
+            return Err(Why::BusPassive { bus });
         }
         if self.holds {
             self.may_hold_on(facts)?;

@@ -155,10 +155,11 @@ impl Log {
 }
 
 fn phase_line(t: &Transition) -> Value {
-    let reason = t.cause.map_or(t.event.word(), |cause| cause.reason.word(cause.limit));
+    let reason = t.cause.map_or(t.event.word(), |cause| cause.reason.word());
     json!({
         "event": "phase", "tick": t.tick, "from": t.from.word(), "to": t.to.word(), "reason": reason,
-        "joint": t.cause.and_then(|c| c.joint), "value": t.cause.map(|c| c.value),
+        "joint": t.cause.and_then(|c| c.joint), "bus": t.cause.and_then(|c| c.bus),
+        "code": t.cause.map(|c| c.code), "value": t.cause.map(|c| c.value),
     })
 }
 
@@ -210,8 +211,7 @@ mod tests {
         queue.push(Record::Accepted { tick: 41, trajectory_id: 7, start_offset_rad }).unwrap();
         let position_rad = trajectory.sample(0.777).position_rad;
         queue.push(Record::Cycle(cycle(41, position_rad))).unwrap();
-        let cause =
-            Some(Cause { reason: FaultReason::FeedbackLate, joint: Some(2), value: 0.021, limit: 0.02 });
+        let cause = Some(Cause::new(FaultReason::FeedbackLate).at_joint(2).amount(0.021, 0.02));
         let (from, to, event) = (Phase::Moving, Phase::FastStopping, Event::StopFault);
         queue.push(Record::Transition(Transition { tick: 42, from, to, event, cause })).unwrap();
         queue.push(Record::Lost(5)).unwrap();

@@ -2,15 +2,15 @@
 //!
 //! Everything is a plain value pushed into a bounded queue. A full queue drops the newest value and counts it: the
 //! cycle never waits for a reader.
-use crate::facts::{BUSES_MAX, Decision};
+use crate::facts::{BUSES_MAX, BusFacts, Decision};
 use crate::facts::{Facts, TRANSITIONS_MAX, Transition, Trip};
 use crate::guard::GuardedCommand;
-use crate::supervise::{Orders, Supervisor};
+use crate::supervise::{Orders, Supervisor, is_energised};
 use crate::track::Track;
 use crossbeam_queue::ArrayQueue;
 use std::sync::Arc;
-use taustream_drivers::DriveState;
-use taustream_messages::{LAYOUT_VERSION, Phase, Report, RobotDigest};
+use taustream_drivers::ErrorFrame;
+use taustream_messages::{BusTrouble, LAYOUT_VERSION, Phase, Report, RobotDigest};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Reports that may wait for the service thread.
@@ -42,6 +42,22 @@ pub enum Note {
         trip: Trip,
         /// Lowest and highest angle a joint, rad.
         sweep_rad: [[f64; 2]; MAX_JOINTS],
+    },
+    /// The controller of a bus tells of an error.
+    BusError {
+        /// Index of the bus.
+        bus: usize,
+        /// What it tells.
+        error: ErrorFrame,
+        /// Error frames of this bus since the note before this one, this one included.
+        count: u64,
+    },
+    /// A bus failed, and is silent from now on.
+    BusFailed {
+        /// Index of the bus.
+        bus: usize,
+        /// Why.
+        trouble: BusTrouble,
     },
     /// No setpoint left for longer than the drives bridge.
     Stall {
@@ -119,7 +135,19 @@ pub struct Reporter {
     frozen_before: bool,
     records_lost: u64,
     last_running: Running,
+    noted: [NotedBus; BUSES_MAX],
+    /// The last command of each joint that could reach it.
+    reached_rad: JointArray,
     counts: Report,
+}
+
+/// What was last noted of a bus.
+#[derive(Clone, Copy, Debug, Default)]
+struct NotedBus {
+    error: ErrorFrame,
+    error_frames: u64,
+    tick: u64,
+    failed: Option<BusTrouble>,
 }
 
 /// The trajectory that runs or ran last.
@@ -131,11 +159,11 @@ struct Running {
 }
 
 impl Reporter {
-    /// A reporter for an arm; `rate_hz` reports a second, and records for a cycle log if `recording`.
+    /// A reporter for an arm of so many joints and buses; it fills records for a cycle log if `recording`.
     #[must_use]
     pub fn new(
         digest: RobotDigest,
-        joints: usize,
+        (joints, buses): (usize, usize),
         cycle: &taustream_arm::settings::Cycle,
         recording: bool,
     ) -> Self {
@@ -147,6 +175,7 @@ impl Reporter {
         let counts = Report {
             layout_version: LAYOUT_VERSION,
             joint_count: u32::try_from(joints).unwrap_or(u32::MAX),
+            bus_count: u32::try_from(buses).unwrap_or(u32::MAX),
             robot_digest: digest,
             ..Report::default()
         };
@@ -165,6 +194,8 @@ impl Reporter {
             frozen_before: false,
             records_lost: 0,
             last_running: Running::default(),
+            noted: [NotedBus::default(); BUSES_MAX],
+            reached_rad: [0.0; MAX_JOINTS],
             counts,
         }
     }
@@ -187,6 +218,12 @@ impl Reporter {
     ) {
         let (supervisor, orders) = judged;
         self.count(facts);
+        let joints = self.reached_rad.iter_mut().zip(&facts.commanded_rad).zip(&facts.out_of_reach);
+        for ((reached_rad, commanded_rad), out_of_reach) in joints {
+            if !out_of_reach {
+                *reached_rad = *commanded_rad;
+            }
+        }
         if let Some(running) = track.running() {
             let duration_s = running.trajectory.duration_s();
             self.last_running = Running { id: running.trajectory_id, s: facts.trajectory_s, duration_s };
@@ -211,10 +248,39 @@ impl Reporter {
         c.cycles_late += u64::from(facts.tick.lateness_ns() > self.period_ns / 2);
         c.guard_trips += u64::from(facts.trip.is_some());
         c.stalls += u64::from(facts.frozen && !self.frozen_before);
-        for bus in &facts.buses {
-            c.frames_sent += u64::from(bus.sent);
-            c.frames_lost += u64::from(bus.wanted - bus.sent.min(bus.wanted));
-            c.frames_received += u64::from(bus.received);
+        for (found, bus) in facts.buses.iter().zip(&mut c.buses) {
+            let lost = u64::from(lost_frames(found));
+            bus.frames_sent += u64::from(found.sent);
+            bus.frames_lost += lost;
+            bus.frames_received += u64::from(found.received);
+            bus.cycles_lost += u64::from(lost > 0);
+            bus.error_frames = found.error_frames;
+            c.frames_sent += u64::from(found.sent);
+            c.frames_lost += lost;
+            c.frames_received += u64::from(found.received);
+        }
+    }
+
+    /// Notes what a controller tells: at once when it is new, else once a second with its count, so that a flood of error
+    /// frames does not flood the log.
+    fn note_buses(&mut self, facts: &Facts) {
+        let second_ticks = 1_000_000_000 / self.period_ns;
+        for (bus, (found, noted)) in facts.buses.iter().zip(&mut self.noted).enumerate() {
+            if found.failed != noted.failed {
+                noted.failed = found.failed;
+                if let Some(trouble) = found.failed {
+                    let _ = self.queues.notes.push(Note::BusFailed { bus, trouble });
+                }
+            }
+            let count = found.error_frames.saturating_sub(noted.error_frames);
+            let is_new = kind(found.newest_error) != kind(noted.error);
+            let is_due = facts.tick.number.saturating_sub(noted.tick) >= second_ticks;
+            if count > 0 && (is_new || is_due) {
+                let error = found.newest_error;
+                (noted.error, noted.error_frames, noted.tick) =
+                    (error, found.error_frames, facts.tick.number);
+                let _ = self.queues.notes.push(Note::BusError { bus, error, count });
+            }
         }
     }
 
@@ -222,6 +288,7 @@ impl Reporter {
         if let Some(trip) = facts.trip {
             let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad });
         }
+        self.note_buses(facts);
         if facts.frozen && !self.frozen_before {
             let _ = self.queues.notes.push(Note::Stall { gap_s: facts.gap_s });
         }
@@ -258,7 +325,7 @@ impl Reporter {
                 sigma: facts.scale.sigma,
                 position_rad: command.setpoint().position_rad,
                 sent: facts.buses.map(|b| b.sent),
-                lost: facts.buses.map(|b| b.wanted - b.sent.min(b.wanted)),
+                lost: facts.buses.map(|b| lost_frames(&b)),
             }));
         }
     }
@@ -279,22 +346,26 @@ impl Reporter {
         track: &Track,
         supervisor: &Supervisor,
     ) -> Report {
-        let cause = supervisor.cause();
         let setpoint = command.setpoint();
         let (tracking_error_rad, tracking_error_rad_max) = supervisor.watch().tracking_rad();
         let joints = self.counts.joints();
         let mut r = self.counts;
         (r.tick, r.time_ns, r.phase) = (facts.tick.number, facts.tick.woke.0, supervisor.phase().code());
-        r.fault_reason = cause.map_or(0, |c| c.reason.code());
-        r.fault_joint = cause.and_then(|c| u32::try_from(c.joint?).ok()).unwrap_or(u32::MAX);
-        (r.fault_value, r.fault_limit) = cause.map_or((0.0, 0.0), |c| (c.value, c.limit));
+        r.set_cause(supervisor.cause());
+        for (bus, found) in r.buses.iter_mut().zip(&facts.buses) {
+            let passive = found.passive.then_some(BusTrouble::ErrorPassive);
+            bus.trouble = found.failed.or(passive).map_or(0, BusTrouble::code);
+            bus.silent = u32::from(found.failed.is_some());
+            bus.in_flight = found.in_flight;
+            (bus.error_class, bus.error_data) = (found.newest_error.class, found.newest_error.data);
+        }
         r.energised = u32::from(facts.servos.iter().take(joints).any(|s| is_energised(s.state)));
         r.generation = track.newest_generation();
         let run = self.last_running;
         (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
         r.end_rad = track.running().map_or(facts.commanded_rad, |t| t.trajectory.end_rad());
         (r.sigma, r.speed_percent) = (facts.scale.sigma, supervisor.speed() * 100.0);
-        r.command_rad = facts.commanded_rad;
+        r.command_rad = self.reached_rad;
         r.command_velocity_rad_s = setpoint.velocity_rad_s;
         r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
         r.command_jerk_rad_s3 = setpoint.jerk_rad_s3;
@@ -305,14 +376,23 @@ impl Reporter {
             r.feedback_age_s[joint] = supervisor.watch().age_s(facts, joint);
             r.drive_status[joint] = servo.status_word;
             r.drive_error[joint] = servo.error_code;
+            if facts.out_of_reach[joint] {
+                // Nothing is commanded there any more.
+                r.command_velocity_rad_s[joint] = 0.0;
+                r.command_acceleration_rad_s2[joint] = 0.0;
+                r.command_jerk_rad_s3[joint] = 0.0;
+            }
         }
         r
     }
 }
 
-fn is_energised(state: DriveState) -> bool {
-    matches!(
-        state,
-        DriveState::Enabled | DriveState::Enabling | DriveState::Disabling | DriveState::EnergisedUnowned
-    )
+fn lost_frames(found: &BusFacts) -> u32 {
+    found.wanted.saturating_sub(found.sent)
+}
+
+/// An error without its counters, which change with every frame.
+fn kind(error: ErrorFrame) -> (u32, [u8; 6]) {
+    let [a, b, c, d, e, f, ..] = error.data;
+    (error.class, [a, b, c, d, e, f])
 }

@@ -8,6 +8,7 @@ use crate::check::{Checked, Checker};
 use crate::facts::{Asked, Decision, Verdict};
 use crate::intake::{COMMANDS_PENDING_MAX, Desk};
 use crate::log;
+use crate::names::Names;
 use crate::recorder::Candidate;
 use crate::report::{Note, Readers};
 use crate::rt;
@@ -46,7 +47,7 @@ struct Pending {
 pub struct Service {
     desk: Desk,
     readers: Readers,
-    names: Vec<String>,
+    names: Names,
     robot: String,
     digest_hex: String,
     checker: Checker,
@@ -100,7 +101,7 @@ impl Service {
         Ok(Self {
             desk,
             readers,
-            names: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
+            names: Names::of(settings),
             robot: settings.robot.name.clone(),
             digest_hex: settings.robot.digest_hex(),
             checker: Checker::start(&settings.robot).map_err(|e| StartError::System(e.to_string()))?,
@@ -129,6 +130,7 @@ impl Service {
             let last = stop.load(Ordering::Acquire);
             self.take_commands();
             self.take_trajectories();
+            self.restore_buses();
             self.return_answers();
             self.return_checked();
             self.return_verdicts();
@@ -168,14 +170,37 @@ impl Service {
         }
     }
 
+    /// Starts the links of failed buses over. What stands in the way is the answer to the `clear-fault` that asked.
+    fn restore_buses(&mut self) {
+        let Some(mut handover) = self.desk.failed_links() else { return };
+        let mut obstacles = Vec::new();
+        for (bus, link) in handover.links.iter_mut().enumerate() {
+            match link.as_mut().map(|link| link.reopen()) {
+                None => {}
+                Some(Ok(())) => info!("{} is started over", self.names.bus(bus)),
+                Some(Err(e)) => obstacles.push(format!("{}: {e}", self.names.bus(bus))),
+            }
+        }
+        handover.well = obstacles.is_empty();
+        let sequence = handover.sequence;
+        self.desk.give_back_links(handover);
+        if !obstacles.is_empty() {
+            self.answer(sequence, (false, Phase::Fault), &obstacles.join("; "));
+        }
+    }
+
+    fn answer(&mut self, sequence: u64, (accepted, phase): (bool, Phase), text: &str) {
+        let found = self.pending.iter().position(|p| p.sequence == sequence);
+        let Some(pending) = found.map(|at| self.pending.swap_remove(at)) else { return };
+        let message = if accepted { CommandReply::accepted } else { CommandReply::refused };
+        info!(accepted, phase = phase.word(), "answered: {text}");
+        reply(&pending.question, message(phase, text));
+    }
+
     fn return_answers(&mut self) {
         while let Some(answer) = self.desk.answer() {
-            let text = answer.why.sentence(|joint| self.joint_name(joint));
-            let found = self.pending.iter().position(|p| p.sequence == answer.sequence);
-            let Some(pending) = found.map(|at| self.pending.swap_remove(at)) else { continue };
-            let message = if answer.accepted { CommandReply::accepted } else { CommandReply::refused };
-            info!(accepted = answer.accepted, phase = answer.phase.word(), "answered: {text}");
-            reply(&pending.question, message(answer.phase, &text));
+            let text = answer.why.sentence(&self.names);
+            self.answer(answer.sequence, (answer.accepted, answer.phase), &text);
         }
         let now = rt::now();
         let phase = self.phase;
@@ -315,13 +340,8 @@ impl Service {
             if let Note::Transition(transition) = note {
                 self.phase = transition.to;
             }
-            log::note(&note, |joint| self.joint_name(joint));
+            log::note(&note, &self.names);
         }
-    }
-
-    fn joint_name(&self, joint: usize) -> String {
-        let name = self.names.get(joint).map_or("?", String::as_str);
-        format!("{} ({name})", joint + 1)
     }
 }
 

@@ -4,7 +4,7 @@
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
 //! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
 use crate::facts::{Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition};
-use crate::intake::Leave;
+use crate::intake::{Answers, Leave};
 use crate::phases::{self, Event};
 use crate::track::ScaleOrder;
 use crate::watch::Watch;
@@ -32,6 +32,8 @@ pub struct Orders {
     pub pose_rad: Option<JointArray>,
     /// Drives are asked to forget their faults.
     pub clear_faults: bool,
+    /// Failed buses are started over, as this command asked.
+    pub restore_buses: Option<u64>,
     /// The changes of phase, in order.
     pub transitions: [Option<Transition>; TRANSITIONS_MAX],
     /// The cycle ends after this one; true: orderly.
@@ -57,6 +59,8 @@ pub struct Supervisor {
     /// A stall froze the motion; it goes on when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
     pub(crate) resetting_since: Option<Nanos>,
+    /// Failed buses are being started over, for this `clear-fault`.
+    pub(crate) restoring: Option<u64>,
     pub(crate) leaving: Leave,
     leaving_since: Nanos,
 }
@@ -80,6 +84,7 @@ impl Supervisor {
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
             resetting_since: None,
+            restoring: None,
             leaving: Leave::No,
             leaving_since: Nanos(0),
         }
@@ -131,19 +136,16 @@ impl Supervisor {
     /// Judges one cycle: its facts first, then its commands, then leaving. `answers` takes the commands' answers.
     ///
     /// Real time: bounded work, no allocation.
-    pub fn judge(
-        &mut self,
-        facts: &Facts,
-        leave: Leave,
-        answers: &mut [Option<Answer>; crate::facts::COMMANDS_MAX],
-    ) -> Orders {
+    pub fn judge(&mut self, facts: &Facts, leave: Leave, answers: &mut Answers) -> Orders {
         let mut orders = Orders::default();
         self.watch.observe(facts);
         self.judge_motion(facts, &mut orders);
         self.judge_stall(facts, &mut orders);
         self.judge_drives(facts, &mut orders);
-        for (asked, answer) in facts.commands.iter().zip(answers.iter_mut()) {
-            *answer = asked.map(|asked| self.command(asked, facts, &mut orders));
+        let [answers @ .., restored] = answers;
+        *restored = self.judge_restored(facts, &mut orders);
+        for (asked, answer) in facts.commands.iter().zip(answers) {
+            *answer = asked.and_then(|asked| self.command(asked, facts, &mut orders));
         }
         self.judge_leaving(leave, facts, &mut orders);
         self.follow_measured(facts, &mut orders);
@@ -195,8 +197,7 @@ impl Supervisor {
             self.step(Event::Accepted, facts, orders);
         }
         if let Some(trip) = facts.trip {
-            let joint = Some(trip.joint);
-            let cause = Cause { reason: FaultReason::Guard, joint, value: trip.value, limit: trip.limit };
+            let cause = Cause::new(FaultReason::Guard).at_joint(trip.joint).amount(trip.value, trip.limit);
             // In a fast stop the first cause stays the one to report.
             let cause = if self.phase == Phase::FastStopping { self.cause.unwrap_or(cause) } else { cause };
             self.raise(Event::GuardTrip, cause, facts, orders);
@@ -216,8 +217,7 @@ impl Supervisor {
     fn judge_stall(&mut self, facts: &Facts, orders: &mut Orders) {
         let energised = self.wish() == DriveWish::Enabled && self.phase != Phase::Fault;
         if energised && facts.gap_s > self.watchdog_s {
-            let cause =
-                Cause { reason: FaultReason::Stall, joint: None, value: facts.gap_s, limit: self.watchdog_s };
+            let cause = Cause::new(FaultReason::Stall).amount(facts.gap_s, self.watchdog_s);
             self.raise(Event::StopFault, cause, facts, orders);
         }
         if self.phase != Phase::Moving {
@@ -241,8 +241,28 @@ impl Supervisor {
         }
     }
 
+    /// Failed buses are back, or not: the `clear-fault` that asked for it goes on, or was refused in the service
+    /// thread's own words.
+    fn judge_restored(&mut self, facts: &Facts, orders: &mut Orders) -> Option<Answer> {
+        let restored = facts.restored?;
+        self.restoring = None;
+        if !restored.well || self.phase != Phase::Fault {
+            return None;
+        }
+        self.clear(Event::ClearedOff, facts, orders);
+        let (sequence, phase) = (restored.sequence, self.phase);
+        Some(Answer { sequence, accepted: true, phase, why: Why::BusRestored })
+    }
+
     fn judge_drives(&mut self, facts: &Facts, orders: &mut Orders) {
+        // Buses that just came back are judged from the next cycle on.
+        let failed = facts.failed_bus().is_some() && facts.restored.is_none();
         match self.phase {
+            Phase::Configuring | Phase::Disabled | Phase::Disabling if failed => {
+                if let Some(cause) = self.watch.bus_cause(facts) {
+                    self.raise(Event::HardFault, cause, facts, orders);
+                }
+            }
             Phase::Configuring | Phase::Disabled => self.judge_bring_up(facts, orders),
             Phase::Disabling => {
                 if self.all(facts, |s| s.state == DriveState::Disabled) {
@@ -276,13 +296,10 @@ impl Supervisor {
 
     fn judge_bring_up(&mut self, facts: &Facts, orders: &mut Orders) {
         let bad = self.servos(facts).find_map(|(joint, servo)| {
-            let code = f64::from(servo.error_code);
-            let (reason, value, limit) = match servo.state {
-                DriveState::Refused => {
-                    (FaultReason::ConfigurationRefused, code, f64::from(servo.refused_object))
-                }
-                DriveState::EnergisedUnowned => (FaultReason::NotTrusted, 0.0, 0.0),
-                DriveState::Fault => (FaultReason::DriveFault, code, 0.0),
+            let reason = match servo.state {
+                DriveState::Refused => FaultReason::ConfigurationRefused,
+                DriveState::EnergisedUnowned => FaultReason::NotTrusted,
+                DriveState::Fault => FaultReason::DriveFault,
                 DriveState::Absent
                 | DriveState::Configuring
                 | DriveState::Disabled
@@ -290,7 +307,8 @@ impl Supervisor {
                 | DriveState::Enabled
                 | DriveState::Disabling => return None,
             };
-            Some(Cause { reason, joint: Some(joint), value, limit })
+            let cause = Cause::new(reason).at_joint(joint).code(servo.error_code);
+            Some(Cause { object: servo.refused_object, ..cause })
         });
         if let Some(cause) = bad {
             self.raise(Event::HardFault, cause, facts, orders);
@@ -381,7 +399,7 @@ impl Supervisor {
         self.torque_off = true;
         self.holds = false;
         self.resetting_since = None;
-        let asked = Cause { reason: FaultReason::TorqueOff, joint: None, value: 0.0, limit: 0.0 };
+        let asked = Cause::new(FaultReason::TorqueOff);
         // A fault that stopped the arm before stays the one to report.
         let cause = self.cause.unwrap_or(asked);
         self.raise(Event::HardFault, cause, facts, orders);
@@ -403,18 +421,9 @@ impl Supervisor {
         others.next().map(|(joint, s)| Why::NotConfigured { joint, state: s.state })
     }
 
-    /// The first drive that carries torque.
+    /// The first drive that carries torque, or did when it was last heard.
     pub(crate) fn energised(&self, facts: &Facts) -> Option<(usize, DriveState)> {
-        let on = |s: &ServoStatus| {
-            matches!(
-                s.state,
-                DriveState::Enabled
-                    | DriveState::Enabling
-                    | DriveState::Disabling
-                    | DriveState::EnergisedUnowned
-            )
-        };
-        self.servos(facts).find(|(_, s)| on(s)).map(|(joint, s)| (joint, s.state))
+        self.servos(facts).find(|(_, s)| is_energised(s.state)).map(|(joint, s)| (joint, s.state))
     }
 
     fn overdue(&self, facts: &Facts, done: impl Fn(&ServoStatus) -> bool) -> Option<Cause> {
@@ -423,6 +432,14 @@ impl Supervisor {
             return None;
         }
         let joint = self.servos(facts).find(|(_, s)| !done(s)).map(|(joint, _)| joint);
-        Some(Cause { reason: FaultReason::BringUp, joint, value: limit, limit })
+        Some(Cause { joint, ..Cause::new(FaultReason::BringUp).amount(limit, limit) })
     }
+}
+
+/// The drive carries torque.
+pub(crate) fn is_energised(state: DriveState) -> bool {
+    matches!(
+        state,
+        DriveState::Enabled | DriveState::Enabling | DriveState::Disabling | DriveState::EnergisedUnowned
+    )
 }

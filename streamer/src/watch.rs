@@ -6,7 +6,7 @@
 use crate::facts::{Cause, Facts};
 use taustream_arm::settings::Supervision;
 use taustream_drivers::{DriveState, Nanos};
-use taustream_messages::{DRIVE_WARNING, FaultReason};
+use taustream_messages::{BusTrouble, FaultReason};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// Cycles from a command to the measured position that answers it.
@@ -136,17 +136,30 @@ impl Watch {
         })
     }
 
-    /// A bus that does not carry setpoints any more.
+    /// A bus that does not carry setpoints any more, or may soon not.
     #[must_use]
     pub fn bus_cause(&self, facts: &Facts) -> Option<Cause> {
-        let lost = facts.lost_in_a_row();
-        let trouble = facts.buses.iter().any(|b| b.trouble.is_some());
-        (trouble || lost >= self.rules.lost_cycles_max.max(1)).then_some(Cause {
-            reason: FaultReason::BusFault,
-            joint: None,
-            value: f64::from(lost),
-            limit: f64::from(self.rules.lost_cycles_max),
+        facts.failed_bus().map(|(bus, trouble)| self.failed(facts, bus, trouble)).or_else(|| {
+            let bus = facts.buses.iter().position(|b| b.passive)?;
+            Some(Cause::bus(bus, BusTrouble::ErrorPassive, 0.0, 0.0))
         })
+    }
+
+    /// The cause that a failed bus is, with what was counted.
+    fn failed(&self, facts: &Facts, bus: usize, trouble: BusTrouble) -> Cause {
+        let found = facts.buses.get(bus).copied().unwrap_or_default();
+        let limit = f64::from(self.rules.lost_cycles_max);
+        match trouble {
+            BusTrouble::QueueFull | BusTrouble::System => {
+                Cause::bus(bus, trouble, f64::from(found.lost_in_a_row), limit)
+            }
+            BusTrouble::Unconfirmed => Cause::bus(bus, trouble, f64::from(found.in_flight), 0.0),
+            BusTrouble::Down
+            | BusTrouble::Gone
+            | BusTrouble::BusOff
+            | BusTrouble::Restarted
+            | BusTrouble::ErrorPassive => Cause::bus(bus, trouble, 0.0, 0.0),
+        }
     }
 
     /// Feedback of one joint that is late, jumps, or is far from its command.
@@ -162,7 +175,7 @@ impl Watch {
         ];
         // A value that is not a number is beyond every limit.
         let found = checks.into_iter().find(|(_, value, limit)| value.is_nan() || value > limit);
-        found.map(|(reason, value, limit)| Cause { reason, joint: Some(joint), value, limit })
+        found.map(|(reason, value, limit)| Cause::new(reason).at_joint(joint).amount(value, limit))
     }
 
     /// Age of a joint's newest feedback, s; infinite before the first.
@@ -224,14 +237,10 @@ fn reports(state: DriveState) -> bool {
 /// A drive that is not where it should be, or that warns.
 fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
     let servo = facts.servos.get(joint)?;
-    let fault = Cause {
-        reason: FaultReason::DriveFault,
-        joint: Some(joint),
-        value: f64::from(servo.error_code),
-        limit: 0.0,
-    };
-    let dropped = Cause { reason: FaultReason::DriveDropped, value: f64::from(servo.status_word), ..fault };
-    let warning = Cause { value: f64::from(servo.status_word), limit: DRIVE_WARNING, ..fault };
+    let cause = |reason, code| Cause::new(reason).at_joint(joint).code(code);
+    let fault = cause(FaultReason::DriveFault, servo.error_code);
+    let dropped = cause(FaultReason::DriveDropped, servo.status_word);
+    let warning = cause(FaultReason::DriveWarning, servo.status_word);
     match servo.state {
         DriveState::Fault => Some(fault),
         // A warning is the drive's last word before it drops out: the arm stops while it still can.

@@ -1,4 +1,5 @@
 //! Why a command was taken over or refused: as plain values on the real-time thread, as sentences off it.
+use crate::names::Names;
 use taustream_drivers::DriveState;
 use taustream_messages::Phase;
 
@@ -46,8 +47,10 @@ pub enum Why {
     NothingToResume,
     NoFault,
     TooManyRamps,
-    BusFails { lost_in_a_row: u32 },
-    BusGone,
+    BusRestored,
+    BusPassive { bus: usize },
+    OutOfReach { bus: usize },
+    HoldsBesideFailed { joint: usize, bus: usize },
     Unowned { joint: usize },
     PartlyEnergised { joint: usize, state: DriveState },
     StillEnergised { joint: usize },
@@ -56,9 +59,10 @@ pub enum Why {
 }
 
 impl Why {
-    /// The sentence for people. `name` gives a joint's name.
-    pub fn sentence(&self, name: impl Fn(usize) -> String) -> String {
-        self.taken().unwrap_or_else(|| self.refused(&name))
+    /// The sentence for people.
+    #[must_use]
+    pub fn sentence(&self, names: &Names) -> String {
+        self.taken().unwrap_or_else(|| self.refused(names))
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
@@ -79,6 +83,9 @@ impl Why {
             Self::Resetting => "the drives are asked to forget their faults; `status` shows the outcome",
             Self::ClearedHolding => "fault cleared, the drives hold; `enable` makes the arm ready",
             Self::ClearedOff => "fault cleared, the drives are de-energised; `enable` energises them",
+            Self::BusRestored => {
+                "the bus carries frames again and its drives are looked at anew; when `status` says disabled, `enable`"
+            }
             Self::Already => "it is so already",
             Self::NothingMoves => "nothing moves",
             _ => return None,
@@ -87,51 +94,61 @@ impl Why {
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
-    fn refused(self, name: &impl Fn(usize) -> String) -> String {
+    fn refused(self, names: &Names) -> String {
+        let name = |joint| names.joint(joint);
         match self {
             Self::NotConfigured { joint, state } => format!(
-                "joint {} is not ready ({}); see that its drive is powered and connected, then `status`",
+                "{} is not ready ({}); see that its drive is powered and connected, then `status`",
                 name(joint),
                 state_word(state)
             ),
             Self::NotAtRest { joint, speed_rad_s, limit_rad_s } => format!(
-                "joint {} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm rests",
+                "{} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm rests",
                 name(joint)
             ),
             Self::OutOfRange { joint, position_rad, range_rad: [low, high] } => format!(
-                "joint {} is at {position_rad:.4} rad, outside its range [{low:.4}, {high:.4}]; move it back by hand",
+                "{} is at {position_rad:.4} rad, outside its range [{low:.4}, {high:.4}]; move it back by hand",
                 name(joint)
             ),
             Self::NoFeedback { joint, age_s } => format!(
-                "joint {} has not answered for {age_s:.3} s; see that its drive is powered and connected",
+                "{} has not answered for {age_s:.3} s; see that its drive is powered and connected",
                 name(joint)
             ),
             Self::Warns { joint, status_word } => format!(
-                "the drive of joint {} warns (status {status_word:#06x}); remove the cause at the drive",
+                "the drive of {} warns (status {status_word:#06x}); remove the cause at the drive",
                 name(joint)
             ),
             Self::Tracking { joint, error_rad, limit_rad } => format!(
-                "joint {} is {error_rad:.4} rad from its command (limit {limit_rad}); `disable` and free the arm",
+                "{} is {error_rad:.4} rad from its command (limit {limit_rad}); `disable` and free the arm",
                 name(joint)
             ),
-            Self::BusFails { lost_in_a_row } => format!(
-                "the bus still fails ({lost_in_a_row} cycles lost in a row); see cables, termination and `ip link`"
+            Self::BusPassive { bus } => format!(
+                "the controller of {} is still error-passive; see cable, termination and the power of the drives, or start \
+                 it anew: ip link set {1} down && ip link set {1} up",
+                names.bus(bus),
+                names.interface(bus)
             ),
-            Self::BusGone => {
-                "a bus is gone (its interface, or the simulated servos, ended); bring it back, then restart the streamer"
-                    .to_owned()
-            }
+            Self::OutOfReach { bus } => format!(
+                "no drive can be told: {} has failed, and its drives are where their own watchdogs have left them; \
+                 `clear-fault` reaches them again once the bus is mended",
+                names.bus(bus)
+            ),
+            Self::HoldsBesideFailed { joint, bus } => format!(
+                "{} holds while the drives on {} are out of reach; support the arm, `disable`, then `clear-fault`",
+                name(joint),
+                names.bus(bus)
+            ),
             Self::Unowned { joint } => format!(
-                "the drive of joint {} was found energised by somebody else and is left alone; end that program, or `torque-off` (the arm may fall)",
+                "the drive of {} was found energised by somebody else and is left alone; end that program, or `torque-off` (the arm may fall)",
                 name(joint)
             ),
             Self::PartlyEnergised { joint, state } => format!(
-                "the drive of joint {} is off ({}) while others hold; support the arm, `disable`, then `clear-fault`",
+                "the drive of {} is off ({}) while others hold; support the arm, `disable`, then `clear-fault`",
                 name(joint),
                 state_word(state)
             ),
             Self::StillEnergised { joint } => {
-                format!("the drive of joint {} is still energised; wait, then ask again", name(joint))
+                format!("the drive of {} is still energised; wait, then ask again", name(joint))
             }
             other => other.plain_refusal().to_owned(),
         }

@@ -7,6 +7,8 @@
     unreachable_pub,
     reason = "helpers of tests fail by panicking; what reaches the drives is compared bit by bit"
 )]
+#[path = "cycle_suite/bus_faults.rs"]
+mod bus_faults;
 #[path = "cycle_suite/faults.rs"]
 mod faults;
 #[path = "cycle_suite/motion.rs"]

@@ -24,6 +24,7 @@ use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, Stage, run_cycle};
 use taustream_streamer::facts::{Asked, Decision};
 use taustream_streamer::intake::{self, Desk};
+use taustream_streamer::names::Names;
 use taustream_streamer::report::{Readers, Record};
 use taustream_streamer::tick::Tick;
 
@@ -92,7 +93,9 @@ impl Arm {
         let near_end = link::open(bus, LinkChoice::Local, LinkRole::Master, &runtime).unwrap();
         let driver = Cia402Driver::new(&settings, 0).unwrap();
         let (queues, desk) = intake::pair();
-        let buses = Buses::new(vec![Bus::new(near_end, Box::new(driver))]).unwrap();
+        let buses =
+            Buses::new(vec![Bus::new(near_end, Box::new(driver), settings.supervision.lost_cycles_max)])
+                .unwrap();
         let core = Core::new(&settings, buses, queues, true);
         let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         // A limp joint falls, and the streamer rightly refuses to enable it while it does.
@@ -169,7 +172,7 @@ impl Arm {
         assert!(self.desk.ask(Asked { sequence: self.tick, command }));
         self.step(&mut NoProbe);
         let answer = self.desk.answer().unwrap();
-        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(|joint| joint.to_string()));
+        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
     fn fault(&mut self, spec: &str) {

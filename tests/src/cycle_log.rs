@@ -69,6 +69,9 @@ pub enum Event {
         reason: String,
         /// Zero-based joint, where one is to blame.
         joint: Option<usize>,
+        /// Index of the bus, where one is to blame.
+        #[serde(default)]
+        bus: Option<usize>,
         /// The number that belongs to the reason.
         value: Option<f64>,
     },

@@ -134,7 +134,7 @@ mod tests {
     }
 
     fn arm() -> ArmName {
-        ArmName { name: "a".into(), joints: Vec::new() }
+        ArmName { name: "a".into(), joints: Vec::new(), buses: Vec::new() }
     }
 
     fn walk(steps: &[(Report, Phase)]) -> Result<Option<Executed>, String> {

@@ -5,4 +5,3 @@ pub(crate) mod follow;
 pub(crate) mod replan;
 pub(crate) mod run;
 pub(crate) mod status;
-pub(crate) mod watch;

@@ -6,7 +6,8 @@ use crate::output::Form;
 use crate::words::fault_sentence;
 use serde::Serialize;
 use std::fmt;
-use taustream_messages::{Phase, Report};
+use taustream_drivers::ErrorFrame;
+use taustream_messages::{BusReport, Phase, Report};
 
 /// One joint.
 #[derive(Debug, Serialize)]
@@ -29,11 +30,32 @@ struct JointStatus {
 /// The fault of the arm.
 #[derive(Debug, Serialize)]
 struct FaultStatus {
-    code: u32,
+    reason: u32,
     joint: Option<u32>,
+    bus: Option<u32>,
+    code: u32,
+    object: u32,
     value: f64,
     limit: f64,
     message: String,
+}
+
+/// One bus.
+#[derive(Debug, Serialize)]
+struct BusStatus {
+    name: String,
+    interface: String,
+    /// "well", or what is wrong with it and what to do.
+    state: String,
+    silent: bool,
+    frames_sent: u64,
+    frames_lost: u64,
+    frames_received: u64,
+    cycles_lost: u64,
+    in_flight: u32,
+    error_frames: u64,
+    /// What the newest error frame says; null when there was none.
+    newest_error: Option<String>,
 }
 
 /// The motion that runs or ran last.
@@ -48,7 +70,7 @@ struct MotionStatus {
 
 /// What the streamer says.
 #[derive(Debug, Serialize)]
-pub(crate) struct Status {
+struct Status {
     arm: String,
     robot_digest: String,
     phase: &'static str,
@@ -58,8 +80,7 @@ pub(crate) struct Status {
     speed_percent: f64,
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
-    /// Number of the report; gaps are reports that this reader missed.
-    sequence: u64,
+    buses: Vec<BusStatus>,
     tick: u64,
     time_ns: u64,
     cycles: u64,
@@ -87,10 +108,13 @@ pub(crate) fn run(form: Form, arm: &ArmName) -> Result<(), Failure> {
 }
 
 impl Status {
-    pub(crate) fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
+    fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
         let fault = (r.fault_reason != 0).then(|| FaultStatus {
-            code: r.fault_reason,
+            reason: r.fault_reason,
             joint: (r.fault_joint != u32::MAX).then_some(r.fault_joint),
+            bus: (r.fault_bus != u32::MAX).then_some(r.fault_bus),
+            code: r.fault_code,
+            object: r.fault_object,
             value: r.fault_value,
             limit: r.fault_limit,
             message: fault_sentence(r, arm),
@@ -112,7 +136,7 @@ impl Status {
             speed_percent: r.speed_percent,
             motion,
             joints: joints(r, arm),
-            sequence: r.sequence,
+            buses: buses(r, arm),
             tick: r.tick,
             time_ns: r.time_ns,
             cycles: r.cycles,
@@ -156,6 +180,28 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
         .collect()
 }
 
+fn buses(r: &Report, arm: &ArmName) -> Vec<BusStatus> {
+    let names = arm.names();
+    let status = |(index, bus): (usize, &BusReport)| {
+        let name = names.buses.get(index).cloned().unwrap_or_default();
+        let error = ErrorFrame { class: bus.error_class, data: bus.error_data };
+        BusStatus {
+            name: name.name,
+            interface: name.interface,
+            state: names.bus_state(index, bus),
+            silent: bus.silent != 0,
+            frames_sent: bus.frames_sent,
+            frames_lost: bus.frames_lost,
+            frames_received: bus.frames_received,
+            cycles_lost: bus.cycles_lost,
+            in_flight: bus.in_flight,
+            error_frames: bus.error_frames,
+            newest_error: (bus.error_frames > 0).then(|| error.sentence()),
+        }
+    };
+    r.buses().iter().enumerate().map(status).collect()
+}
+
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let energised = if self.energised { "energised" } else { "not energised" };
@@ -191,6 +237,20 @@ impl fmt::Display for Status {
                 j.feedback_age_s * 1e3,
                 j.drive_status,
                 if j.drive_error == 0 { String::new() } else { format!(" error {:#06x}", j.drive_error) }
+            )?;
+        }
+        for b in &self.buses {
+            writeln!(
+                f,
+                "bus {} ({}): {}; {} sent, {} lost in {} cycles, {} received, {} in flight",
+                b.name,
+                b.interface,
+                b.state,
+                b.frames_sent,
+                b.frames_lost,
+                b.cycles_lost,
+                b.frames_received,
+                b.in_flight
             )?;
         }
         writeln!(

@@ -317,6 +317,15 @@ impl Node {
         }
     }
 
+    /// Back to silence: nothing of what was heard counts any more.
+    ///
+    /// Real time: no allocation.
+    pub fn start_over(&mut self, now: Nanos) {
+        self.listen(now, None);
+        (self.heard, self.status, self.position) = (false, 0, None);
+        (self.nmt, self.denials) = (None, 0);
+    }
+
     fn in_fault(&self) -> bool {
         matches!(DriveStep::from_status(self.status), Some(DriveStep::Fault | DriveStep::FaultReaction))
     }

@@ -291,6 +291,15 @@ impl ServoDriver for Cia402Driver {
         }
     }
 
+    fn start_over(&mut self) {
+        let patient = self.patient;
+        for drive in &mut self.drives {
+            drive.node.start_over(patient);
+            drive.received = None;
+        }
+        self.other_master_at = None;
+    }
+
     fn explain(&self, error_code: u32) -> String {
         trouble::explain(error_code)
     }

@@ -50,22 +50,42 @@ pub(super) fn send(socket: BorrowedFd<'_>, frames: &[CanFrame]) -> Sent {
     Sent { count, fault }
 }
 
-/// Replaces the batch by what has arrived, oldest first. Packets that are no frames by their size are left out.
-/// `Ok(0)`: nothing there. The end of a stream socket is [`LinkFault::Gone`], told at once if no frame came before
-/// it, else by the next call.
+/// What one call took from a socket.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Received {
+    /// Frames of others: those that are in the batch.
+    pub(super) frames: usize,
+    /// This socket's own frames, come back when they were on the wire. They never enter the batch.
+    pub(super) confirmed: u64,
+}
+
+/// How a packet came.
+#[derive(Clone, Copy, Debug, Default)]
+struct Packet {
+    size: usize,
+    own: bool,
+}
+
+/// Replaces the batch by what has arrived, oldest first. Packets that are no frames by their size are left out, and
+/// so are this socket's own. The end of a stream socket is [`LinkFault::Gone`], told at once if no frame came
+/// before it, else by the next call.
 ///
 /// Real time: one system call, never waits.
-pub(super) fn receive(socket: BorrowedFd<'_>, into: &mut FrameBatch) -> Result<usize, LinkFault> {
+pub(super) fn receive(socket: BorrowedFd<'_>, into: &mut FrameBatch) -> Result<Received, LinkFault> {
     into.clear();
-    let mut sizes = [0; BATCH_MAX];
-    let packets = match receive_some(socket, into.slots(), &mut sizes) {
-        Ok(packets) => packets,
-        Err(libc::EAGAIN | libc::EINTR) => return Ok(0),
+    let mut packets = [Packet::default(); BATCH_MAX];
+    let taken = match receive_some(socket, into.slots(), &mut packets) {
+        Ok(taken) => taken,
+        Err(libc::EAGAIN | libc::EINTR) => return Ok(Received::default()),
         Err(errno) => return Err(fault_of(errno)),
     };
     let slots = into.slots();
-    let mut count = 0;
-    for (from, size) in sizes.iter().take(packets).copied().enumerate() {
+    let (mut count, mut confirmed) = (0, 0);
+    for (from, Packet { size, own }) in packets.iter().take(taken).copied().enumerate() {
+        if own {
+            confirmed += 1;
+            continue;
+        }
         if size == 0 {
             if count == 0 {
                 return Err(LinkFault::Gone);
@@ -79,7 +99,25 @@ pub(super) fn receive(socket: BorrowedFd<'_>, into: &mut FrameBatch) -> Result<u
         }
     }
     into.set_count(count);
-    Ok(count)
+    into.set_more(taken == BATCH_MAX);
+    Ok(Received { frames: count, confirmed })
+}
+
+/// Bytes of kernel memory that frames of this socket still hold: those that wait in the interface's queue. What a
+/// controller already has in its mailboxes is not counted.
+pub(super) fn queued_bytes(socket: BorrowedFd<'_>) -> std::io::Result<u32> {
+    // linux/sock_diag.h: the third word is the memory of what is being sent.
+    const WORDS: usize = 9;
+    const SENDING: usize = 2;
+    let mut words = [0_u32; WORDS];
+    let mut size = libc::socklen_t::try_from(size_of_val(&words)).unwrap_or(0);
+    // SAFETY: `words` is exclusively borrowed and `size` is its size in bytes; the kernel writes no more than that, and
+    // any bytes make valid integers.
+    let result = unsafe {
+        let into = words.as_mut_ptr().cast();
+        libc::getsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, libc::SO_MEMINFO, into, &raw mut size)
+    };
+    if result < 0 { Err(Error::last_os_error()) } else { Ok(words[SENDING]) }
 }
 
 /// Whether an interface is up, asked through any socket of its network namespace.
@@ -134,11 +172,11 @@ fn send_some(socket: BorrowedFd<'_>, frames: &[CanFrame]) -> Result<usize, i32> 
     usize::try_from(taken).map_err(|_| errno())
 }
 
-/// One `recvmmsg`: how many packets came (at least one) with their sizes, or the errno.
+/// One `recvmmsg`: how many packets came (at least one) and how, or the errno.
 fn receive_some(
     socket: BorrowedFd<'_>,
     slots: &mut [CanFrame; BATCH_MAX],
-    sizes: &mut [usize; BATCH_MAX],
+    packets: &mut [Packet; BATCH_MAX],
 ) -> Result<usize, i32> {
     let (mut parts, mut headers) = empty_headers();
     let mut asked: libc::c_uint = 0;
@@ -154,14 +192,16 @@ fn receive_some(
     // SAFETY: each of the `asked` headers points at one live `iovec` of `parts`, which points at a whole slot of 72
     // bytes, exclusively borrowed; any bytes make a valid `CanFrame` (integers without padding). The kernel writes
     // no more than `iov_len` there, and the lengths into `headers`. The null time-out means none.
-    let packets = unsafe {
+    let taken = unsafe {
         libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), asked, flags, std::ptr::null_mut())
     };
-    let packets = usize::try_from(packets).map_err(|_| errno())?;
-    for (size, header) in sizes.iter_mut().zip(&headers).take(packets) {
-        *size = usize::try_from(header.msg_len).unwrap_or(usize::MAX);
+    let taken = usize::try_from(taken).map_err(|_| errno())?;
+    for (packet, header) in packets.iter_mut().zip(&headers).take(taken) {
+        packet.size = usize::try_from(header.msg_len).unwrap_or(usize::MAX);
+        // can.rst: set on frames that this very socket has sent; MSG_DONTROUTE on those of any socket of this host.
+        packet.own = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
     }
-    Ok(packets)
+    Ok(taken)
 }
 
 /// Headers that point at nothing.

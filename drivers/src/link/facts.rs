@@ -13,6 +13,7 @@ use neli::utils::Groups;
 use rustix::io::Errno;
 use rustix::net::{AddressFamily, Protocol, SocketFlags, SocketType};
 use socketcan::CanInterface;
+pub(super) use socketcan::nl::CanState;
 use std::ffi::CStr;
 use std::io::Error;
 use std::num::NonZeroU32;
@@ -28,6 +29,8 @@ pub(super) struct Facts {
     pub(super) kind: Option<String>,
     /// Nominal bit rate, if the driver states one.
     pub(super) bitrate_bit_s: Option<u32>,
+    /// State of the controller, if the driver states one.
+    pub(super) state: Option<CanState>,
 }
 
 /// True when this kernel has raw CAN sockets.
@@ -54,8 +57,11 @@ pub(super) fn of(interface: &str) -> Result<Facts, OpenError> {
         }
     };
     let is_can = *info.ifi_type() == Arphrd::from(libc::ARPHRD_CAN);
-    let bitrate_bit_s = if is_can { CanInterface::open_iface(index).bit_rate().ok().flatten() } else { None };
-    Ok(Facts { is_can, is_up: info.ifi_flags().contains(Iff::UP), kind: kind_of(info), bitrate_bit_s })
+    let controller = is_can.then(|| CanInterface::open_iface(index));
+    // Drivers without a controller (vcan) state neither.
+    let bitrate_bit_s = controller.as_ref().and_then(|c| c.bit_rate().ok().flatten());
+    let state = controller.as_ref().and_then(|c| c.state().ok().flatten());
+    Ok(Facts { is_can, is_up: info.ifi_flags().contains(Iff::UP), kind: kind_of(info), bitrate_bit_s, state })
 }
 
 /// The index of an interface.

@@ -121,7 +121,7 @@ impl CanLink for LocalMaster {
     fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
         // What the servos sent before they went is still read: `gone` by a failed send does not stop it.
         match batch::receive(self.peer.as_fd(), into) {
-            Ok(0) if self.gone => Some(LinkFault::Gone),
+            Ok(received) if received.frames == 0 && self.gone => Some(LinkFault::Gone),
             Ok(_) => None,
             Err(fault) => {
                 self.gone |= fault == LinkFault::Gone;

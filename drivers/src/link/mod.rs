@@ -6,12 +6,14 @@ use crate::frame::{CanFrame, FrameBatch};
 use std::os::fd::BorrowedFd;
 
 mod batch;
+pub mod error_frame;
 mod facts;
 mod local;
 mod lock;
 pub mod open;
 mod socketcan;
 
+pub use error_frame::ErrorFrame;
 pub use open::{Holder, LinkChoice, LinkRole, OpenError, open};
 
 /// Why a link did not take, or give, frames.
@@ -62,13 +64,24 @@ pub trait CanLink: Send {
         None
     }
 
-    /// After [`LinkFault::Gone`]: attaches to the interface, or the peer, that has come back. The lock is kept all the
-    /// while, so that no other master slips in. Harmless on a link that is well.
+    /// How many frames of this link were seen on the wire since it was opened or reopened: the kernel hands each one
+    /// back when the controller has sent it (own-message echo). `None` where a frame that was taken has arrived.
+    ///
+    /// Interfaces without an echo of their own (vcan, some serial adapters) hand frames back as they are taken, before
+    /// any queue: there the count says nothing about the wire, and only the queue filling up does.
+    fn confirmed(&self) -> Option<u64> {
+        None
+    }
+
+    /// After a fault: starts over on the interface, or the peer, that has come back. What was received before is
+    /// forgotten, and frames that still wait to be sent are a refusal: they are old. The lock is kept all the while, so that
+    /// no other master slips in. Harmless on a link that is well.
     ///
     /// Not for real time: allocates and asks the kernel.
     ///
     /// # Errors
-    /// As for [`open()`]; the link stays gone and may be asked again.
+    /// As for [`open()`], and when the controller is not fit or old frames wait; the link is as it was and may be asked
+    /// again.
     fn reopen(&mut self) -> Result<(), OpenError> {
         Ok(())
     }

@@ -110,6 +110,26 @@ pub enum OpenError {
         /// What to do.
         command: String,
     },
+    /// The controller is out of order.
+    #[error("the controller of {interface} is {state}; mend cable, termination or bit rate, then: {cure}")]
+    Unfit {
+        /// The interface.
+        interface: String,
+        /// Its state.
+        state: &'static str,
+        /// What to do then.
+        cure: String,
+    },
+    /// Frames of before the fault have not left yet.
+    #[error(
+        "frames of before the fault still wait in the queue of {interface} ({bytes} bytes of memory), and would reach the          drives late; let the bus carry them, or drop them: ip link set {interface} down && ip link set {interface} up"
+    )]
+    Queued {
+        /// The interface.
+        interface: String,
+        /// Memory that they hold.
+        bytes: u32,
+    },
     /// It has another hardware type.
     #[error(
         "interface {interface} is no CAN interface; name one in the settings (list them: ip link show type can)"

@@ -1,5 +1,7 @@
 //! The kernel's CAN: a raw socket on an interface.
-use super::batch::{self, InterfaceName};
+use super::batch::{self, InterfaceName, Received};
+use super::error_frame::ERROR_CLASSES;
+use super::facts::CanState;
 use super::lock::InterfaceLock;
 use super::open::{LinkRole, OpenError};
 use super::{CanLink, LinkFault, Sent, facts};
@@ -8,10 +10,6 @@ use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_recv_buffer_s
 use socketcan::{CanFdSocket, Socket, SocketOptions};
 use std::os::fd::{AsFd, BorrowedFd};
 use taustream_arm::{Bus, BusKind};
-
-/// Error frames that are taken: transmit time-out, controller state, bus-off, restarted (linux/can/error.h). The others
-/// flood, and say nothing that changes what to do.
-const ERROR_CLASSES: u32 = 0x001 | 0x004 | 0x040 | 0x100;
 
 /// Receive buffer. The default holds 278 frames, less than what six drives send in 50 ms; this holds some 2700.
 const RECEIVE_BUFFER_BYTES: usize = 2 << 20;
@@ -26,6 +24,9 @@ pub(super) struct SocketCan {
     gone: bool,
     /// The interface was seen down, and not yet up again.
     down: bool,
+    role: LinkRole,
+    /// Own frames that came back.
+    confirmed: u64,
     _lock: Option<InterfaceLock>,
 }
 
@@ -42,8 +43,14 @@ impl SocketCan {
             LinkRole::Master => Some(InterfaceLock::take(interface)?),
             LinkRole::Servos => None,
         };
-        let socket = open_socket(interface)?;
-        Ok(Self { bus: bus.clone(), socket, name, gone: false, down: false, _lock: lock })
+        let socket = open_socket(interface, role)?;
+        Ok(Self { bus: bus.clone(), socket, name, gone: false, down: false, role, confirmed: 0, _lock: lock })
+    }
+
+    fn take(&mut self, into: &mut FrameBatch) -> Result<(), LinkFault> {
+        let Received { frames: _, confirmed } = batch::receive(self.socket.as_fd(), into)?;
+        self.confirmed += confirmed;
+        Ok(())
     }
 
     /// Asks whether an interface that was down still is.
@@ -86,15 +93,15 @@ impl CanLink for SocketCan {
             into.clear();
             return Some(LinkFault::Gone);
         }
-        let mut result = batch::receive(self.socket.as_fd(), into);
+        let mut result = self.take(into);
         if result == Err(LinkFault::Down) {
             // The word may be stale, and it hides the frames behind it: read again, then ask for the truth.
             self.down = true;
-            result = batch::receive(self.socket.as_fd(), into);
+            result = self.take(into);
         }
         match result {
-            Ok(_) if self.down => self.look_up(),
-            Ok(_) => None,
+            Ok(()) if self.down => self.look_up(),
+            Ok(()) => None,
             Err(fault) => self.note(fault),
         }
     }
@@ -107,15 +114,40 @@ impl CanLink for SocketCan {
         (!self.gone).then(|| self.socket.as_fd())
     }
 
+    fn confirmed(&self) -> Option<u64> {
+        (self.role == LinkRole::Master).then_some(self.confirmed)
+    }
+
     fn reopen(&mut self) -> Result<(), OpenError> {
+        let interface = &self.bus.interface;
         check(&self.bus)?;
-        if self.gone {
-            self.socket = open_socket(&self.bus.interface)?;
-            self.gone = false;
+        check_controller(interface)?;
+        if !self.gone {
+            let failed =
+                |source| OpenError::System { interface: interface.clone(), doing: "look at", source };
+            let bytes = batch::queued_bytes(self.socket.as_fd()).map_err(failed)?;
+            if bytes > 0 {
+                return Err(OpenError::Queued { interface: interface.clone(), bytes });
+            }
         }
-        self.down = false;
+        // A new socket: the old one may be dead, and holds what was received before the fault.
+        self.socket = open_socket(interface, self.role)?;
+        (self.gone, self.down, self.confirmed) = (false, false, 0);
         Ok(())
     }
+}
+
+/// Refuses a controller that cannot carry setpoints. Drivers that tell no state are taken at their word.
+fn check_controller(interface: &str) -> Result<(), OpenError> {
+    let restart = || format!("ip link set {interface} type can restart");
+    let wait = || format!("wait for it, or: ip link set {interface} down && ip link set {interface} up");
+    let (state, cure) = match facts::of(interface)?.state {
+        Some(CanState::BusOff) => ("bus-off", restart()),
+        Some(CanState::ErrorPassive) => ("error-passive", wait()),
+        Some(CanState::Stopped | CanState::Sleeping) => ("not started", wait()),
+        Some(CanState::ErrorActive | CanState::ErrorWarning) | None => return Ok(()),
+    };
+    Err(OpenError::Unfit { interface: interface.to_owned(), state, cure })
 }
 
 /// Refuses an interface that is absent, down, or not what the settings say.
@@ -193,12 +225,13 @@ fn up_command(bus: &Bus) -> String {
     }
 }
 
-/// Opens and sets up the socket: FD frames too, error frames, no own frames, never waiting.
-fn open_socket(interface: &str) -> Result<CanFdSocket, OpenError> {
+/// Opens and sets up the socket: FD frames too, error frames, never waiting. A master's own frames come back to it as
+/// confirmations that they were on the wire.
+fn open_socket(interface: &str, role: LinkRole) -> Result<CanFdSocket, OpenError> {
     let failed = |doing| move |source| OpenError::System { interface: interface.to_owned(), doing, source };
     let socket = CanFdSocket::open(interface).map_err(failed("open"))?;
     socket.set_nonblocking(true).map_err(failed("set up"))?;
-    socket.set_recv_own_msgs(false).map_err(failed("set up"))?;
+    socket.set_recv_own_msgs(role == LinkRole::Master).map_err(failed("set up"))?;
     // Loopback to other sockets of this host stays on: recorders and simulators live there.
     socket.set_loopback(true).map_err(failed("set up"))?;
     socket.set_error_filter(ERROR_CLASSES).map_err(failed("set up"))?;

@@ -5,22 +5,19 @@ use taustream_drivers::{DriveState, DriveWish, LinkFault};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_motion::{Stroke, Trajectory};
 use taustream_streamer::facts::Decision;
-use taustream_streamer::log::cause_sentence;
+use taustream_streamer::names::Names;
 use taustream_streamer::words::Why;
 
 /// Every supervised fault, planted in the middle of a motion: fast stop on the path, then fault, drives holding.
 #[test]
 fn fault_of_any_kind_while_moving_stops_the_arm_on_the_path_and_names_the_joint() {
     type Plant = fn(&mut World);
-    let table: [(&str, Plant, FaultReason, Option<usize>); 8] = [
+    let table: [(&str, Plant, FaultReason, Option<usize>); 5] = [
         ("drive fault", |w| w.forced[2] = Some(DriveState::Fault), FaultReason::DriveFault, Some(2)),
-        ("warning", |w| w.warning = Some(4), FaultReason::DriveFault, Some(4)),
+        ("warning", |w| w.warning = Some(4), FaultReason::DriveWarning, Some(4)),
         ("dropped", |w| w.forced[1] = Some(DriveState::Disabled), FaultReason::DriveDropped, Some(1)),
         ("silent", |w| w.silent = Some(3), FaultReason::FeedbackLate, Some(3)),
         ("jump", |w| w.offset_rad[5] = 0.08, FaultReason::PositionJump, Some(5)),
-        ("bus off", |w| w.error_frame = Some(0x040), FaultReason::BusFault, None),
-        ("error passive", |w| w.error_frame = Some(0x004), FaultReason::BusFault, None),
-        ("restarted", |w| w.error_frame = Some(0x100), FaultReason::BusFault, None),
     ];
     for (name, plant, reason, joint) in table {
         let mut rig = Rig::new();
@@ -31,8 +28,8 @@ fn fault_of_any_kind_while_moving_stops_the_arm_on_the_path_and_names_the_joint(
         let cause = rig.cause().unwrap();
         assert_eq!((cause.reason, cause.joint), (reason, joint), "{name}");
         if name == "warning" {
-            let said = cause_sentence(&cause, |joint| joint.to_string());
-            assert_eq!(said, "drive warns (statusword): joint 4, 0x1237");
+            let said = Names::default().fault(&cause);
+            assert_eq!(said, "drive warns (statusword) at joint 5: 0x1237");
         }
         rig.run_until(Phase::Fault, 1_500);
         rig.run(50);
@@ -112,40 +109,6 @@ fn reset_that_does_not_help_leaves_the_fault() {
     rig.accept(Command::ClearFault);
     rig.run(6_000);
     assert_eq!((rig.phase(), rig.cause().unwrap().joint), (Phase::Fault, Some(0)));
-}
-
-#[test]
-fn bus_that_takes_nothing_freezes_the_path_and_becomes_a_bus_fault() {
-    let mut rig = Rig::new();
-    let trajectory = rig.move_it();
-    rig.run(600);
-    rig.script(|w| w.link_fault = Some(LinkFault::QueueFull));
-    rig.run(3);
-    assert_eq!(rig.cause().unwrap().reason, FaultReason::BusFault);
-    rig.run(50);
-    assert_eq!(rig.phase(), Phase::Fault);
-    assert!(!rig.ask(Command::ClearFault).accepted);
-    rig.script(|w| w.link_fault = None);
-    rig.run(3);
-    assert_on_path(&rig, &trajectory);
-    // What the drives got last is what they go on getting: nothing jumped while nobody listened.
-    let world = rig.world.lock().unwrap();
-    let (last, before) = (world.arrived[world.arrived.len() - 1], world.arrived[world.arrived.len() - 4]);
-    assert_eq!(last.1, before.1);
-}
-
-/// Goal: a link that has ended never passes for a bus whose drives are off: what they last said is old.
-#[test]
-fn fault_of_a_bus_that_is_gone_is_not_cleared_and_says_what_helps() {
-    let mut rig = Rig::new();
-    rig.enable();
-    rig.script(|w| (w.link_fault, w.link_takes) = (Some(LinkFault::Gone), 0));
-    rig.run_until(Phase::Fault, 50);
-    let answer = rig.ask(Command::ClearFault);
-    let sentence = answer.why.sentence(|joint| joint.to_string());
-    assert!(!answer.accepted && sentence.contains("restart the streamer"), "{sentence}");
-    rig.run(20);
-    assert_eq!(rig.phase(), Phase::Fault);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use taustream_drivers::{DriveState, DriveWish};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_streamer::cycle::Next;
 use taustream_streamer::intake::Leave;
-use taustream_streamer::log::cause_sentence;
+use taustream_streamer::names::Names;
 use taustream_streamer::words::Why;
 
 #[test]
@@ -94,8 +94,8 @@ fn drive_that_refuses_its_configuration_is_a_fault_that_names_object_and_code() 
     rig.run_until(Phase::Fault, 20);
     let cause = rig.cause().unwrap();
     assert_eq!((cause.reason, cause.joint), (FaultReason::ConfigurationRefused, Some(2)));
-    let text = cause_sentence(&cause, |joint| format!("{joint}"));
-    assert!(text.contains("joint 2, object 0x1600:02: SDO abort 0x06040041"), "{text}");
+    let text = Names::default().fault(&cause);
+    assert!(text.contains("joint 3: object 0x1600:02: SDO abort 0x06040041"), "{text}");
     assert!(text.contains("cannot be mapped"), "{text}");
 }
 

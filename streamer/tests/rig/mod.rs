@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use taustream_arm::Settings;
-use taustream_drivers::link::Sent;
+use taustream_drivers::link::{OpenError, Sent};
 use taustream_drivers::{
     CanFrame, CanId, CanLink, DriveState, DriveWish, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
     ServoStatus,
@@ -14,6 +14,7 @@ use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
 use taustream_streamer::facts::{Asked, Cause, Decision, Verdict};
 use taustream_streamer::intake::{self, Desk, Leave};
+use taustream_streamer::names::Names;
 use taustream_streamer::report::{CycleRecord, Readers, Record};
 use taustream_streamer::tick::Tick;
 use taustream_streamer::words::Answer;
@@ -40,8 +41,19 @@ pub struct World {
     pub link_takes: usize,
     /// Handed to the cycle beside the answers.
     pub error_frame: Option<u32>,
+    /// Byte 1 of that frame: state of the controller.
+    pub error_state: u8,
+    /// Frames that were taken come back as seen on the wire.
+    pub confirms: bool,
+    /// A link that is reopened comes back.
+    pub reopens: bool,
+    /// Frames that left.
+    pub frames: u64,
+    confirmed: u64,
     pub wish: Option<DriveWish>,
     pub clears: u32,
+    /// How often the driver was told to look at its drives anew.
+    pub start_overs: u32,
     /// Commands that arrived while energised, newest last, with their tick.
     pub arrived: Vec<(u64, JointArray)>,
     pub tick: u64,
@@ -122,6 +134,10 @@ impl ServoDriver for FakeDriver {
     fn clear_faults(&mut self) {
         self.world.lock().unwrap().clears += 1;
     }
+    fn start_over(&mut self) {
+        self.world.lock().unwrap().start_overs += 1;
+        self.received = [None; MAX_JOINTS];
+    }
     fn explain(&self, error_code: u32) -> String {
         format!("{error_code:#x}")
     }
@@ -145,13 +161,20 @@ impl CanLink for FakeLink {
             let tick = world.tick;
             world.arrived.push((tick, pending));
         }
+        world.frames += frames.len() as u64;
         Sent { count: frames.len(), fault: None }
     }
     fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
         into.clear();
-        let world = self.0.lock().unwrap();
+        let mut world = self.0.lock().unwrap();
+        if world.confirms {
+            world.confirmed = world.frames;
+        }
         if let Some(class) = world.error_frame {
-            into.push(CanFrame::classic(CanId::from_raw(0x2000_0000 | class), &[0, 0x20, 0, 0, 0, 0, 0, 0]));
+            into.push(CanFrame::classic(
+                CanId::from_raw(0x2000_0000 | class),
+                &[0, world.error_state, 0, 0, 0, 0, 0, 0],
+            ));
         }
         if world.link_fault.is_none() {
             into.push(CanFrame::classic(CanId::standard(0x181), &[0; 6]));
@@ -160,6 +183,18 @@ impl CanLink for FakeLink {
     }
     fn describe(&self) -> String {
         "scripted".to_owned()
+    }
+    fn confirmed(&self) -> Option<u64> {
+        let world = self.0.lock().unwrap();
+        Some(world.confirmed)
+    }
+    fn reopen(&mut self) -> Result<(), OpenError> {
+        let mut world = self.0.lock().unwrap();
+        if !world.reopens {
+            return Err(OpenError::NotCan { interface: "scripted".into() });
+        }
+        (world.frames, world.confirmed) = (0, 0);
+        Ok(())
     }
 }
 
@@ -210,8 +245,14 @@ impl Rig {
             link_fault: None,
             link_takes: 0,
             error_frame: None,
+            error_state: 0x20,
+            confirms: true,
+            reopens: true,
+            frames: 0,
+            confirmed: 0,
             wish: None,
             clears: 0,
+            start_overs: 0,
             arrived: Vec::new(),
             tick: 0,
             pending: HOME_RAD,
@@ -225,7 +266,8 @@ impl Rig {
             received: [None; MAX_JOINTS],
             position_rad: HOME_RAD,
         };
-        let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver));
+        let lost_cycles_max = settings.supervision.lost_cycles_max;
+        let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), lost_cycles_max);
         let (queues, desk) = intake::pair();
         let core = Core::new(&settings, Buses::new(vec![bus]).unwrap(), queues, true);
         let readers = core.readers();
@@ -306,9 +348,33 @@ impl Rig {
         answer
     }
 
+    /// Asks what cannot be answered in the same cycle, and runs it.
+    pub fn ask_for_later(&mut self, command: Command) -> Option<Answer> {
+        self.sequence += 1;
+        assert!(self.desk.ask(Asked { sequence: self.sequence, command }));
+        self.step_after(1);
+        self.desk.answer()
+    }
+
+    /// Runs one cycle that must answer.
+    pub fn step_to_answer(&mut self) -> Answer {
+        self.step_after(1);
+        self.desk.answer().expect("an answer that was waited for")
+    }
+
+    /// The service thread's part: starts the links that were handed out over. True when all are there again.
+    pub fn restore_buses(&mut self) -> bool {
+        let mut handover = self.desk.failed_links().expect("links of failed buses are handed out");
+        let mut links = handover.links.iter_mut().flatten();
+        handover.well = links.all(|link| link.reopen().is_ok());
+        let well = handover.well;
+        self.desk.give_back_links(handover);
+        well
+    }
+
     pub fn accept(&mut self, command: Command) {
         let answer = self.ask(command);
-        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(|j| j.to_string()));
+        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
     /// Offers a trajectory, runs one cycle, and returns the verdict.

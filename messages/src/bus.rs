@@ -1,0 +1,40 @@
+//! What the streamer tells of each bus.
+use crate::fault::BusTrouble;
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Most buses of one arm.
+pub const BUSES_MAX: usize = 8;
+
+/// One bus in a report. Counts are since the start of the streamer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct BusReport {
+    /// Frames handed over.
+    pub frames_sent: u64,
+    /// Frames refused.
+    pub frames_lost: u64,
+    /// Frames received, own ones not counted.
+    pub frames_received: u64,
+    /// Cycles whose frames were not all taken.
+    pub cycles_lost: u64,
+    /// Error frames of the controller.
+    pub error_frames: u64,
+    /// What is wrong with it ([`BusTrouble::code`]); 0 when it is well.
+    pub trouble: u32,
+    /// 1 while nothing is sent on it, from its failure to `clear-fault`.
+    pub silent: u32,
+    /// Frames handed over and not yet seen on the wire.
+    pub in_flight: u32,
+    /// Class bits of the newest error frame (linux/can/error.h); 0 for none.
+    pub error_class: u32,
+    /// Its data bytes.
+    pub error_data: [u8; 8],
+}
+
+impl BusReport {
+    /// What is wrong with it. A code of another release reads as [`BusTrouble::System`]: never as well.
+    #[must_use]
+    pub fn trouble(&self) -> Option<BusTrouble> {
+        (self.trouble != 0).then(|| BusTrouble::from_code(self.trouble).unwrap_or(BusTrouble::System))
+    }
+}

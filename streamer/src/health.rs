@@ -1,0 +1,139 @@
+//! Whether a bus still carries setpoints: lost cycles, frames that nobody acknowledges, error frames, a lost interface.
+//!
+//! A bus that has failed is *silent* from then on: no setpoint leaves on it until `clear-fault` has started it over. Its
+//! drives have stopped where their own watchdogs left them while the other buses went on along the path, so the first
+//! setpoint after an outage would be a step, and whatever still waits in a queue is old. Only torque off is still tried.
+use crate::facts::BusFacts;
+use taustream_drivers::{ErrorFrame, LinkFault};
+use taustream_messages::BusTrouble;
+
+/// Longest history of what was sent, in cycles: the most that `lost_cycles_max` can ask for is cut to it.
+const CYCLES_MAX: usize = 64;
+
+/// What is remembered of one bus.
+#[derive(Debug)]
+pub(crate) struct Health {
+    lost_cycles_max: u32,
+    lost_in_a_row: u32,
+    failed: Option<BusTrouble>,
+    passive: bool,
+    /// Frames handed over since the link was opened.
+    sent: u64,
+    /// The same at the end of each of the last cycles, as a ring.
+    history: [u64; CYCLES_MAX],
+    slot: usize,
+    newest_error: ErrorFrame,
+    error_frames: u64,
+}
+
+/// What one cycle has seen of a link, beside [`BusFacts`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Seen {
+    /// The drives were wished energised: lost setpoints matter.
+    pub(crate) live: bool,
+    /// Own frames that came back, since the link was opened; `None` where none do.
+    pub(crate) confirmed: Option<u64>,
+}
+
+impl Health {
+    /// A bus of which nothing was sent or heard; `lost_cycles_max` in a row make it fail.
+    pub(crate) fn new(lost_cycles_max: u32) -> Self {
+        Self {
+            lost_cycles_max: lost_cycles_max.max(1),
+            lost_in_a_row: 0,
+            failed: None,
+            passive: false,
+            sent: 0,
+            history: [0; CYCLES_MAX],
+            slot: 0,
+            newest_error: ErrorFrame::default(),
+            error_frames: 0,
+        }
+    }
+
+    /// Nothing may leave but torque off.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.failed.is_some()
+    }
+
+    /// Why, once it has failed.
+    pub(crate) fn failed(&self) -> Option<BusTrouble> {
+        self.failed
+    }
+
+    /// The link was started over: what was lost, unconfirmed or told by its controller is history.
+    pub(crate) fn start_over(&mut self) {
+        let fresh = Self::new(self.lost_cycles_max);
+        *self = Self { newest_error: self.newest_error, error_frames: self.error_frames, ..fresh };
+    }
+
+    /// Takes an error frame.
+    ///
+    /// Real time: arithmetic only.
+    pub(crate) fn take_error(&mut self, error: ErrorFrame, found: &mut BusFacts) {
+        self.newest_error = error;
+        self.error_frames = self.error_frames.saturating_add(1);
+        found.errors += 1;
+        if error.is_bus_off() {
+            self.fail(BusTrouble::BusOff);
+        } else if error.is_restarted() {
+            self.fail(BusTrouble::Restarted);
+        } else if error.is_passive() {
+            self.passive = true;
+        } else if error.is_recovered() {
+            self.passive = false;
+        }
+    }
+
+    /// Judges the cycle that ends, and completes its facts.
+    ///
+    /// Real time: arithmetic only.
+    pub(crate) fn judge(&mut self, seen: Seen, found: &mut BusFacts) {
+        self.sent = self.sent.saturating_add(u64::from(found.sent));
+        let confirmed = seen.confirmed.unwrap_or(self.sent);
+        let complete = found.sent == found.wanted;
+        self.lost_in_a_row = if complete { 0 } else { self.lost_in_a_row.saturating_add(1) };
+        // What was sent so many cycles ago and is not confirmed now is as good as lost.
+        let depth = usize::try_from(self.lost_cycles_max).unwrap_or(CYCLES_MAX).clamp(1, CYCLES_MAX - 1);
+        self.slot = (self.slot + 1) % CYCLES_MAX;
+        self.history[self.slot] = self.sent;
+        let overdue = self.history[(self.slot + CYCLES_MAX - depth) % CYCLES_MAX] > confirmed;
+        match found.fault {
+            Some(LinkFault::Gone) => self.fail(BusTrouble::Gone),
+            Some(LinkFault::Down) => self.fail(BusTrouble::Down),
+            Some(LinkFault::QueueFull) if self.is_lost(seen) => self.fail(BusTrouble::QueueFull),
+            Some(LinkFault::Os(_)) if self.is_lost(seen) => self.fail(BusTrouble::System),
+            Some(LinkFault::QueueFull | LinkFault::Os(_)) | None if overdue && seen.live => {
+                self.fail(BusTrouble::Unconfirmed);
+            }
+            Some(LinkFault::QueueFull | LinkFault::Os(_)) | None => {}
+        }
+        found.lost_in_a_row = self.lost_in_a_row;
+        found.in_flight = u32::try_from(self.sent.saturating_sub(confirmed)).unwrap_or(u32::MAX);
+        found.failed = self.failed;
+        found.passive = self.passive;
+        (found.newest_error, found.error_frames) = (self.newest_error, self.error_frames);
+    }
+
+    /// Before drives are energised nothing depends on a cycle: drives that have no power yet do not acknowledge, and
+    /// waiting for them is no fault.
+    fn is_lost(&self, seen: Seen) -> bool {
+        seen.live && self.lost_in_a_row >= self.lost_cycles_max
+    }
+
+    /// The first trouble is the one to report, unless a later one says more: a lost interface hides behind a full queue.
+    fn fail(&mut self, trouble: BusTrouble) {
+        if self.failed.is_none_or(|before| telling(trouble) > telling(before)) {
+            self.failed = Some(trouble);
+        }
+    }
+}
+
+/// How much a trouble tells of its cause.
+fn telling(trouble: BusTrouble) -> u8 {
+    match trouble {
+        BusTrouble::QueueFull | BusTrouble::Unconfirmed | BusTrouble::System | BusTrouble::ErrorPassive => 0,
+        BusTrouble::Down | BusTrouble::BusOff | BusTrouble::Restarted => 1,
+        BusTrouble::Gone => 2,
+    }
+}
