@@ -34,6 +34,20 @@ impl Draw {
         // The modulo's bias is below 2^-40 for every count that fits in memory here.
         usize::try_from(self.0.next_u64() % (count.max(1) as u64)).unwrap_or(0)
     }
+
+    /// Uniform in 0..count without the given ones, which are sorted; 0 when nothing is left.
+    pub fn index_except(&mut self, count: usize, taken: &[usize]) -> usize {
+        let free = self.index(count.saturating_sub(taken.len()));
+        // Every taken number that is not above moves the answer up by one.
+        let moved = taken.iter().fold(free, |i, t| if *t <= i { i + 1 } else { i });
+        if moved < count { moved } else { 0 }
+    }
+
+    /// Normal with mean 0 and deviation 1: the first of the two numbers of Box and Muller's method.
+    pub fn normal(&mut self) -> f64 {
+        let (u, v) = (1.0 - self.unit(), self.unit());
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
 }
 
 #[cfg(test)]
@@ -49,6 +63,36 @@ mod tests {
         assert_eq!(take(7, 0), take(7, 0));
         assert_ne!(take(7, 0), take(7, 1));
         assert_ne!(take(7, 0), take(8, 0));
+    }
+
+    #[test]
+    fn draw_without_the_taken_ones_reaches_all_others_equally_often() {
+        let mut draw = Draw::new(1, 0);
+        let mut times = [0_u32; 6];
+        for _ in 0..30_000 {
+            times[draw.index_except(6, &[0, 3, 4])] += 1;
+        }
+        assert_eq!([times[0], times[3], times[4]], [0; 3], "taken ones were drawn: {times:?}");
+        // 10000 each, deviation 82.
+        assert!([1, 2, 5].iter().all(|i: &usize| times[*i].abs_diff(10_000) < 500), "{times:?}");
+        assert_eq!((draw.index_except(2, &[0, 1]), draw.index_except(0, &[])), (0, 0));
+    }
+
+    #[test]
+    fn draw_of_normal_numbers_has_the_moments_of_the_normal_distribution() {
+        let mut draw = Draw::new(2, 0);
+        let n = 100_000;
+        let sums = (0..n).fold([0.0; 4], |s, _| {
+            let x = draw.normal();
+            [s[0] + x, s[1] + x * x, s[2] + x * x * x, s[3] + x * x * x * x]
+        });
+        let moments = sums.map(|s| s / f64::from(n));
+        let theirs = [0.0, 1.0, 0.0, 3.0];
+        // Deviations of the means: 0.003, 0.0045, 0.012, 0.031.
+        let bands = [0.015, 0.02, 0.06, 0.15];
+        for (i, (m, t)) in moments.iter().zip(theirs).enumerate() {
+            assert!((m - t).abs() < bands[i], "moment {}: {m}, not {t}", i + 1);
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub mod cost;
 pub mod draw;
 pub mod leave;
 pub mod optimize;
+pub mod papers;
 pub mod pipeline;
 pub mod plan;
 pub mod refine;

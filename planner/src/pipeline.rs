@@ -5,6 +5,7 @@
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
 use crate::leave::Leaving;
+use crate::optimize::Ibfoa;
 use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind};
 use crate::refine::refine;
 use crate::shortcut::shorten;
@@ -246,7 +247,14 @@ impl<'a> Pipeline<'a> {
 
     /// IBFOA around a path; only a path whose every edge is proven comes back.
     fn refine(&mut self, path: &[JointArray], evaluations_max: usize, from: &str) -> Option<Vec<JointArray>> {
-        let (mut corners, found) = refine(&self.space, path, evaluations_max, self.options.seed)?;
+        let refined = refine(&self.space, path, &Ibfoa::CASE_1, evaluations_max, self.options.seed);
+        let (mut corners, found) = match refined {
+            Ok(refined) => refined?,
+            Err(refusal) => {
+                self.tried.push(format!("IBFOA from {from} (not started: {refusal})"));
+                return None;
+            }
+        };
         let free = corners.windows(2).all(|p| {
             let [a, b] = p else { return false };
             self.space.is_edge_free(a, b)

@@ -5,7 +5,7 @@
 //! out is a proposal: its edges are proven like any other path's.
 use crate::cost::CostModel;
 use crate::draw::Draw;
-use crate::optimize::{Found, Ibfoa, Optimizer, Parameters, Problem, Run};
+use crate::optimize::{Found, Optimizer, Problem, Progress, Refusal, Run};
 use crate::tree::Space;
 use crate::work::Work;
 use crate::world::{Snapshot, World};
@@ -21,21 +21,25 @@ const POSES_PER_SEGMENT: u32 = 12;
 const SCATTER_RAD: f64 = 0.15;
 const SCATTERED: usize = 5;
 
-/// Proposes a path near a given one (which may collide), or none when the run was cut before its first evaluation.
+/// Proposes a path near a given one (which may collide) with any optimiser, or none when the run was cut before its
+/// first evaluation.
+///
+/// # Errors
+/// When the optimiser's numbers make no sense, or the robot's limits are no box.
 pub fn refine(
     space: &Space,
     path: &[JointArray],
+    optimizer: &dyn Optimizer,
     evaluations_max: usize,
     seed: u64,
-) -> Option<(Vec<JointArray>, Found)> {
-    let (start, goal) = (*path.first()?, *path.last()?);
-    let problem = PathProblem::new(space, start, goal);
+) -> Result<Option<(Vec<JointArray>, Found)>, Refusal> {
+    let [Some(start), Some(goal)] = [path.first(), path.last()] else { return Ok(None) };
+    let problem = PathProblem::new(space, *start, *goal);
     let guesses = problem.guesses(path, seed);
-    let optimizer = Ibfoa { parameters: Parameters::CASE_1 };
-    let (is_over, mut watch) = (|| space.work.is_over(), |_: &crate::optimize::Progress| ());
+    let (is_over, mut watch) = (|| space.work.is_over(), |_: &Progress| ());
     let run = Run { seed, evaluations_max, guesses: &guesses, is_over: &is_over, watch: &mut watch };
-    let found = optimizer.minimise(&problem, run);
-    (!found.x.is_empty()).then(|| (problem.corners(&found.x), found))
+    let found = optimizer.minimise(&problem, run)?;
+    Ok((!found.x.is_empty()).then(|| (problem.corners(&found.x), found)))
 }
 
 /// The paper's problem: where to put the control points.

@@ -1,0 +1,73 @@
+//! Which methods there are, by name. A new one is a file beside this one and a line here.
+use super::{Bfoa, Boa, Bso, De, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, Optimizer, Pso, Sma, Ssa};
+
+/// Where a paper's text cannot be meant as printed: which reading.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reading {
+    /// What must have been meant; each method's file says what was corrected.
+    #[default]
+    Corrected,
+    /// The letter of the paper.
+    Printed,
+}
+
+/// How a method is set up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Setup {
+    /// Which reading of its paper.
+    pub reading: Reading,
+    /// Evaluations that its schedule is fitted to; `None` is the paper's own schedule.
+    pub evaluations: Option<usize>,
+}
+
+/// One registered method.
+#[derive(Clone, Copy)]
+pub struct Method {
+    /// The word that users write.
+    pub name: &'static str,
+    /// One line for a list.
+    pub about: &'static str,
+    /// Makes it.
+    pub make: fn(Setup) -> Box<dyn Optimizer>,
+}
+
+macro_rules! method {
+    ($name:literal, $about:literal, $make:expr) => {
+        Method { name: $name, about: $about, make: |setup| Box::new($make(setup)) }
+    };
+}
+
+/// Every method.
+pub const METHODS: [Method; 14] = [
+    method!("ibfoa", "bacterial foraging with decay and elite (seed paper 000)", Ibfoa::set_up),
+    method!("bfoa", "bacterial foraging (Passino 2002)", Bfoa::set_up),
+    method!("bso", "bacterial foraging along particle velocities (Korani 2008)", Bso::set_up),
+    method!("isma", "slime mould with crossover, bee search, parabolas (seed paper 001)", Isma::set_up),
+    method!("sma", "slime mould (Li et al. 2020)", Sma::set_up),
+    method!("boa", "butterflies (Arora and Singh 2019)", Boa::set_up),
+    method!("gwo", "grey wolves (Mirjalili et al. 2014)", Gwo::set_up),
+    method!("ssa", "sparrow search (Xue and Shen 2020)", Ssa::set_up),
+    method!("iepso", "particles with exchange and elimination (seed paper 003)", Iepso::set_up),
+    method!("pso", "particles of 1995, without damping (Kennedy and Eberhart)", Pso::original),
+    method!("spso", "particles with constriction (Clerc and Kennedy 2002)", Pso::standard),
+    method!("ga", "genetic algorithm: tournament, blend, Gaussian mutation", Ga::set_up),
+    method!("de", "differential evolution, rand/1/bin (Storn and Price 1997)", De::set_up),
+    method!("iwo", "invasive weeds (Mehrabian and Lucas 2006)", Iwo::set_up),
+];
+
+/// A name that nobody has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no optimiser named \"{name}\"; there are {}", METHODS.map(|m| m.name).join(", "))]
+pub struct Unknown {
+    /// The name that was asked for.
+    pub name: String,
+}
+
+/// The method of a name.
+///
+/// # Errors
+/// Lists the names when this is none of them.
+pub fn by_name(name: &str, setup: Setup) -> Result<Box<dyn Optimizer>, Unknown> {
+    let method = METHODS.iter().find(|m| m.name == name);
+    method.map(|m| (m.make)(setup)).ok_or_else(|| Unknown { name: name.chars().take(64).collect() })
+}
