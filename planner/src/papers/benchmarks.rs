@@ -82,11 +82,17 @@ impl Function {
             Self::Rosenbrock => rosenbrock(x),
             Self::Step => x.iter().map(|x| (x + 0.5) * (x + 0.5)).sum(),
             Self::Ackley => ackley(x),
-            Self::Schwefel => -x.iter().map(|x| x * x.abs().sqrt().sin()).sum::<f64>(),
+            Self::Schwefel => x.iter().map(|x| schwefel(*x)).sum(),
             Self::Penalised => penalised(x),
             Self::Griewank => griewank(x),
         }
     }
+}
+
+/// Beyond 500 the waves would go on and deeper; a moved function stays at its edge there and rises.
+fn schwefel(x: f64) -> f64 {
+    let inside = x.clamp(-500.0, 500.0);
+    (x - inside).abs() - inside * inside.abs().sqrt().sin()
 }
 
 fn rosenbrock(x: &[f64]) -> f64 {
