@@ -1,6 +1,15 @@
 //! What the seed papers optimise: their benchmark functions, arms, objectives and scenes.
 //!
-//! The methods are in [`crate::optimize`]; here are the problems they are tried on.
+//! The methods are in [`crate::optimize`]; here are the problems they are tried on, and the papers' own ways of using
+//! them. Nothing here moves an arm: motions for metal come from [`crate::plan()`].
 pub mod benchmarks;
+mod linear;
+mod quadrature;
+pub mod reach;
+pub mod spline;
+pub mod spline_time;
+pub mod two_link;
+pub mod two_link_energy;
+pub mod two_link_via;
 
 pub use benchmarks::{Benchmark, Function};
