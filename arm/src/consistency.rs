@@ -2,8 +2,9 @@
 //!
 //! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
 use crate::bus_load::REFUSED_PERCENT;
+use crate::protocol::DamiaoMode;
 use crate::reader::Book;
-use crate::settings::{Cycle, Settings, Supervision};
+use crate::settings::{Cycle, Settings, Supervision, Traffic};
 
 /// Times that only make sense in one order.
 pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision) {
@@ -59,9 +60,10 @@ pub(crate) fn check_jump(book: &Book, settings: &Settings) {
     }
 }
 
-/// A motor that lets go before the streamer counts it as gone would be found limp in the middle of a motion.
-pub(crate) fn check_watchdogs(book: &Book, settings: &Settings) {
+/// Damiao motors against the cycle, the supervision and the traffic that they are driven with.
+pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
     let counted_ms = settings.cycle.drive_watchdog_ms;
+    let timeout_s = settings.supervision.drive_timeout_s;
     for (i, servo) in settings.servos.iter().enumerate() {
         let Some(damiao) = servo.protocol.as_damiao() else { continue };
         if damiao.watchdog_ms < counted_ms {
@@ -70,6 +72,23 @@ pub(crate) fn check_watchdogs(book: &Book, settings: &Settings) {
             );
             book.add(None, &format!("servo[{i}].watchdog_ms"), &damiao.watchdog_ms.to_string(), &expected);
         }
+        if let DamiaoMode::Mit { gain_ramp_ms, .. } = damiao.mode
+            && f64::from(gain_ramp_ms) * 1e-3 > 0.5 * timeout_s
+        {
+            let expected = format!(
+                "at most half of supervision.drive_timeout_s = {timeout_s}: the ramp is a part of enabling"
+            );
+            book.add(None, &format!("servo[{i}].gain_ramp_ms"), &gain_ramp_ms.to_string(), &expected);
+        }
+        let Some(bus) = settings.buses.get(servo.bus).filter(|bus| bus.traffic != Traffic::EVERY_CYCLE)
+        else {
+            continue;
+        };
+        let value =
+            format!("damiao on bus {} with setpoint_every, stagger, feedback_every or packed", bus.name);
+        let expected = "a bus with one command and one answer a cycle: the motor does not interpolate, and answers \
+                        each command";
+        book.add(None, &format!("servo[{i}].protocol"), &value, expected);
     }
 }
 

@@ -235,18 +235,23 @@ fn check_counts(table: &Table<'_>, cia402: &Cia402, joint: &RobotJoint, [sign, z
     }
 }
 
+/// Share of a range that joints may use: in the rest, feedback of a motor cannot be told from the value of a register.
+const USED_RANGE: f64 = 127.0 / 128.0;
+
 /// Both ends of the joint's range, and its speed, inside what the wire spans: outside they would be cut off silently.
 fn check_ranges(table: &Table<'_>, damiao: &Damiao, joint: &RobotJoint, [sign, zero_rad]: [f64; 2]) {
     let range_rad = damiao.position_range_rad;
+    let used_rad = USED_RANGE * range_rad;
     for position_rad in joint.limits.position_rad {
         let motor_rad = (position_rad - zero_rad) * sign;
-        if motor_rad.abs() > range_rad {
+        if motor_rad.abs() > used_rad {
             let expected = format!(
                 "at least {:.4} rad: joint {} at {position_rad} rad is {motor_rad:.4} rad of its motor, {:.4} rad \
-                 outside; choose another zero_offset_rad, narrower limits of the joint, or a wider PMAX in the motor",
-                motor_rad.abs(),
+                 outside what can be used of the range; choose another zero_offset_rad, narrower limits of the joint, \
+                 or a wider PMAX in the motor",
+                motor_rad.abs() / USED_RANGE,
                 joint.name,
-                motor_rad.abs() - range_rad
+                motor_rad.abs() - used_rad
             );
             table.fault("position_range_rad", &format!("{range_rad:?}"), &expected);
             break;

@@ -241,7 +241,7 @@ impl Settings {
             simulator,
         };
         consistency::check_jump(book, &settings);
-        consistency::check_watchdogs(book, &settings);
+        consistency::check_damiao(book, &settings);
         consistency::check_loads(book, &settings);
         Some(settings)
     }

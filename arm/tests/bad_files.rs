@@ -479,7 +479,7 @@ const DAMIAO_CASES: &[Case] = &[
         "position_range_rad = 12.5",
         "position_range_rad = 3.0",
         "servo[0].position_range_rad",
-        "joint shoulder_pan at -3.1416 rad is -3.1416 rad of its motor, 0.1416 rad outside",
+        "joint shoulder_pan at -3.1416 rad is -3.1416 rad of its motor, 0.1650 rad outside",
     ),
     (
         Damiao,
@@ -500,7 +500,7 @@ const DAMIAO_CASES: &[Case] = &[
         "zero_offset_rad = 0.0",
         "zero_offset_rad = 10.0",
         "servo[0].position_range_rad",
-        "0.6416 rad outside",
+        "0.7393 rad outside",
     ),
     (
         Damiao,

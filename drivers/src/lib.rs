@@ -6,6 +6,7 @@
 
 pub mod bring_up;
 pub mod codec;
+pub mod drivers;
 pub mod frame;
 pub mod link;
 pub mod servo;
@@ -13,4 +14,4 @@ pub mod sim;
 
 pub use frame::{CanFrame, CanId, FrameBatch};
 pub use link::{CanLink, ErrorFrame, LinkFault};
-pub use servo::{DriveState, DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};
+pub use servo::{DriveState, DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};

@@ -29,6 +29,8 @@ pub struct JointCommand {
     pub velocity_rad_s: f64,
     /// Its second derivative.
     pub acceleration_rad_s2: f64,
+    /// Torque on top of what the servo's own control gives, for protocols that carry it; cut off at the servo's range.
+    pub torque_nm: f64,
 }
 
 /// What the streamer wants of all drives of a bus.
@@ -78,9 +80,9 @@ pub struct ServoStatus {
     pub received: Option<Nanos>,
     /// The protocol's status word.
     pub status_word: u32,
-    /// The protocol's error code (EMCY code, or SDO abort code when refused); 0 for none.
+    /// The protocol's error code (CiA 402: EMCY code, or SDO abort code when refused; see `bring_up`); 0 for none.
     pub error_code: u32,
-    /// Object that was refused, `index << 8 | sub`; 0 for none.
+    /// Object or register that was refused, in the protocol's numbers (CiA 402: `index << 8 | sub`); 0 for none.
     pub refused_object: u32,
     /// The drive warns.
     pub warning: bool,
@@ -98,6 +100,20 @@ impl ServoStatus {
         refused_object: 0,
         warning: false,
     };
+}
+
+/// Why a servo's zero is not set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ZeroRefused {
+    /// The protocol, or this software's use of it, cannot.
+    #[error("this servo's protocol sets no zero; state zero_offset_rad in the settings instead")]
+    NotOffered,
+    /// This driver does not serve the joint.
+    #[error("the joint is not on this bus")]
+    NoSuchJoint,
+    /// The servo is energised, in fault or not configured.
+    #[error("the servo is not configured and de-energised; disable the arm and clear its faults first")]
+    NotReady,
 }
 
 /// A protocol's master side for the joints of one bus.
@@ -134,6 +150,18 @@ pub trait ServoDriver: Send {
     ///
     /// Real time: no allocation.
     fn start_over(&mut self);
+
+    /// Makes the angle where a joint's servo stands its zero, for good, over the next cycle. Only for a servo that is
+    /// configured and not energised.
+    ///
+    /// Real time: no allocation.
+    ///
+    /// # Errors
+    /// What stands against it. A protocol that cannot do this refuses always.
+    fn set_zero(&mut self, joint: usize) -> Result<(), ZeroRefused> {
+        let _ = joint;
+        Err(ZeroRefused::NotOffered)
+    }
 
     /// The sentence for an error code of this protocol: "0x8611 following error too large".
     fn explain(&self, error_code: u32) -> String;

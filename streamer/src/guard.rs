@@ -41,6 +41,8 @@ impl GuardedCommand {
                 position_rad: *position,
                 velocity_rad_s: *velocity,
                 acceleration_rad_s2: *acceleration,
+                // No model of the arm's masses yet: servos carry their load by their own control.
+                torque_nm: 0.0,
             };
         }
         Self { setpoint, joints }

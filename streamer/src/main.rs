@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use taustream_arm::Settings;
-use taustream_drivers::codec::cia402::Cia402Driver;
+use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
@@ -91,7 +91,7 @@ fn open_buses(settings: &Settings, choice: LinkChoice) -> Result<Buses> {
     let mut buses = Vec::new();
     for (index, bus) in settings.buses.iter().enumerate() {
         let link = link::open(bus, choice, LinkRole::Master, &runtime)?;
-        let driver = Cia402Driver::new(settings, index)?;
+        let driver = drivers::of_bus(settings, index)?;
         buses.push(Bus::new(link, Box::new(driver), settings.supervision.lost_cycles_max));
     }
     Ok(Buses::new(buses)?)

@@ -3,6 +3,7 @@
 //! First it only listens: a drive that is energised before this master has configured it is left as it is. Then the
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's patient
 //! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
+use crate::bring_up::pace::{Cycle, Patience};
 use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
 use crate::bring_up::power::{Heard, Power};
 use crate::bring_up::trouble::Trouble;
@@ -61,17 +62,6 @@ pub struct Service {
     pub sdo: Option<SdoRequest>,
 }
 
-/// What the master knows in a cycle, beside the node itself.
-#[derive(Clone, Copy, Debug)]
-pub struct Cycle {
-    /// Patient clock.
-    pub now: Nanos,
-    /// The wish.
-    pub wish: DriveWish,
-    /// Another master was heard a short while ago.
-    pub other_master: bool,
-}
-
 /// The command for a node in this cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
@@ -79,15 +69,6 @@ pub struct Target {
     pub counts: Option<i32>,
     /// Close enough to the measured position to energise.
     pub near: bool,
-}
-
-/// Limits of waiting.
-#[derive(Clone, Copy, Debug)]
-pub struct Patience {
-    /// Each confirmation of a step.
-    pub step: Nanos,
-    /// Age up to which a statusword is recent.
-    pub feedback: Nanos,
 }
 
 /// The master's image of one node.

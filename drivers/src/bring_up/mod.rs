@@ -2,6 +2,10 @@
 //!
 //! State machines without I/O, advanced once a cycle by their protocol's driver.
 pub mod cia402;
+pub mod damiao;
+pub mod damiao_plan;
+pub mod damiao_trouble;
+pub mod pace;
 pub mod plan;
 pub mod power;
 pub mod trouble;

@@ -1,7 +1,8 @@
 //! What the master itself finds wrong with a node, beside what the node reports.
 //!
-//! [`crate::ServoStatus::error_code`] holds three kinds of codes that do not overlap: emergency codes (up to 0xFFFF),
-//! these (0x1 0000 to 0x1 FFFF), and SDO abort codes (from 0x503 0000).
+//! [`crate::ServoStatus::error_code`] holds kinds of codes that do not overlap: emergency codes (up to 0xFFFF), these
+//! (0x1 0000 to 0x1 FFFF), those of Damiao motors (0x2 0000 to 0x2 FFFF), and SDO abort codes (from 0x503 0000).
+use crate::bring_up::damiao_trouble as damiao;
 use crate::codec::words;
 
 /// A finding of the master.
@@ -105,6 +106,9 @@ pub fn explain_refusal(code: u32, object: u32) -> String {
     if object == 0 {
         return explain(code);
     }
+    if let Some(sentence) = damiao::explain_refusal(code, object) {
+        return sentence;
+    }
     let (index, sub) = (object >> 8, object & 0xFF);
     format!("object 0x{index:04X}:{sub:02}: {}", explain(code))
 }
@@ -114,6 +118,9 @@ pub fn explain_refusal(code: u32, object: u32) -> String {
 pub fn explain(code: u32) -> String {
     if let Some(trouble) = Trouble::ALL.into_iter().find(|trouble| trouble.code() == code) {
         return trouble.sentence().to_owned();
+    }
+    if let Some(sentence) = damiao::explain(code) {
+        return sentence;
     }
     match u16::try_from(code) {
         Ok(emcy) => format!("0x{emcy:04X} {}", words::emcy(emcy)),

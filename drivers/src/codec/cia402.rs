@@ -3,7 +3,8 @@
 //! One cycle on the bus: SYNC, which makes the drives apply the setpoints of the cycle before and sample their
 //! position; the new setpoints; then, one frame a node at most, configuration. So a command acts one period after it
 //! was sent, and a position is one period old when it is seen.
-use crate::bring_up::cia402::{Cycle, Node, Patience, Target};
+use crate::bring_up::cia402::{Node, Target};
+use crate::bring_up::pace::{self, Patience, PatientClock};
 use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan};
 use crate::bring_up::trouble;
 use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, sync};
@@ -17,11 +18,6 @@ pub use crate::codec::cia402_words::{
     CountScale, DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo,
     rad_from_counts,
 };
-
-/// Silence of other masters after which the bus counts as ours.
-const OTHER_MASTER_QUIET: Nanos = Nanos(500_000_000);
-/// A longer gap between two cycles is our own stall and does not count as waiting.
-const PATIENT_STEP_PERIODS: u64 = 10;
 
 /// Why a driver cannot be made from settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -98,12 +94,8 @@ pub struct Cia402Driver {
     /// Node id to index of drive.
     by_node: [Option<usize>; NODE_MAX as usize + 1],
     near_rad: f64,
-    patient_step: Nanos,
-    /// Advances with the cycles, but not through our own stalls.
-    patient: Nanos,
-    encoded_at: Option<Nanos>,
+    clock: PatientClock,
     heartbeat_at: Option<Nanos>,
-    other_master_at: Option<Nanos>,
 }
 
 impl Cia402Driver {
@@ -132,11 +124,8 @@ impl Cia402Driver {
             joints: Vec::new(),
             by_node: [None; NODE_MAX as usize + 1],
             near_rad,
-            patient_step: Nanos(u64::from(period_us) * 1_000 * PATIENT_STEP_PERIODS),
-            patient: Nanos(0),
-            encoded_at: None,
+            clock: PatientClock::new(period_us),
             heartbeat_at: None,
-            other_master_at: None,
         };
         for servo in settings.servos.iter().filter(|s| s.bus == bus) {
             let Some(scale) = CountScale::of(servo) else { continue };
@@ -170,12 +159,6 @@ impl Cia402Driver {
         self.drives.get_mut(index)
     }
 
-    fn tick(&mut self, now: Nanos) {
-        let passed = self.encoded_at.map_or(0, |then| now.0.saturating_sub(then.0));
-        self.patient = Nanos(self.patient.0.saturating_add(passed.min(self.patient_step.0)));
-        self.encoded_at = Some(now);
-    }
-
     /// Drives watch for this (object 0x1016) and stop by themselves when it ends.
     fn push_heartbeat(&mut self, now: Nanos, out: &mut FrameBatch) {
         let due = self
@@ -189,16 +172,7 @@ impl Cia402Driver {
 
 /// A positive time of the settings in nanoseconds.
 fn nanos(key: &'static str, value: f64) -> Result<Nanos, Cia402Error> {
-    if !value.is_finite() || value <= 0.0 {
-        return Err(Cia402Error::Supervision { key, value });
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "positive; saturation is fine"
-    )]
-    let nanos = (value * 1e9) as u64;
-    Ok(Nanos(nanos))
+    pace::nanos(value).ok_or(Cia402Error::Supervision { key, value })
 }
 
 impl ServoDriver for Cia402Driver {
@@ -209,11 +183,7 @@ impl ServoDriver for Cia402Driver {
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
-        self.tick(now);
-        let patient = self.patient;
-        let other_master =
-            self.other_master_at.is_some_and(|at| patient.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0);
-        let cycle = Cycle { now: patient, wish, other_master };
+        let cycle = self.clock.tick(now, wish);
         if self.drives.iter().any(|drive| drive.node.needs_sync()) {
             out.push(sync());
         }
@@ -237,9 +207,9 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn decode(&mut self, now: Nanos, frame: &CanFrame) {
-        let patient = self.patient;
+        let patient = self.clock.now();
         if decode_sync(frame).is_some() {
-            self.other_master_at = Some(patient);
+            self.clock.note_other_master();
         } else if let Some((node, status, position)) = decode_tpdo(frame) {
             if let Some(drive) = self.drive_mut(node)
                 && drive.node.take_tpdo(patient, status, position)
@@ -285,19 +255,19 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn clear_faults(&mut self) {
-        let patient = self.patient;
+        let patient = self.clock.now();
         for drive in &mut self.drives {
             drive.node.clear_faults(patient);
         }
     }
 
     fn start_over(&mut self) {
-        let patient = self.patient;
+        let patient = self.clock.now();
         for drive in &mut self.drives {
             drive.node.start_over(patient);
             drive.received = None;
         }
-        self.other_master_at = None;
+        self.clock.forget_other_master();
     }
 
     fn explain(&self, error_code: u32) -> String {

@@ -4,6 +4,9 @@
 pub mod canopen;
 pub mod cia402;
 pub mod cia402_words;
+pub mod damiao;
+pub mod damiao_frames;
+pub mod mit;
 pub mod object;
 pub mod sdo;
 pub mod sdo_client;

@@ -1,0 +1,589 @@
+//! One Damiao motor from silence to following commands.
+//!
+//! First it is only asked for feedback: a motor that is energised before this master has configured it is left as it is.
+//! Then its registers are compared with the settings, mode and watchdog written, and both looked at once more before
+//! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
+//! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
+//! All times are on the driver's patient clock, which stands still while the master itself is stalled.
+use crate::bring_up::damiao_plan::{CONFIGURE, Job, Judged, MotorPlan, VERIFY};
+use crate::bring_up::damiao_trouble::{DamiaoTrouble, differs, register_object, status_code};
+use crate::bring_up::pace::{Cycle, Patience};
+use crate::codec::damiao_frames::{Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, Special};
+use crate::codec::mit::{MitCommand, MitState};
+use crate::servo::{DriveState, DriveWish, Nanos};
+use taustream_arm::DamiaoMode;
+
+/// Pause between two looks at a motor that is waited for.
+const LOOK_AGAIN: Nanos = Nanos(100_000_000);
+/// How long the bus is listened to before anything is written: a foreign master shows itself in this time.
+const LISTEN_LEAST: Nanos = Nanos(100_000_000);
+/// An answer that has not come by then was lost; it is asked for again.
+const ASK_AGAIN: Nanos = Nanos(20_000_000);
+/// A special command is repeated after this, until the motor's status shows it.
+const REPEAT: Nanos = Nanos(20_000_000);
+/// What a change of mode takes (vendor's library).
+const SETTLE: Nanos = Nanos(100_000_000);
+/// Without feedback for so long, at one request a cycle, the motor is gone.
+const SILENT: Nanos = Nanos(350_000_000);
+
+/// Where the bring-up stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Asking for feedback, changing nothing.
+    Listen { since: Nanos },
+    /// Found energised; watched, left alone.
+    Unowned,
+    /// At this job of [`CONFIGURE`].
+    Configure { job: usize, since: Nanos },
+    /// Configured, not energised.
+    Ready,
+    /// At this job of [`VERIFY`], on the way to energised.
+    Verify { job: usize, since: Nanos },
+    /// Waiting for a fresh position.
+    Arm { since: Nanos },
+    /// The enable command is sent until the motor says that it is energised.
+    Enable { since: Nanos, next: Nanos },
+    /// Energised; gains rise.
+    Ramp { since: Nanos },
+    /// Energised; following.
+    On,
+    /// The disable command is sent until the motor says that it is not energised.
+    Disable { since: Nanos },
+    /// Let go, or not as it was left; waits for the wish to be disabled.
+    Gone,
+    /// A register does not fit.
+    Refused { code: u32, object: u32 },
+}
+
+const NO_FEEDBACK: Feedback =
+    Feedback { status: STATUS_DISABLED, state: [0; 5], stage_celsius: 0, winding_celsius: 0 };
+const NOT_MEASURED: MitState =
+    MitState { position_rad: f64::NAN, velocity_rad_s: f64::NAN, torque_nm: f64::NAN };
+
+/// The command for a motor in this cycle, motor side.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorTarget {
+    /// Wanted angle.
+    pub position_rad: f64,
+    /// Wanted velocity.
+    pub velocity_rad_s: f64,
+    /// Torque on top.
+    pub torque_nm: f64,
+}
+
+/// The master's image of one motor.
+#[derive(Clone, Debug)]
+pub struct Motor {
+    plan: MotorPlan,
+    patience: Patience,
+    near_rad: f64,
+    stage: Stage,
+    wished: DriveWish,
+    trouble: Option<DamiaoTrouble>,
+    /// What was asked last and not answered yet.
+    asked: Option<Request>,
+    asked_at: Nanos,
+    /// The newest register that was answered.
+    answer: Option<(u8, bool, [u8; 4])>,
+    /// A feedback has come since this was looked at.
+    looked: bool,
+    heard: bool,
+    feedback: Feedback,
+    measured: MitState,
+    measured_at: Nanos,
+    /// Clearing an error since, and when to repeat it.
+    clearing: Option<(Nanos, Nanos)>,
+    set_zero: bool,
+    sent_rad: f64,
+}
+
+impl Motor {
+    /// A motor of which nothing is known. Energised only when its command is within `near_rad` of where it stands.
+    #[must_use]
+    pub const fn new(plan: MotorPlan, patience: Patience, near_rad: f64) -> Self {
+        let nothing =
+            Feedback { status: STATUS_DISABLED, state: [0; 5], stage_celsius: 0, winding_celsius: 0 };
+        Self {
+            plan,
+            patience,
+            near_rad,
+            stage: Stage::Listen { since: Nanos(0) },
+            wished: DriveWish::TorqueOff,
+            trouble: None,
+            asked: None,
+            asked_at: Nanos(0),
+            answer: None,
+            looked: false,
+            heard: false,
+            feedback: NO_FEEDBACK,
+            measured: NOT_MEASURED,
+            measured_at: Nanos(0),
+            clearing: None,
+            set_zero: false,
+            sent_rad: 0.0,
+        }
+    }
+
+    /// What it measured last, motor side; not numbers before the first feedback.
+    #[must_use]
+    pub const fn measured(&self) -> MitState {
+        self.measured
+    }
+
+    /// Status nibble, then the temperatures of power stage and winding, a byte each.
+    #[must_use]
+    pub const fn status_word(&self) -> u32 {
+        let Feedback { status, stage_celsius, winding_celsius, .. } = self.feedback;
+        status as u32 | (stage_celsius as u32) << 8 | (winding_celsius as u32) << 16
+    }
+
+    /// Where the motor is.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        let troubled = self.trouble.is_some();
+        match self.stage {
+            Stage::Listen { .. } if !self.heard => DriveState::Absent,
+            Stage::Listen { .. } | Stage::Configure { .. } => DriveState::Configuring,
+            Stage::Unowned => DriveState::EnergisedUnowned,
+            Stage::Refused { .. } => DriveState::Refused,
+            Stage::Gone => DriveState::Fault,
+            _ if troubled || self.in_error() => DriveState::Fault,
+            Stage::Ready => DriveState::Disabled,
+            Stage::Verify { .. } | Stage::Arm { .. } | Stage::Enable { .. } | Stage::Ramp { .. } => {
+                DriveState::Enabling
+            }
+            Stage::On => DriveState::Enabled,
+            Stage::Disable { .. } => DriveState::Disabling,
+        }
+    }
+
+    /// The code to report, and the register that it concerns.
+    #[must_use]
+    pub fn error(&self) -> (u32, u32) {
+        match (self.stage, self.trouble) {
+            (Stage::Refused { code, object }, _) => (code, object),
+            _ if self.heard && self.in_error() => (status_code(self.feedback.status), 0),
+            (_, Some(trouble)) => (trouble.code(), 0),
+            (_, None) => (0, 0),
+        }
+    }
+
+    /// Takes what the motor sends. True when it was a feedback whose scale is known.
+    ///
+    /// Real time: arithmetic only.
+    pub fn take(&mut self, now: Nanos, reply: Reply) -> bool {
+        self.heard = true;
+        let feedback = match reply {
+            Reply::Feedback(feedback) => feedback,
+            Reply::Register { number, written, value } => {
+                let awaited = match self.asked {
+                    Some(Request::Read(asked)) => asked == number && !written,
+                    Some(Request::Write(asked, _)) => asked == number && written,
+                    _ => false,
+                };
+                if awaited {
+                    (self.answer, self.asked) = (Some((number, written, value)), None);
+                }
+                return false;
+            }
+        };
+        (self.feedback, self.looked) = (feedback, true);
+        if self.asked == Some(Request::Refresh) {
+            self.asked = None;
+        }
+        // Before the ranges were read nobody knows how it scales.
+        let known = !matches!(
+            self.stage,
+            Stage::Listen { .. } | Stage::Unowned | Stage::Configure { .. } | Stage::Refused { .. }
+        );
+        if known {
+            (self.measured, self.measured_at) = (feedback.values(&self.plan.ranges()), now);
+        }
+        known
+    }
+
+    /// Forgets findings, clears an error of the motor, and tries a refused motor again from the start.
+    ///
+    /// Real time: no allocation.
+    pub fn clear_faults(&mut self, now: Nanos) {
+        match self.stage {
+            Stage::Refused { .. } => self.listen(now, None),
+            Stage::Ready if self.in_error() => self.clearing = Some((now, now)),
+            Stage::Ready | Stage::On | Stage::Ramp { .. } => self.trouble = None,
+            Stage::Listen { .. }
+            | Stage::Unowned
+            | Stage::Configure { .. }
+            | Stage::Verify { .. }
+            | Stage::Arm { .. }
+            | Stage::Enable { .. }
+            | Stage::Disable { .. }
+            | Stage::Gone => {}
+        }
+    }
+
+    /// Forgets everything that is known of it, as at start.
+    ///
+    /// Real time: no allocation.
+    pub fn start_over(&mut self, now: Nanos) {
+        self.listen(now, None);
+        (self.heard, self.feedback, self.measured) = (false, NO_FEEDBACK, NOT_MEASURED);
+    }
+
+    /// Makes the angle where it stands its zero, in the next cycle; false unless it is configured and not energised.
+    pub fn set_zero(&mut self) -> bool {
+        let able = self.stage == Stage::Ready && !self.in_error() && self.wished == DriveWish::Disabled;
+        self.set_zero |= able;
+        able
+    }
+
+    /// This cycle's request to the motor: one at most.
+    ///
+    /// Real time: no allocation, bounded work.
+    pub fn request(&mut self, cycle: Cycle, target: Option<MotorTarget>) -> Option<Request> {
+        let before = std::mem::replace(&mut self.wished, cycle.wish);
+        if cycle.wish == DriveWish::TorqueOff && before != DriveWish::TorqueOff {
+            return self.torque_off(cycle.now);
+        }
+        let rises = cycle.wish == DriveWish::Enabled && before == DriveWish::Disabled;
+        let looked = std::mem::take(&mut self.looked);
+        let status = looked.then_some(self.feedback.status);
+        match self.stage {
+            Stage::Listen { since } => self.listening(cycle, since, status),
+            Stage::Unowned => self.unowned(cycle, status),
+            Stage::Configure { job, since } => self.configuring(cycle.now, status, (job, since)),
+            Stage::Ready => self.ready(cycle.now, status, rises),
+            Stage::Verify { .. } | Stage::Arm { .. } | Stage::Enable { .. }
+                if cycle.wish != DriveWish::Enabled =>
+            {
+                self.disable(cycle.now)
+            }
+            Stage::Verify { job, since } => self.verifying(cycle.now, (job, since)),
+            Stage::Arm { since } => self.arming(cycle.now, target, since),
+            Stage::Enable { since, next } => self.enabling(cycle.now, status, target, (since, next)),
+            Stage::Ramp { .. } | Stage::On => self.following(cycle, status, target),
+            Stage::Disable { since } => self.disabling(cycle.now, status, since),
+            Stage::Gone => self.gone(cycle),
+            Stage::Refused { .. } => None,
+        }
+    }
+
+    fn listening(&mut self, cycle: Cycle, since: Nanos, status: Option<u8>) -> Option<Request> {
+        match status {
+            Some(STATUS_ENABLED) => self.stage = Stage::Unowned,
+            Some(_) if cycle.other_master => self.trouble = Some(DamiaoTrouble::OtherMaster),
+            Some(_) if cycle.wish == DriveWish::Disabled && age(cycle.now, since) >= LISTEN_LEAST.0 => {
+                self.trouble = None;
+                return self.at_job(cycle.now, 0);
+            }
+            Some(_) => {}
+            None if self.asked.is_some() && age(cycle.now, self.asked_at) >= LOOK_AGAIN.0 => {
+                self.heard = false;
+                self.trouble.get_or_insert(DamiaoTrouble::NoAnswer);
+            }
+            None => {}
+        }
+        self.look(cycle.now)
+    }
+
+    fn unowned(&mut self, cycle: Cycle, status: Option<u8>) -> Option<Request> {
+        match status {
+            Some(status) if status != STATUS_ENABLED => self.listen(cycle.now, None),
+            _ => {}
+        }
+        let look = self.look(cycle.now)?;
+        // Its answer to the emergency is a feedback as good as any.
+        Some(if cycle.wish == DriveWish::TorqueOff { Request::Special(Special::Disable, 0) } else { look })
+    }
+
+    fn configuring(&mut self, now: Nanos, status: Option<u8>, at: (usize, Nanos)) -> Option<Request> {
+        let (index, since) = at;
+        if status == Some(STATUS_ENABLED) {
+            self.stage = Stage::Unowned;
+            return None;
+        }
+        let Some(job) = CONFIGURE.get(index).copied() else {
+            self.stage = Stage::Ready;
+            return Some(Request::Refresh);
+        };
+        if let Some((_, _, value)) = self.answer.take() {
+            return match self.plan.judge(job, Some(index), value) {
+                Judged::On(steps) => self.at_job(now, index + steps),
+                Judged::Differs => {
+                    let (code, object) = differs(job.register(), value);
+                    self.stage = Stage::Refused { code, object };
+                    None
+                }
+            };
+        }
+        if age(now, since) >= self.patience.step.0 {
+            let code = DamiaoTrouble::NoRegister.code();
+            self.stage = Stage::Refused { code, object: register_object(job.register()) };
+            return None;
+        }
+        self.ask_job(now, job, since)
+    }
+
+    fn ready(&mut self, now: Nanos, status: Option<u8>, rises: bool) -> Option<Request> {
+        if status == Some(STATUS_ENABLED) {
+            // Somebody else has energised it.
+            self.stage = Stage::Unowned;
+            return None;
+        }
+        if age(now, self.measured_at) >= SILENT.0 && age(now, self.asked_at) >= SILENT.0 {
+            self.heard = false;
+            self.listen(now, Some(DamiaoTrouble::Silent));
+            return None;
+        }
+        if std::mem::take(&mut self.set_zero) {
+            return Some(Request::Special(Special::SetZero, 0));
+        }
+        if let Some((since, next)) = self.clearing {
+            if !self.in_error() {
+                (self.clearing, self.trouble) = (None, None);
+            } else if age(now, since) >= self.patience.step.0 {
+                self.clearing = None;
+            } else if now >= next {
+                self.clearing = Some((since, later(now, REPEAT)));
+                return Some(Request::Special(Special::ClearError, 0));
+            }
+        }
+        if rises && !self.in_error() && self.trouble.is_none() {
+            (self.asked, self.answer) = (None, None);
+            self.stage = Stage::Verify { job: 0, since: now };
+        }
+        Some(Request::Refresh)
+    }
+
+    /// Registers and feedback take turns, so that the position stays young.
+    fn verifying(&mut self, now: Nanos, at: (usize, Nanos)) -> Option<Request> {
+        let (index, since) = at;
+        let Some(job) = VERIFY.get(index).copied() else {
+            self.stage = Stage::Arm { since: now };
+            return Some(Request::Refresh);
+        };
+        if let Some((_, _, value)) = self.answer.take() {
+            if self.plan.judge(job, None, value) == Judged::Differs {
+                return self.go(DamiaoTrouble::Restarted);
+            }
+            self.stage = Stage::Verify { job: index + 1, since: now };
+            return Some(Request::Refresh);
+        }
+        if age(now, since) >= self.patience.step.0 {
+            return self.go(DamiaoTrouble::NoRegister);
+        }
+        self.ask_job(now, job, since)
+    }
+
+    fn arming(&mut self, now: Nanos, target: Option<MotorTarget>, since: Nanos) -> Option<Request> {
+        if self.in_error() {
+            self.stage = Stage::Ready;
+            return Some(Request::Refresh);
+        }
+        if age(now, since) >= self.patience.step.0 {
+            return self.go(DamiaoTrouble::Silent);
+        }
+        if self.measured_at <= since {
+            return Some(Request::Refresh);
+        }
+        // False for a position that is not known.
+        let near =
+            target.is_some_and(|t| (t.position_rad - self.measured.position_rad).abs() <= self.near_rad);
+        if !near {
+            return self.go(DamiaoTrouble::CommandFar);
+        }
+        self.sent_rad = self.measured.position_rad;
+        self.stage = Stage::Enable { since: now, next: now };
+        // A command without gains first: whatever the motor was told before, it is not taken up.
+        self.command(target, 0.0)
+    }
+
+    fn enabling(
+        &mut self,
+        now: Nanos,
+        status: Option<u8>,
+        target: Option<MotorTarget>,
+        at: (Nanos, Nanos),
+    ) -> Option<Request> {
+        let (since, next) = at;
+        if status == Some(STATUS_ENABLED) {
+            self.stage = Stage::Ramp { since: now };
+            return self.command(target, 0.0);
+        }
+        if self.in_error() {
+            self.stage = Stage::Ready;
+            return Some(Request::Refresh);
+        }
+        if age(now, since) >= self.patience.step.0 {
+            self.trouble = Some(DamiaoTrouble::EnableTimeout);
+            return self.disable(now);
+        }
+        if now < next {
+            return self.command(target, 0.0);
+        }
+        self.stage = Stage::Enable { since, next: later(now, REPEAT) };
+        Some(Request::Special(Special::Enable, 0))
+    }
+
+    fn following(
+        &mut self,
+        cycle: Cycle,
+        status: Option<u8>,
+        target: Option<MotorTarget>,
+    ) -> Option<Request> {
+        let now = cycle.now;
+        if cycle.wish != DriveWish::Enabled {
+            return self.disable(now);
+        }
+        match status {
+            None | Some(STATUS_ENABLED) => {}
+            Some(STATUS_DISABLED) => return self.go(DamiaoTrouble::DroppedOut),
+            Some(_) => {
+                self.stage = Stage::Ready;
+                return Some(Request::Refresh);
+            }
+        }
+        if age(now, self.measured_at) >= SILENT.0 {
+            // A silent motor may still listen: it gets its commands until the wish is disabled.
+            self.trouble.get_or_insert(DamiaoTrouble::Silent);
+        }
+        let share = match self.stage {
+            Stage::Ramp { since } => ratio(age(now, since), self.plan.ramp_ns()),
+            _ => 1.0,
+        };
+        if share >= 1.0 {
+            self.stage = Stage::On;
+        }
+        self.command(target, share)
+    }
+
+    fn disabling(&mut self, now: Nanos, status: Option<u8>, since: Nanos) -> Option<Request> {
+        if status.is_some_and(|status| status != STATUS_ENABLED) {
+            self.stage = if self.trouble.is_some() { Stage::Gone } else { Stage::Ready };
+            return Some(Request::Refresh);
+        }
+        if age(now, since) >= SILENT.0 && age(now, self.measured_at) >= SILENT.0 {
+            self.heard = false;
+            self.listen(now, Some(DamiaoTrouble::Silent));
+            return None;
+        }
+        Some(Request::Special(Special::Disable, 0))
+    }
+
+    fn gone(&mut self, cycle: Cycle) -> Option<Request> {
+        if cycle.wish == DriveWish::Disabled {
+            self.listen(cycle.now, self.trouble);
+        }
+        // It was ours: should it be energised after all, it is not left to its last command.
+        let energised = self.feedback.status == STATUS_ENABLED;
+        Some(if energised { Request::Special(Special::Disable, 0) } else { Request::Refresh })
+    }
+
+    /// The emergency: in any stage, before anything else.
+    fn torque_off(&mut self, now: Nanos) -> Option<Request> {
+        match self.stage {
+            Stage::Listen { .. }
+            | Stage::Unowned
+            | Stage::Configure { .. }
+            | Stage::Gone
+            | Stage::Refused { .. } => {
+                self.asked = None;
+                Some(Request::Special(Special::Disable, 0))
+            }
+            Stage::Ready
+            | Stage::Verify { .. }
+            | Stage::Arm { .. }
+            | Stage::Enable { .. }
+            | Stage::Ramp { .. }
+            | Stage::On
+            | Stage::Disable { .. } => self.disable(now),
+        }
+    }
+
+    fn disable(&mut self, now: Nanos) -> Option<Request> {
+        (self.asked, self.answer, self.clearing) = (None, None, None);
+        self.stage = Stage::Disable { since: now };
+        Some(Request::Special(Special::Disable, 0))
+    }
+
+    fn go(&mut self, trouble: DamiaoTrouble) -> Option<Request> {
+        (self.asked, self.answer, self.clearing) = (None, None, None);
+        self.trouble = Some(trouble);
+        self.stage = Stage::Gone;
+        Some(Request::Refresh)
+    }
+
+    /// Back to the start, where nothing is changed before the motor has been looked at.
+    fn listen(&mut self, now: Nanos, trouble: Option<DamiaoTrouble>) {
+        (self.asked, self.answer, self.clearing) = (None, None, None);
+        (self.trouble, self.set_zero, self.looked) = (trouble, false, false);
+        self.stage = Stage::Listen { since: now };
+    }
+
+    fn look(&mut self, now: Nanos) -> Option<Request> {
+        let due = self.asked_at == Nanos(0) || age(now, self.asked_at) >= LOOK_AGAIN.0;
+        due.then(|| self.ask(now, Request::Refresh))
+    }
+
+    fn ask(&mut self, now: Nanos, request: Request) -> Request {
+        (self.asked, self.asked_at) = (Some(request), now);
+        request
+    }
+
+    fn at_job(&mut self, now: Nanos, job: usize) -> Option<Request> {
+        (self.asked, self.answer) = (None, None);
+        self.stage = Stage::Configure { job, since: now };
+        None
+    }
+
+    /// Asks for the answer to a job, again when it was lost.
+    fn ask_job(&mut self, now: Nanos, job: Job, since: Nanos) -> Option<Request> {
+        let settling = matches!(job, Job::ReadSettled(_)) && age(now, since) < SETTLE.0;
+        let waiting = self.asked.is_some() && age(now, self.asked_at) < ASK_AGAIN.0;
+        (!settling && !waiting).then(|| self.ask(now, self.plan.request(job)))
+    }
+
+    /// The command of this cycle with this share of the gains. What is no number never becomes one: the last good
+    /// angle stays.
+    fn command(&mut self, target: Option<MotorTarget>, share: f64) -> Option<Request> {
+        if let Some(target) = target {
+            self.sent_rad = target.position_rad;
+        }
+        let (velocity_rad_s, torque_nm) = target.map_or((0.0, 0.0), |t| (t.velocity_rad_s, t.torque_nm));
+        match self.plan.damiao.mode {
+            DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } => {
+                let command = MitCommand {
+                    position_rad: self.sent_rad,
+                    velocity_rad_s,
+                    stiffness_nm_rad: share * stiffness_nm_rad,
+                    damping_nm_s_rad: share * damping_nm_s_rad,
+                    torque_nm: share * torque_nm,
+                };
+                command.encode(&self.plan.ranges()).map(Request::Mit)
+            }
+            DamiaoMode::PosVel => {
+                #[expect(clippy::cast_possible_truncation, reason = "the frame has this width")]
+                let (position_rad, velocity_rad_s) = (self.sent_rad as f32, self.plan.speed_rad_s as f32);
+                Some(Request::PosVel { position_rad, velocity_rad_s })
+            }
+        }
+    }
+
+    const fn in_error(&self) -> bool {
+        self.feedback.status > STATUS_ENABLED
+    }
+}
+
+const fn age(now: Nanos, then: Nanos) -> u64 {
+    now.0.saturating_sub(then.0)
+}
+
+const fn later(now: Nanos, by: Nanos) -> Nanos {
+    Nanos(now.0.saturating_add(by.0))
+}
+
+/// `part` of `whole`, at most 1.
+fn ratio(part: u64, whole: u64) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
+    let (part, whole_ns) = (part as f64, whole as f64);
+    if whole == 0 { 1.0 } else { (part / whole_ns).min(1.0) }
+}

@@ -1,0 +1,81 @@
+//! What every bring-up knows of time: how long to wait, and a clock that does not count our own stalls as waiting.
+use crate::servo::{DriveWish, Nanos};
+
+/// Limits of waiting.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    /// Each confirmation of a step.
+    pub step: Nanos,
+    /// Age up to which what a drive said is recent.
+    pub feedback: Nanos,
+}
+
+/// What the master knows in a cycle, beside the drive itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycle {
+    /// Patient clock.
+    pub now: Nanos,
+    /// The wish.
+    pub wish: DriveWish,
+    /// Another master was heard a short while ago.
+    pub other_master: bool,
+}
+
+/// Silence of other masters after which the bus counts as ours.
+const OTHER_MASTER_QUIET: Nanos = Nanos(500_000_000);
+/// A longer gap between two cycles is our own stall and does not count as waiting.
+const STEP_PERIODS: u64 = 10;
+
+/// A clock that advances with the cycles, but not through our own stalls.
+#[derive(Clone, Copy, Debug)]
+pub struct PatientClock {
+    step: Nanos,
+    now: Nanos,
+    ticked: Option<Nanos>,
+    other_master_at: Option<Nanos>,
+}
+
+impl PatientClock {
+    /// At its beginning.
+    #[must_use]
+    pub fn new(period_us: u32) -> Self {
+        let step = Nanos(u64::from(period_us) * 1_000 * STEP_PERIODS);
+        Self { step, now: Nanos(0), ticked: None, other_master_at: None }
+    }
+    /// One cycle at `time`, with this wish.
+    pub fn tick(&mut self, time: Nanos, wish: DriveWish) -> Cycle {
+        let passed = self.ticked.map_or(0, |then| time.0.saturating_sub(then.0));
+        self.now = Nanos(self.now.0.saturating_add(passed.min(self.step.0)));
+        self.ticked = Some(time);
+        let heard = |at: Nanos| self.now.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0;
+        Cycle { now: self.now, wish, other_master: self.other_master_at.is_some_and(heard) }
+    }
+    /// Its time.
+    #[must_use]
+    pub const fn now(&self) -> Nanos {
+        self.now
+    }
+    /// The bus is another one now.
+    pub fn forget_other_master(&mut self) {
+        self.other_master_at = None;
+    }
+    /// Another master has spoken.
+    pub fn note_other_master(&mut self) {
+        self.other_master_at = Some(self.now);
+    }
+}
+
+/// A positive time of the settings in nanoseconds; `None` for what is no positive number.
+#[must_use]
+pub fn nanos(seconds: f64) -> Option<Nanos> {
+    if !seconds.is_finite() || seconds <= 0.0 {
+        return None;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; saturation is fine"
+    )]
+    let nanos = (seconds * 1e9) as u64;
+    Some(Nanos(nanos))
+}
