@@ -99,7 +99,7 @@ impl Arm {
         let core = Core::new(&settings, buses, queues, true);
         let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         // A limp joint falls, and the streamer rightly refuses to enable it while it does.
-        setups.iter_mut().for_each(|setup| setup.parameters.plant.brake = true);
+        setups.iter_mut().for_each(|setup| setup.parameters.plant_mut().brake = true);
         Self {
             readers: core.readers(),
             core,

@@ -7,9 +7,11 @@
 //! setpoint acts from the SYNC after it, and feedback shows the state before it.
 use super::controller::{Controller, LoopParameters};
 use super::dictionary::Dictionary;
+use super::disturbance::Disturbance;
+use super::mechanics::Mechanics;
 use super::network::{Consumers, Errors, Nmt};
 use super::pdo::{Pdos, Received};
-use super::plant::{Plant, PlantParameters};
+use super::plant::PlantParameters;
 use super::power::{Power, PowerState};
 use super::sdo_server::SdoServer;
 use crate::codec::canopen::{NmtCommand, decode_sync};
@@ -58,23 +60,6 @@ pub struct DriveParameters {
     pub step_ns: u64,
 }
 
-/// A fault inside a drive or its mechanics.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Disturbance {
-    /// The drive detects a fault with this EMCY code.
-    Fault(u16),
-    /// The joint is jammed, or free again.
-    Jammed(bool),
-    /// The encoder reads this much too far.
-    EncoderShift(f64),
-    /// The warning bit of the statusword.
-    Warning(bool),
-    /// Every SDO write is refused with this abort code; 0 ends it.
-    RefuseWrites(u32),
-    /// The drive restarts, as after a dip of its supply: torque is gone meanwhile.
-    Restart,
-}
-
 /// A simulated drive.
 #[derive(Clone, Debug)]
 pub struct Drive {
@@ -87,11 +72,9 @@ pub struct Drive {
     pub(super) errors: Errors,
     pub(super) power: Power,
     pub(super) controller: Controller,
-    pub(super) plant: Plant,
+    pub(super) mechanics: Mechanics,
     /// Time of the newest call.
     pub(super) now: Nanos,
-    /// Time up to which the mechanics have been moved; `None` before the first call.
-    pub(super) moved: Option<Nanos>,
     /// When setpoints were last applied at a SYNC, while the watchdog is armed.
     pub(super) fed: Option<Nanos>,
     /// The watchdog holds the last setpoint.
@@ -106,7 +89,6 @@ pub struct Drive {
     pub(super) resting: Option<Nanos>,
     /// When the joint was last seen moving after that.
     pub(super) moving: Nanos,
-    pub(super) encoder_shift_rad: f64,
     pub(super) warning: bool,
     pub(super) refuse_writes: u32,
 }
@@ -132,9 +114,8 @@ impl Drive {
             errors: Errors::default(),
             power: Power::new(),
             controller: Controller::new(parameters.loops),
-            plant: Plant::new(parameters.plant, parameters.start_rad),
+            mechanics: Mechanics::new(parameters.plant, parameters.start_rad, parameters.step_ns),
             now: Nanos(0),
-            moved: None,
             fed: None,
             held: false,
             halted: false,
@@ -142,7 +123,6 @@ impl Drive {
             astray: None,
             resting: None,
             moving: Nanos(0),
-            encoder_shift_rad: 0.0,
             warning: false,
             refuse_writes: 0,
             parameters,
@@ -174,7 +154,7 @@ impl Drive {
 
     /// Takes a frame from the bus and pushes the answers. Frames for others, and malformed ones, change nothing.
     pub fn receive(&mut self, now: Nanos, frame: &CanFrame, out: &mut Vec<CanFrame>) {
-        if now > self.now || self.moved.is_none() {
+        if now > self.now || self.mechanics.moved.is_none() {
             self.advance(now, out);
         }
         if self.nmt.state() == NmtState::BootUp || frame.is_fd() {
@@ -200,8 +180,8 @@ impl Drive {
     pub fn disturb(&mut self, disturbance: Disturbance, out: &mut Vec<CanFrame>) {
         match disturbance {
             Disturbance::Fault(code) => self.fail(code, out),
-            Disturbance::Jammed(jammed) => self.plant.jammed = jammed,
-            Disturbance::EncoderShift(shift_rad) => self.encoder_shift_rad = shift_rad,
+            Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warning) => self.warning = warning,
             Disturbance::RefuseWrites(code) => self.refuse_writes = code,
             Disturbance::Restart => self.restart(false),
@@ -229,13 +209,13 @@ impl Drive {
     /// True angle of the link, which no encoder fault can bend.
     #[must_use]
     pub fn position_rad(&self) -> f64 {
-        self.plant.position_rad
+        self.mechanics.plant.position_rad
     }
 
     /// True angular velocity of the link.
     #[must_use]
     pub fn velocity_rad_s(&self) -> f64 {
-        self.plant.velocity_rad_s
+        self.mechanics.plant.velocity_rad_s
     }
 
     /// Angle that the drive is steering to now, between two setpoints.

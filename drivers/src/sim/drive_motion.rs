@@ -13,32 +13,23 @@ const STANDSTILL_RAD_S: f64 = 0.01;
 const SLOW_S: f64 = 0.01;
 /// How long a joint may creep after its reference rests: a jammed or overloaded one must not keep a fault waiting.
 const STANDSTILL_S: f64 = 0.5;
-/// Time that is simulated after a pause of the process; what is longer is skipped.
-const CATCH_UP_NS: u64 = 1_000_000_000;
 /// Controlword bit 8.
 const HALT: i64 = 0x100;
 
 impl Drive {
     /// Moves the mechanics up to the last whole step before `now`.
     pub(super) fn move_on(&mut self, now: Nanos) {
-        let step_ns = self.parameters.step_ns;
-        #[expect(clippy::cast_precision_loss, reason = "at most a million")]
-        let dt_s = step_ns as f64 * 1e-9;
-        let mut at = self.moved.unwrap_or(now).0.max(now.0.saturating_sub(CATCH_UP_NS));
-        while at + step_ns <= now.0 {
-            at += step_ns;
-            let measured = (self.measured_rad(0.0), self.plant.velocity_rad_s);
-            let torque_nm = self.controller.step(Nanos(at), dt_s, measured, &self.parameters.plant);
-            self.plant.step(torque_nm, dt_s);
+        let dt_s = self.mechanics.step_s();
+        for at in self.mechanics.due(now) {
+            let measured = (self.measured_rad(0.0), self.mechanics.plant.velocity_rad_s);
+            let torque_nm = self.controller.step(at, dt_s, measured, &self.parameters.plant);
+            self.mechanics.plant.step(torque_nm, dt_s);
         }
-        self.moved = Some(Nanos(at));
     }
 
     /// The encoder, which sees whole counts, `ahead_s` after the last whole step.
     pub(super) fn counts(&self, ahead_s: f64) -> i32 {
-        let angle_rad =
-            self.plant.position_rad + ahead_s * self.plant.velocity_rad_s + self.encoder_shift_rad;
-        counts(self, angle_rad)
+        counts(self, self.mechanics.read_rad(ahead_s))
     }
 
     /// Link angle as the encoder says.
@@ -97,7 +88,7 @@ impl Drive {
     pub(super) fn follows_target(&self) -> bool {
         self.power.state() == PowerState::OperationEnabled
             && self.controller.is_following()
-            && self.plant.is_free()
+            && self.mechanics.plant.is_free()
             && !self.held
             && self.dictionary.get(0x6060, 0) == i64::from(MODE_CSP)
     }
@@ -125,23 +116,23 @@ impl Drive {
         match action {
             Action::Continue => {}
             Action::Energise => {
-                self.plant.energise(true);
+                self.mechanics.plant.energise(true);
                 self.controller.energise(self.measured_rad(0.0));
                 self.astray = None;
                 self.halted = false;
             }
             Action::Follow => {
-                self.plant.energise(true); // A brake that was closing opens again.
+                self.mechanics.plant.energise(true); // A brake that was closing opens again.
                 self.controller.follow();
             }
             Action::SlowDown(slowing) => {
-                let measured = (self.measured_rad(0.0), self.plant.velocity_rad_s);
+                let measured = (self.measured_rad(0.0), self.mechanics.plant.velocity_rad_s);
                 self.controller.slow_down(self.deceleration_rad_s2(slowing), measured);
                 self.resting = None;
             }
             Action::Release => {
                 self.controller.release();
-                self.plant.energise(false);
+                self.mechanics.plant.energise(false);
                 self.halted = false;
                 self.resting = None;
             }
@@ -172,15 +163,15 @@ impl Drive {
     /// Ends a ramp once the joint rests. A drive that is about to lose its torque closes the brake first.
     fn settle(&mut self, now: Nanos) {
         let resting = *self.resting.get_or_insert(now);
-        if self.plant.velocity_rad_s.abs() > STANDSTILL_RAD_S {
+        if self.mechanics.plant.velocity_rad_s.abs() > STANDSTILL_RAD_S {
             self.moving = now;
         }
         let rests = now.since_s(self.moving.max(resting)) > SLOW_S || now.since_s(resting) > STANDSTILL_S;
         if !rests {
             return;
         }
-        if self.power.ends_released() && self.parameters.plant.brake && self.plant.is_free() {
-            self.plant.shut_brake(true);
+        if self.power.ends_released() && self.parameters.plant.brake && self.mechanics.plant.is_free() {
+            self.mechanics.plant.shut_brake(true);
             return;
         }
         let action = self.power.standstill();

@@ -92,10 +92,10 @@ impl Drive {
 
     /// Writes the live values into the dictionary, as they are now.
     pub(super) fn publish(&mut self) {
-        let ahead_s = self.moved.map_or(0.0, |moved| self.now.since_s(moved));
+        let ahead_s = self.mechanics.ahead_s(self.now);
         let per_rad = self.parameters.counts_per_rad();
         let torque = 1000.0 * self.controller.torque_nm() / self.parameters.plant.torque_nm_max;
-        let velocity = register(self.plant.velocity_rad_s * per_rad, i32::MIN, i32::MAX);
+        let velocity = register(self.mechanics.plant.velocity_rad_s * per_rad, i32::MIN, i32::MAX);
         let demand = counts(self, self.controller.reference_rad());
         for (index, value) in [
             (0x1001, i64::from(self.errors.register())),

@@ -1,17 +1,22 @@
-//! Simulated servos: CiA 402 drives with an object dictionary, a motor and gravity, behind a real link.
+//! Simulated servos, with a motor and gravity, behind a real link: CiA 402 drives with an object dictionary, and Damiao
+//! motors with their registers.
 //!
-//! [`Drive`] is one drive, [`Rig`] the drives of an arm with faults on request, [`serve`] runs a rig on links. All but
-//! the last are pure: frames and time in, frames out.
+//! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`Rig`] the servos of an arm with faults on request, [`serve`] runs
+//! a rig on links. All but the last are pure: frames and time in, frames out.
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; links have no bit
 //! rate; of the modes of operation there is only cyclic synchronous position.
 pub mod arguments;
 mod controller;
 mod dictionary;
+mod disturbance;
 mod drive;
 mod drive_motion;
 mod drive_objects;
 pub mod faults;
+mod mechanics;
+mod motor;
+mod motor_registers;
 mod network;
 mod objects;
 mod pdo;
@@ -21,11 +26,15 @@ pub mod priority;
 pub mod rig;
 mod sdo_server;
 pub mod serve;
+mod servo;
 pub mod settings;
 
 pub use controller::LoopParameters;
-pub use drive::{Disturbance, Drive, DriveParameters};
+pub use disturbance::Disturbance;
+pub use drive::{Drive, DriveParameters};
 pub use faults::{FaultOrder, Order};
+pub use motor::{Motor, MotorParameters};
 pub use plant::PlantParameters;
 pub use power::PowerState;
 pub use rig::Rig;
+pub use servo::{ServoParameters, SimulatedServo};

@@ -1,9 +1,9 @@
 //! The simulated drives of an arm on their buses, with the faults that were asked for.
 //!
 //! Pure as the drives are: frames, orders and time in, frames out. Chance comes from a seed.
-use super::drive::{Disturbance, Drive};
+use super::disturbance::Disturbance;
 use super::faults::{After, FaultKind, FaultOrder};
-use super::power::PowerState;
+use super::servo::SimulatedServo;
 use super::settings::DriveSetup;
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
@@ -19,7 +19,7 @@ const HELD_MAX: usize = 4096;
 struct Unit {
     joint: String,
     bus: usize,
-    drive: Drive,
+    drive: SimulatedServo,
     enabled: Option<Nanos>,
     moving: Option<Nanos>,
     silent: bool,
@@ -65,7 +65,7 @@ impl Rig {
         let units = setups.into_iter().map(|setup| Unit {
             joint: setup.joint,
             bus: setup.bus,
-            drive: Drive::new(setup.parameters),
+            drive: SimulatedServo::new(setup.parameters),
             enabled: None,
             moving: None,
             silent: false,
@@ -90,7 +90,7 @@ impl Rig {
 
     /// The drive of a joint.
     #[must_use]
-    pub fn drive(&self, joint: usize) -> Option<&Drive> {
+    pub fn drive(&self, joint: usize) -> Option<&SimulatedServo> {
         self.units.get(joint).map(|unit| &unit.drive)
     }
 
@@ -153,7 +153,7 @@ impl Rig {
         now: Nanos,
         at: usize,
         out: &mut [Vec<CanFrame>],
-        call: impl FnOnce(&mut Drive, &mut Vec<CanFrame>),
+        call: impl FnOnce(&mut SimulatedServo, &mut Vec<CanFrame>),
     ) {
         let mut frames = std::mem::take(&mut self.scratch);
         frames.clear();
@@ -203,7 +203,7 @@ impl Rig {
     /// Notes when joints were enabled, and when they began to move.
     fn note_motion(&mut self, now: Nanos) {
         for unit in &mut self.units {
-            let enabled = unit.drive.power_state() == PowerState::OperationEnabled;
+            let enabled = unit.drive.is_enabled();
             unit.enabled = if enabled { unit.enabled.or(Some(now)) } else { None };
             let moves = enabled && unit.drive.velocity_rad_s().abs() > MOVING_RAD_S;
             // Once it has begun to move it counts as moving until disabled: faults in the middle of a motion

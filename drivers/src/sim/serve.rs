@@ -224,12 +224,11 @@ impl Server {
                 for (joint, name) in self.joints.iter().enumerate() {
                     let Some(drive) = self.rig.drive(joint) else { continue };
                     let (position_rad, velocity_rad_s) = (drive.position_rad(), drive.velocity_rad_s());
-                    let (power, word) = (drive.power_state(), drive.statusword());
                     say(&format!(
                         "status joint={name} node={} position_rad={position_rad} \
-                         velocity_rad_s={velocity_rad_s} power={power:?} network={:?} statusword=0x{word:04X}",
+                         velocity_rad_s={velocity_rad_s} {}",
                         drive.node_id(),
-                        drive.network_state(),
+                        drive.describe(),
                     ));
                 }
                 say("ok: status");

@@ -4,21 +4,26 @@
 //! a joint, base to tip. Every fault of the section is reported at once.
 use super::controller::LoopParameters;
 use super::drive::DriveParameters;
+use super::motor::MotorParameters;
 use super::plant::PlantParameters;
+use super::servo::ServoParameters;
+use crate::codec::damiao::wire_of;
+use crate::codec::damiao_frames::Wire;
 use std::cell::RefCell;
 use std::path::Path;
-use taustream_arm::{Cia402, Fault, Faults, Servo, Settings};
+use taustream_arm::{Cia402, Damiao, Fault, Faults, Protocol, Servo, Settings};
+use taustream_motion::JointLimits;
 use toml::{Table, Value};
 
-/// One drive and the joint that it moves.
+/// One servo and the joint that it moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveSetup {
     /// The joint's name.
     pub joint: String,
     /// Index of its bus in [`Settings::buses`].
     pub bus: usize,
-    /// The drive.
-    pub parameters: DriveParameters,
+    /// The servo.
+    pub parameters: ServoParameters,
 }
 
 /// Drives of all joints, base to tip, as the settings describe them. `start_rad` replaces the section's key.
@@ -31,7 +36,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let joints = settings.robot.joints.len();
     let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
     let mut setups: Vec<DriveSetup> =
-        settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
+        settings.servos.iter().map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
     section.unknown_keys();
     let faults = section.faults.into_inner();
@@ -39,13 +44,13 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
         return Err(Faults(faults));
     }
     for (setup, start_rad) in setups.iter_mut().zip(start_rad.unwrap_or(&[])) {
-        setup.parameters.start_rad = *start_rad;
+        *setup.parameters.start_rad_mut() = *start_rad;
     }
     Ok(setups)
 }
 
 /// Every key, for unknown ones to be found, and for their neighbours to be told.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 29] = [
     "start_rad",
     "inertia_kg_m2",
     "viscous_nm_s_rad",
@@ -68,6 +73,13 @@ const KEYS: [&str; 22] = [
     "watchdog_ms",
     "boot_ms",
     "step_us",
+    "motor_position_range_rad",
+    "motor_velocity_range_rad_s",
+    "motor_torque_range_nm",
+    "motor_mode",
+    "motor_timeout_ms",
+    "mode_offset_ids",
+    "continuous_feedback_ms",
 ];
 
 /// The section while it is being read.
@@ -79,53 +91,106 @@ struct Section<'a> {
 }
 
 impl Section<'_> {
-    fn setup(&self, settings: &Settings, servo: &Servo) -> Option<DriveSetup> {
+    fn setup(&self, settings: &Settings, servo: &Servo) -> DriveSetup {
         let joint = settings.robot.joints.get(servo.joint);
         let limits = joint.map(|joint| joint.limits).unwrap_or_default();
         let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
         let at = servo.joint;
+        let plant = self.plant(at, servo, &limits);
+        let parameters = match servo.protocol {
+            Protocol::Cia402(cia402) => {
+                let watchdog_ms = settings.cycle.drive_watchdog_ms;
+                ServoParameters::Cia402(self.drive(servo, &cia402, (plant, &limits), watchdog_ms))
+            }
+            Protocol::Damiao(damiao) => {
+                let wire = settings.buses.get(servo.bus).map_or(Wire::Classic, |bus| wire_of(bus.kind));
+                ServoParameters::Damiao(self.motor(servo, &damiao, (plant, &limits), wire))
+            }
+        };
+        DriveSetup { joint: name, bus: servo.bus, parameters }
+    }
+
+    fn start_rad(&self, at: usize, limits: &JointLimits) -> f64 {
+        let [low_rad, high_rad] = limits.position_rad;
+        self.number("start_rad", at, 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad)
+    }
+
+    fn boot_s(&self, at: usize) -> f64 {
+        self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3
+    }
+
+    fn step_ns(&self, at: usize) -> u64 {
+        u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000
+    }
+
+    fn drive(
+        &self,
+        servo: &Servo,
+        cia402: &Cia402,
+        (plant, limits): (PlantParameters, &JointLimits),
+        watchdog_ms: u32,
+    ) -> DriveParameters {
+        let at = servo.joint;
         let [low_rad, high_rad] = limits.position_rad;
         let margin_rad = self.number("soft_limit_margin_rad", at, 0.02, 0.0..=3.0);
-        let plant = self.plant(at, servo, &limits);
-        let Some(Cia402 { gear_ratio, counts_per_rev }) = servo.protocol.as_cia402().copied() else {
-            let (protocol, at) = (servo.protocol.name(), servo.joint);
-            self.fault(&format!("servo[{at}].protocol"), protocol, "a protocol that is simulated: cia402");
-            return None;
-        };
-        let parameters = DriveParameters {
+        let (slow_rad_s2, quick_rad_s2) =
+            (limits.motion.acceleration_rad_s2.max(1e-3), limits.stop.acceleration_rad_s2.max(1e-3));
+        DriveParameters {
             node_id: servo.node_id,
             sign: servo.sign,
-            gear_ratio,
-            counts_per_rev,
+            gear_ratio: cia402.gear_ratio,
+            counts_per_rev: cia402.counts_per_rev,
             zero_offset_rad: servo.zero_offset_rad,
-            start_rad: self.number("start_rad", at, 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad),
+            start_rad: self.start_rad(at, limits),
             plant,
             loops: self.loops(at),
             following_window_rad: self.number("following_window_rad", at, 0.3, 1e-6..=100.0),
             following_timeout_ms: self.whole("following_timeout_ms", at, 50, 0..=65_535),
             soft_limit_rad: [low_rad - margin_rad, high_rad + margin_rad],
-            slow_rad_s2: self.number(
-                "slow_rad_s2",
-                at,
-                limits.motion.acceleration_rad_s2.max(1e-3),
-                1e-3..=1e4,
-            ),
-            quick_rad_s2: self.number(
-                "quick_stop_rad_s2",
-                at,
-                limits.stop.acceleration_rad_s2.max(1e-3),
-                1e-3..=1e4,
-            ),
-            watchdog_ms: self.whole("watchdog_ms", at, settings.cycle.drive_watchdog_ms, 0..=65_535),
+            slow_rad_s2: self.number("slow_rad_s2", at, slow_rad_s2, 1e-3..=1e4),
+            quick_rad_s2: self.number("quick_stop_rad_s2", at, quick_rad_s2, 1e-3..=1e4),
+            watchdog_ms: self.whole("watchdog_ms", at, watchdog_ms, 0..=65_535),
             reaction: servo.reaction,
-            boot_s: self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3,
-            step_ns: u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000,
-        };
-        Some(DriveSetup { joint: name, bus: servo.bus, parameters })
+            boot_s: self.boot_s(at),
+            step_ns: self.step_ns(at),
+        }
+    }
+
+    /// A motor as it is sold: its flash holds the ranges that the settings state, MIT mode, and no watchdog.
+    fn motor(
+        &self,
+        servo: &Servo,
+        damiao: &Damiao,
+        (plant, limits): (PlantParameters, &JointLimits),
+        wire: Wire,
+    ) -> MotorParameters {
+        let at = servo.joint;
+        let reach = |key, stated| self.number(key, at, stated, 1e-3..=1e6);
+        MotorParameters {
+            node_id: servo.node_id,
+            feedback_id: damiao.feedback_id,
+            wire,
+            sign: servo.sign,
+            zero_offset_rad: servo.zero_offset_rad,
+            start_rad: self.start_rad(at, limits),
+            plant,
+            loops: self.loops(at),
+            ranges: [
+                reach("motor_position_range_rad", damiao.position_range_rad),
+                reach("motor_velocity_range_rad_s", damiao.velocity_range_rad_s),
+                reach("motor_torque_range_nm", damiao.torque_range_nm),
+            ],
+            mode: self.whole("motor_mode", at, 1, 1..=4),
+            timeout_ms: self.whole("motor_timeout_ms", at, 0, 0..=65_535),
+            mode_offset_ids: self.flag("mode_offset_ids", at, false),
+            continuous_ms: self.whole("continuous_feedback_ms", at, 0, 0..=10_000),
+            boot_s: self.boot_s(at),
+            step_ns: self.step_ns(at),
+        }
     }
 
     /// Mechanics; torque and speed that the motor has by default suffice for the joint's stop limits.
-    fn plant(&self, at: usize, servo: &Servo, limits: &taustream_motion::JointLimits) -> PlantParameters {
+    fn plant(&self, at: usize, servo: &Servo, limits: &JointLimits) -> PlantParameters {
         let inertia_kg_m2 = self.number("inertia_kg_m2", at, 1.0, 1e-4..=1e4);
         let viscous_nm_s_rad = self.number("viscous_nm_s_rad", at, 1.0, 0.0..=1e4);
         let coulomb_nm = self.number("coulomb_nm", at, 1.0, 0.0..=1e4);
