@@ -101,8 +101,6 @@ impl Motor {
     /// A motor of which nothing is known. Energised only when its command is within `near_rad` of where it stands.
     #[must_use]
     pub const fn new(plan: MotorPlan, patience: Patience, near_rad: f64) -> Self {
-        let nothing =
-            Feedback { status: STATUS_DISABLED, state: [0; 5], stage_celsius: 0, winding_celsius: 0 };
         Self {
             plan,
             patience,
@@ -275,12 +273,11 @@ impl Motor {
                 self.trouble = None;
                 return self.at_job(cycle.now, 0);
             }
-            Some(_) => {}
             None if self.asked.is_some() && age(cycle.now, self.asked_at) >= LOOK_AGAIN.0 => {
                 self.heard = false;
                 self.trouble.get_or_insert(DamiaoTrouble::NoAnswer);
             }
-            None => {}
+            Some(_) | None => {}
         }
         self.look(cycle.now)
     }
@@ -446,10 +443,8 @@ impl Motor {
             // A silent motor may still listen: it gets its commands until the wish is disabled.
             self.trouble.get_or_insert(DamiaoTrouble::Silent);
         }
-        let share = match self.stage {
-            Stage::Ramp { since } => ratio(age(now, since), self.plan.ramp_ns()),
-            _ => 1.0,
-        };
+        let ramped = |since| ratio(age(now, since), self.plan.ramp_ns());
+        let share = if let Stage::Ramp { since } = self.stage { ramped(since) } else { 1.0 };
         if share >= 1.0 {
             self.stage = Stage::On;
         }

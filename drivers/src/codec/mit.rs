@@ -19,8 +19,8 @@ impl Span {
     /// From `low` to `high` in `bits` bits, 1 to 16.
     #[must_use]
     pub const fn new(low: f64, high: f64, bits: u32) -> Self {
-        let bits = if bits < 16 { bits } else { 16 };
-        Self { low, high, top: ((1_u32 << bits) - 1) as u16 }
+        let unused = 16_u32.saturating_sub(bits);
+        Self { low, high, top: u16::MAX >> unused }
     }
     /// From minus to plus `reach`.
     #[must_use]

@@ -103,6 +103,15 @@ impl SimulatedServo {
         }
     }
 
+    /// The drive, if it is a CiA 402 drive.
+    #[must_use]
+    pub fn as_cia402(&self) -> Option<&Drive> {
+        match self {
+            Self::Cia402(drive) => Some(drive),
+            Self::Damiao(_) => None,
+        }
+    }
+
     /// Node id.
     #[must_use]
     pub fn node_id(&self) -> u8 {

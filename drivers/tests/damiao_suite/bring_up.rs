@@ -49,8 +49,7 @@ fn bring_up_looks_first_and_writes_only_the_watchdog_of_a_motor_in_the_right_mod
 fn mode_of_the_motor_is_written_read_back_and_survives_no_power_cycle() {
     let mut arm = Arm::with(pos_vel(), |_| {});
     let seen = requests(&mut arm, 600);
-    let write =
-        seen.iter().position(|r| *r == Request::Write(10, 2_u32.to_le_bytes())).expect("the mode is written");
+    let write = seen.iter().position(|r| *r == Request::Write(10, 2_u32.to_le_bytes())).unwrap();
     assert_eq!(seen[write - 1], Request::Read(10));
     assert_eq!(seen[write + 1], Request::Read(10), "and read back");
     assert!(!seen.contains(&Request::Store), "the flash is the owner's");

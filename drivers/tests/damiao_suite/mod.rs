@@ -1,6 +1,7 @@
 //! A bench of a bus in memory: the drivers of its settings against its simulated servos, in cycles of 1 ms.
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
+use taustream_drivers::drivers::BusDriver;
 use taustream_drivers::sim::settings::{DriveSetup, drives};
 use taustream_drivers::sim::{FaultOrder, Rig, ServoParameters, SimulatedServo};
 use taustream_drivers::{
@@ -18,7 +19,7 @@ pub(crate) const JOINTS: usize = 6;
 pub(crate) const START_RAD: [f64; JOINTS] = [0.1, -1.2, 1.0, -0.5, 0.3, -0.2];
 
 pub(crate) struct Arm {
-    pub(crate) drivers: Vec<Box<dyn ServoDriver>>,
+    pub(crate) driver: BusDriver,
     pub(crate) rig: Rig,
     pub(crate) settings: Settings,
     pub(crate) now: Nanos,
@@ -64,7 +65,7 @@ impl Arm {
         let mut setups = drives(&settings, Some(&START_RAD)).unwrap();
         setups.iter_mut().for_each(change);
         Self {
-            drivers: drivers::of_bus(&settings, 0).unwrap(),
+            driver: drivers::of_bus(&settings, 0).unwrap(),
             rig: Rig::new(setups, 1, 1),
             settings,
             now: Nanos(1_000_000_000),
@@ -82,14 +83,10 @@ impl Arm {
 
     pub(crate) fn step(&mut self) {
         let mut batch = FrameBatch::new();
-        for driver in &mut self.drivers {
-            driver.encode(self.now, self.wish, &self.commands, &mut batch);
-        }
+        self.driver.encode(self.now, self.wish, &self.commands, &mut batch);
         self.sent = batch.frames().to_vec();
         for frame in self.arriving.drain(..) {
-            for driver in &mut self.drivers {
-                driver.decode(self.now, &frame);
-            }
+            self.driver.decode(self.now, &frame);
         }
         let mut out = [Vec::new()];
         self.rig.advance(self.now, &mut out);
@@ -105,8 +102,7 @@ impl Arm {
     }
 
     pub(crate) fn status(&self, joint: usize) -> ServoStatus {
-        let driver = self.drivers.iter().find(|driver| driver.joints().contains(&joint));
-        driver.map_or(ServoStatus::UNKNOWN, |driver| driver.status(joint))
+        self.driver.status(joint)
     }
 
     pub(crate) fn states(&self) -> Vec<DriveState> {
@@ -166,7 +162,7 @@ impl Arm {
     }
 
     pub(crate) fn clear_faults(&mut self) {
-        self.drivers.iter_mut().for_each(|driver| driver.clear_faults());
+        self.driver.clear_faults();
     }
 
     /// Orders a fault of a joint from now on.

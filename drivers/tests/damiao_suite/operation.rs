@@ -2,7 +2,7 @@
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
 use taustream_drivers::codec::damiao_frames::{Request, Special};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
-use taustream_drivers::{DriveState, DriveWish, JointCommand, ZeroRefused};
+use taustream_drivers::{DriveState, DriveWish, JointCommand, ServoDriver, ZeroRefused};
 
 /// What a motor of the arm is commanded in the newest cycle, decoded with its ranges.
 fn mit(arm: &Arm, joint: usize) -> Option<MitCommand> {
@@ -238,15 +238,15 @@ fn motors_let_go_when_commands_stop_and_fall_without_a_brake() {
 #[test]
 fn zero_is_set_only_when_the_motor_rests_configured_and_off() {
     let mut arm = Arm::enabled(edited(&[]));
-    assert_eq!(arm.drivers[0].set_zero(2), Err(ZeroRefused::NotReady));
-    assert_eq!(arm.drivers[0].set_zero(7), Err(ZeroRefused::NoSuchJoint));
+    assert_eq!(arm.driver.set_zero(2), Err(ZeroRefused::NotReady));
+    assert_eq!(arm.driver.set_zero(7), Err(ZeroRefused::NoSuchJoint));
     arm.wish = DriveWish::Disabled;
     arm.step();
     arm.until(DriveState::Disabled);
     // Until the brake has closed the joint sinks.
     arm.steps(100);
     let true_rad = arm.servo(2).position_rad();
-    assert_eq!(arm.drivers[0].set_zero(2), Ok(()));
+    assert_eq!(arm.driver.set_zero(2), Ok(()));
     arm.step();
     assert_eq!(arm.under(3), [vec![0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE]]);
     arm.steps(3);

@@ -219,6 +219,6 @@ fn master_that_vanishes_leaves_the_arm_stopped_and_held() {
     for joint in 0..6 {
         let drive = arm.rig.drive(joint).unwrap();
         assert!((drive.position_rad() - rest_rad[joint]).abs() < 1e-9, "joint {joint} still moves");
-        assert_eq!(drive.statusword() & 0x4F, 0x08, "joint {joint} is not in fault");
+        assert_eq!(drive.as_cia402().unwrap().statusword() & 0x4F, 0x08, "joint {joint} is not in fault");
     }
 }
