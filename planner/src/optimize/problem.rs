@@ -129,7 +129,7 @@ impl Refusal {
     }
 
     /// Refuses a number outside its range, NaN included.
-    pub(super) fn check_number(
+    pub(crate) fn check_number(
         method: &'static str,
         what: &'static str,
         value: f64,
@@ -143,7 +143,7 @@ impl Refusal {
     }
 
     /// Refuses a number that is not finite.
-    pub(super) fn check_finite(method: &'static str, what: &'static str, values: &[f64]) -> Result<(), Self> {
+    pub(crate) fn check_finite(method: &'static str, what: &'static str, values: &[f64]) -> Result<(), Self> {
         match values.iter().find(|v| !v.is_finite()) {
             Some(&value) => {
                 Err(Self::Parameter { method, what, value, expected: "a finite number is needed" })

@@ -4,6 +4,7 @@
 //! them. Nothing here moves an arm: motions for metal come from [`crate::plan()`].
 pub mod benchmarks;
 mod linear;
+pub mod planar;
 mod quadrature;
 pub mod reach;
 pub mod spline;
