@@ -14,7 +14,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
-use taustream_drivers::codec::cia402::Cia402Driver;
+use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_drivers::sim::{FaultOrder, Rig, settings::drives};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
@@ -84,14 +84,15 @@ struct Arm {
 }
 
 impl Arm {
-    fn new(name: &str) -> Self {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
+    /// An arm of shipped settings.
+    fn new(name: &str, settings: &str) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings").join(settings);
         let settings = Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"));
         let runtime = std::env::temp_dir().join(format!("taustream-{name}-{}", std::process::id()));
         let bus = &settings.buses[0];
         let far_end = link::open(bus, LinkChoice::Local, LinkRole::Servos, &runtime).unwrap();
         let near_end = link::open(bus, LinkChoice::Local, LinkRole::Master, &runtime).unwrap();
-        let driver = Cia402Driver::new(&settings, 0).unwrap();
+        let driver = drivers::of_bus(&settings, 0).unwrap();
         let (queues, desk) = intake::pair();
         let buses =
             Buses::new(vec![Bus::new(near_end, Box::new(driver), settings.supervision.lost_cycles_max)])
@@ -239,12 +240,11 @@ fn calls() -> u64 {
     CALLS.with(Cell::get)
 }
 
-#[test]
-fn cycle_over_sixty_thousand_runs_with_motions_stops_and_faults_never_allocates() {
-    let mut arm = Arm::new("no-alloc");
+/// Motions, stops and faults for so many cycles, each of them counted.
+fn never_allocates(mut arm: Arm, cycles: u64) {
     arm.enable();
     let mut round = 0;
-    while arm.counted < 60_000 {
+    while arm.counted < cycles {
         arm.move_it(1.0);
         arm.run(400);
         arm.ask(Command::Pause);
@@ -278,6 +278,16 @@ fn cycle_over_sixty_thousand_runs_with_motions_stops_and_faults_never_allocates(
     assert!(round >= 4, "only {round} rounds");
 }
 
+#[test]
+fn cycle_over_sixty_thousand_runs_with_motions_stops_and_faults_never_allocates() {
+    never_allocates(Arm::new("no-alloc", "vcan6.toml"), 60_000);
+}
+
+#[test]
+fn cycle_with_damiao_motors_never_allocates() {
+    never_allocates(Arm::new("no-alloc-damiao", "damiao6.toml"), 40_000);
+}
+
 /// Allocates once, in a stage of the shipped cycle.
 struct Planted;
 
@@ -291,7 +301,7 @@ impl Probe for Planted {
 
 #[test]
 fn planted_allocation_in_the_cycle_is_counted() {
-    let mut arm = Arm::new("planted");
+    let mut arm = Arm::new("planted", "vcan6.toml");
     arm.run(10);
     assert_eq!(calls(), 0);
     arm.step(&mut Planted);
