@@ -17,6 +17,30 @@ fn arrived(scene: &str, rule: Rule) -> Vec<Journey> {
     journeys.filter(|j| j.arrived.iter().all(|a| *a)).collect()
 }
 
+/// Goal: the method is the paper's, step by step: candidates, cost, trap, retreat, virtual obstacle.
+/// Method: the same robot before the same U with the same random numbers, in plain Python (`oracles/paper_002.py`).
+#[test]
+fn planar_robust_bacteria_walk_as_the_program_written_from_the_paper() {
+    let numbers =
+        |line: &str| -> Vec<f64> { line.split(' ').map(|word| word.parse().expect("a number")).collect() };
+    let lines: Vec<Vec<f64>> = include_str!("oracles/planar_walk.txt").lines().map(numbers).collect();
+    let walls = Obstacle::walls(&[[-15.0, -20.0], [-15.0, 0.0], [15.0, 0.0], [15.0, -20.0]]);
+    let scene = Scene { name: "oracle", robots: vec![[[3.0, -60.0], [0.0, 60.0]]], obstacles: vec![walls] };
+    let how = Drive { rule: Rule::RobustBacteria, numbers: Numbers::OURS, shared: true, seed: 1 };
+    let journey = drive(&scene, &how).expect("sane");
+    let path = &journey.paths_cm[0];
+    let counts = [path.len() as f64, journey.virtuals.len() as f64];
+    assert!((0..2).all(|i| (counts[i] - lines[0][i]).abs() < 0.5), "{counts:?}, Python has {:?}", lines[0]);
+    let places = path.iter().step_by(20).copied().chain(journey.virtuals.iter().map(|v| v.centre_cm));
+    assert_eq!(places.clone().count(), lines.len() - 1);
+    for (i, (ours, theirs)) in places.zip(&lines[1..]).enumerate() {
+        assert!(
+            distance_cm(ours, [theirs[0], theirs[1]]) < 1e-6,
+            "place {i}: {ours:?}, Python has {theirs:?}"
+        );
+    }
+}
+
 #[test]
 fn planar_force_is_the_downward_slope_of_the_potential() {
     let numbers = Numbers::OURS;

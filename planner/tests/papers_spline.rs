@@ -91,6 +91,20 @@ fn spline_refuses_what_does_not_fit_and_names_it() {
 }
 
 #[test]
+fn spline_time_refuses_limits_that_are_none() {
+    for (limits, text) in [
+        (vec![], "joint 0 (from 0 of 1) has the limit NaN"),
+        (vec![[1.0; 3]; 2], "joint 1 (from 0 of 1) has the limit NaN"),
+        (vec![[1.0, f64::NAN, 1.0]], "joint 0 (from 0 of 1) has the limit NaN"),
+        (vec![[1.0, 1.0, 0.0]], "has the limit 0;"),
+    ] {
+        let refusal = SplineTime::new(&points(1), &limits, [0.1, 3.0], Reading::Corrected).expect_err(text);
+        assert!(refusal.to_string().contains(text), "{refusal}");
+    }
+    assert!(SplineTime::new(&points(1), &[[1.0; 3]], [f64::NAN, 3.0], Reading::Corrected).is_err());
+}
+
+#[test]
 fn spline_time_adds_up_as_printed_and_as_corrected() {
     let wide = [[1e9; 3]];
     let printed = SplineTime::new(&points(1), &wide, [0.1, 3.0], Reading::Printed).expect("a problem");

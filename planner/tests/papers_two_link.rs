@@ -176,6 +176,20 @@ fn two_link_cubics_pass_their_points_with_continuous_speed_and_stop_at_the_goal_
     assert_eq!(Cubics { pieces: vec![], piece_s: 1.0 }.at(0.0), None);
 }
 
+#[test]
+fn two_link_cubics_refuse_times_and_points_that_are_none() {
+    let iwo = Iwo::PAPER_004;
+    for piece_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let search = CubicSearch { piece_s, ..search(TwoLink::PAPER_004, &iwo, Reading::Corrected) };
+        let refusal = search.through(&[[0.0; 2], [1.0; 2]]).expect_err("no time").to_string();
+        assert!(refusal.contains("the time of a piece"), "{refusal}");
+    }
+    let sane = search(TwoLink::PAPER_004, &iwo, Reading::Corrected);
+    let refusal = sane.through(&[[0.0; 2], [1.0, f64::NAN]]).expect_err("no point").to_string();
+    assert!(refusal.contains("a via point is NaN"), "{refusal}");
+    assert!(sane.through(&[]).is_ok_and(|c| c.pieces.is_empty()));
+}
+
 /// Goal: the paper's method finds the same least energy as another one.
 #[test]
 fn two_link_piece_of_least_energy_is_the_same_for_weeds_and_for_differences() {

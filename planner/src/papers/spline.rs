@@ -52,6 +52,18 @@ pub enum SplineError {
         /// How many the first one has.
         expected: usize,
     },
+    /// A joint's limits.
+    #[error(
+        "joint {joint} (from 0 of {joints}) has the limit {value}; every joint needs three numbers above 0"
+    )]
+    Limit {
+        /// Which joint.
+        joint: usize,
+        /// Of how many.
+        joints: usize,
+        /// The number; NaN for one that is missing or too many.
+        value: f64,
+    },
     /// The intervals differ so much that the equations have no solution in numbers of this precision.
     #[error(
         "the intervals differ too much: the shortest of {shortest_s} s is nothing beside the whole {total_s} s"

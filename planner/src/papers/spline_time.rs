@@ -52,13 +52,24 @@ impl SplineTime {
     /// and jerk are compared with is the curve whose pieces all last the mean of the two.
     ///
     /// # Errors
-    /// When there is no spline through the points.
+    /// When there is no spline through the points, or a joint's limits are missing or make no sense.
     pub fn new(
         points_rad: &[Vec<f64>],
         limits: &[JointLimit],
         bounds_s: [f64; 2],
         reading: Reading,
     ) -> Result<Self, SplineError> {
+        let joints = points_rad.first().map_or(0, Vec::len);
+        if limits.len() != joints {
+            return Err(SplineError::Limit { joint: limits.len().min(joints), joints, value: f64::NAN });
+        }
+        // NaN would never be broken.
+        let bad = |(joint, limit): (usize, &JointLimit)| {
+            limit.iter().find(|l| !(**l > 0.0)).map(|&value| SplineError::Limit { joint, joints, value })
+        };
+        if let Some(refusal) = limits.iter().enumerate().find_map(bad) {
+            return Err(refusal);
+        }
         let intervals = points_rad.len().saturating_sub(1);
         let middle_s = 0.5 * (bounds_s[0] + bounds_s[1]);
         let spline = Spline::through(points_rad, &vec![middle_s; intervals])?;

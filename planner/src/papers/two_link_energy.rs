@@ -118,6 +118,9 @@ impl CubicSearch<'_> {
     /// # Errors
     /// When the optimiser's numbers make no sense or the points are no numbers.
     pub fn through(&self, via_rad: &[[f64; 2]]) -> Result<Cubics, Refusal> {
+        let (who, above) = ("cubics", "a time above 0 is needed");
+        Refusal::check_number(who, "the time of a piece", self.piece_s, [1e-6, 1e6], above)?;
+        Refusal::check_finite(who, "a via point", via_rad.as_flattened())?;
         let mut pieces = Vec::new();
         let mut speed_rad_s = [0.0; 2];
         let last = via_rad.len().saturating_sub(2);
