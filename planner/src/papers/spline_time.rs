@@ -65,7 +65,11 @@ impl SplineTime {
         }
         // NaN would never be broken.
         let bad = |(joint, limit): (usize, &JointLimit)| {
-            limit.iter().find(|l| !(**l > 0.0)).map(|&value| SplineError::Limit { joint, joints, value })
+            limit.iter().find(|l| l.is_nan() || **l <= 0.0).map(|&value| SplineError::Limit {
+                joint,
+                joints,
+                value,
+            })
         };
         if let Some(refusal) = limits.iter().enumerate().find_map(bad) {
             return Err(refusal);
