@@ -7,7 +7,7 @@ use crate::identifiers::{self, Use};
 use crate::protocol;
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
-use crate::settings::{Bus, BusKind, Servo, Traffic};
+use crate::settings::{Bus, BusKind, FEEDBACK_EVERY_MAX, SETPOINT_EVERY_MAX, Servo, Traffic};
 use crate::trust;
 use std::collections::BTreeSet;
 
@@ -17,8 +17,6 @@ const INTERFACE_BYTES_MAX: usize = 15;
 const BITRATE_BIT_S: [i64; 2] = [10_000, 1_000_000];
 /// ISO 11898-2 specifies transceivers up to 5 Mbit/s, and 8 Mbit/s with signal improvement.
 const DATA_BITRATE_BIT_S_MAX: i64 = 8_000_000;
-/// Slower than a tenth of the cycle, supervision would look at one answer many times over.
-const EVERY: [i64; 2] = [1, 10];
 const ZERO_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const FEEDBACK_RAD: Bounds = Bounds::within(-1e6, 1e6, "rad");
 
@@ -103,10 +101,9 @@ fn read_bus_kind(table: &mut Table<'_>) -> Option<BusKind> {
 
 /// How often setpoints and answers come; without the keys, every cycle.
 fn read_traffic(table: &mut Table<'_>) -> Option<Traffic> {
-    let [low, high] = EVERY;
-    let setpoint_every = table.integer_or("setpoint_every", 1, low, high);
+    let setpoint_every = table.integer_or("setpoint_every", 1, 1, i64::from(SETPOINT_EVERY_MAX));
     let stagger = if table.has("stagger") { table.flag("stagger") } else { Some(false) };
-    let feedback_every = table.integer_or("feedback_every", 1, low, high);
+    let feedback_every = table.integer_or("feedback_every", 1, 1, i64::from(FEEDBACK_EVERY_MAX));
     let packed = if table.has("packed") { table.flag("packed") } else { Some(false) };
     if stagger == Some(true) && setpoint_every == Some(1) {
         let expected =

@@ -1,12 +1,18 @@
-//! How full a bus gets in the worst case.
+//! How full a bus gets in the worst case, and what would make it less full.
 //!
-//! Every frame is counted with the most stuff bits that it can have and with the pause behind it. Only what every cycle
-//! sends is counted: heartbeats and configuration need the room that is left.
-//!
-//! Source: Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN) schedulability analysis: refuted, revisited
-//! and revised", Real-Time Systems 35, 2007, equation 1 (11-bit identifiers).
+//! Every frame is counted with the most stuff bits that it can have and with the pause behind it: what each cycle sends,
+//! and what comes beside it (heartbeats, repeated controlwords). Configuration and emergencies need the room that is
+//! left. `docs/bus-planning.md` explains the numbers to users.
+pub mod flow;
+pub mod frame;
+mod ways_out;
+
 use crate::protocol::Protocol;
-use crate::settings::{BusKind, Settings};
+use crate::settings::{Bus, BusKind, Settings};
+pub use flow::{CONTROL_REPEAT_TURNS, HEARTBEAT_MS};
+use flow::{Cia402Bus, Exchange, Flow};
+use frame::{BitRates, Format, Frame};
+pub use ways_out::WayOut;
 
 /// Above this, settings are refused: the cycle's frames do not fit into the cycle.
 pub const REFUSED_PERCENT: f64 = 100.0;
@@ -17,72 +23,105 @@ pub const WARNED_PERCENT: f64 = 80.0;
 const CIA402_PDO_BYTES: u32 = 6;
 /// Every command and every feedback.
 const DAMIAO_BYTES: u32 = 8;
+/// What a virtual bus is measured against, for people who plan a real one.
+const USUAL_BIT_S: u32 = 1_000_000;
 
 /// The load of one bus.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BusLoad {
     /// Servos on it.
     pub servos: usize,
-    /// Worst-case bits of one cycle: SYNC, and one setpoint and one answer a servo.
-    pub cycle_bits: u32,
-    /// Share of the bit rate in percent; none for a virtual bus, which has no bit rate.
-    pub percent: Option<f64>,
+    /// What goes over it.
+    pub flows: Vec<Flow>,
+    /// Its bit rates; those of a usual bus (1 Mbit/s) when it is virtual.
+    pub rates: BitRates,
+    /// It has no bit rate: the shares are those of a usual bus.
+    pub is_virtual: bool,
+    /// Share of the time in percent, over many cycles.
+    pub percent: f64,
+    /// The fullest single cycle, in percent of a cycle. Above 100 the rest of it waits for the next one.
+    pub fullest_cycle_percent: f64,
+}
+
+impl BusLoad {
+    fn of(bus: &Bus, settings: &Settings, servos: &[Protocol]) -> Self {
+        let period_s = f64::from(settings.cycle.period_us.max(1)) * 1e-6;
+        let flows = flows(bus, servos, 1.0 / period_s);
+        let nominal_bit_s = bus.kind.bitrate_bit_s().unwrap_or(USUAL_BIT_S);
+        let data_bit_s = bus.kind.data_bitrate_bit_s().unwrap_or(nominal_bit_s);
+        let rates = BitRates { nominal_bit_s, data_bit_s };
+        let burst_s: f64 = flows.iter().map(|flow| flow.burst_s(rates)).sum();
+        Self {
+            servos: servos.len(),
+            percent: flow::percent(&flows, rates),
+            fullest_cycle_percent: 100.0 * burst_s / period_s,
+            flows,
+            rates,
+            is_virtual: bus.kind == BusKind::Virtual,
+        }
+    }
+    /// More than the bus can carry.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        !self.is_virtual && self.percent > REFUSED_PERCENT
+    }
+    /// So much that configuration and repetitions have little room.
+    #[must_use]
+    pub fn is_warned(&self) -> bool {
+        !self.is_virtual && self.percent > WARNED_PERCENT
+    }
 }
 
 impl Settings {
-    /// The worst-case load of a bus by its index; nothing is on a bus that does not exist.
+    /// The worst-case load of a bus by its index; none of a bus that does not exist.
     #[must_use]
-    pub fn bus_load(&self, bus: usize) -> BusLoad {
-        let mine = self.servos.iter().filter(|servo| servo.bus == bus);
-        let bits = mine.clone().map(|servo| match servo.protocol {
-            Protocol::Cia402(_) => 2 * frame_bits(CIA402_PDO_BYTES),
-            Protocol::Damiao(_) => 2 * frame_bits(DAMIAO_BYTES),
-        });
-        let sync = mine.clone().any(|servo| servo.protocol.as_cia402().is_some());
-        let sync_bits = if sync { frame_bits(0) } else { 0 };
-        let cycle_bits = bits.fold(sync_bits, u32::saturating_add);
-        let servos = mine.count();
-        let cycle_s = f64::from(self.cycle.period_us) * 1e-6;
-        let percent = match self.buses.get(bus).map(|bus| bus.kind) {
-            Some(BusKind::Classic { bitrate_bit_s } | BusKind::Fd { bitrate_bit_s, .. }) => {
-                Some(100.0 * f64::from(cycle_bits) / (f64::from(bitrate_bit_s) * cycle_s))
-            }
-            Some(BusKind::Virtual) | None => None,
+    pub fn bus_load(&self, bus: usize) -> Option<BusLoad> {
+        Some(BusLoad::of(self.buses.get(bus)?, self, &self.protocols_on(bus)))
+    }
+
+    /// What would make a bus less full, each with the load that it would give.
+    #[must_use]
+    pub fn ways_out(&self, bus: usize) -> Vec<WayOut> {
+        let found = self.buses.get(bus).map(|b| ways_out::of(b, self, &self.protocols_on(bus)));
+        found.unwrap_or_default()
+    }
+
+    fn protocols_on(&self, bus: usize) -> Vec<Protocol> {
+        self.servos.iter().filter(|servo| servo.bus == bus).map(|servo| servo.protocol).collect()
+    }
+}
+
+/// What the servos of a bus and their master send.
+fn flows(bus: &Bus, servos: &[Protocol], cycle_hz: f64) -> Vec<Flow> {
+    let count = |wanted: fn(&Protocol) -> bool| {
+        u32::try_from(servos.iter().filter(|protocol| wanted(protocol)).count()).unwrap_or(u32::MAX)
+    };
+    let drives = count(|protocol| matches!(protocol, Protocol::Cia402(_)));
+    let motors = count(|protocol| matches!(protocol, Protocol::Damiao(_)));
+    let mut flows = Vec::new();
+    if drives > 0 {
+        let cia402 = cia402_bus(bus, drives, cycle_hz);
+        flows.extend(cia402.process_data());
+        flows.extend(cia402.service());
+    }
+    if motors > 0 {
+        let format = match bus.kind {
+            BusKind::Virtual | BusKind::Classic { .. } => Format::Classic,
+            BusKind::Fd { .. } => Format::Fd,
         };
-        BusLoad { servos, cycle_bits, percent }
+        let frame = Frame::standard(format, DAMIAO_BYTES);
+        flows.extend(Exchange { servos: motors, cycle_hz, command: frame, answer: Some(frame) }.flows());
     }
+    flows
 }
 
-/// Most bits of a classic frame with an 11-bit identifier and `bytes` bytes, pause included.
-fn frame_bits(bytes: u32) -> u32 {
-    47 + 8 * bytes + (34 + 8 * bytes - 1) / 4
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    #[test]
-    fn frame_bits_agree_with_the_printed_table() {
-        for (bytes, bits) in [(0, 55), (2, 75), (4, 95), (6, 115), (8, 135)] {
-            assert_eq!(frame_bits(bytes), bits, "{bytes} bytes");
-        }
-    }
-
-    #[test]
-    fn six_servos_at_1_khz_are_refused_on_one_classic_bus_and_taken_at_500_hz() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
-        let text = std::fs::read_to_string(&file).unwrap();
-        let real = text.replace("virtual = true", "bitrate_bit_s = 1000000");
-        assert_ne!(real, text);
-        let faults = Settings::from_toml(&file, &real).unwrap_err().to_string();
-        assert!(faults.contains("bus[0] = 144 % full in the worst case (1435 bits a cycle)"), "{faults}");
-        let slower =
-            Settings::from_toml(&file, &real.replace("period_us = 1000", "period_us = 2000")).unwrap();
-        let load = slower.bus_load(0);
-        assert_eq!((load.servos, load.cycle_bits), (6, 1435));
-        assert!(load.percent.is_some_and(|percent| (percent - 71.75).abs() < 1e-9), "{load:?}");
-        assert_eq!(slower.bus_load(7), BusLoad { servos: 0, cycle_bits: 0, percent: None });
+fn cia402_bus(bus: &Bus, drives: u32, cycle_hz: f64) -> Cia402Bus {
+    Cia402Bus {
+        drives,
+        cycle_hz,
+        traffic: bus.traffic,
+        setpoint_bytes: CIA402_PDO_BYTES,
+        answer_bytes: CIA402_PDO_BYTES,
+        format: Format::Classic,
     }
 }

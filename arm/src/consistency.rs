@@ -1,7 +1,7 @@
 //! Settings that only make sense together.
 //!
 //! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
-use crate::bus_load::REFUSED_PERCENT;
+use crate::bus_load::{BusLoad, REFUSED_PERCENT};
 use crate::protocol::DamiaoMode;
 use crate::reader::Book;
 use crate::settings::{Cycle, Settings, Supervision, Traffic};
@@ -95,13 +95,47 @@ pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
 /// A bus that its own cycle does not fit on would lose setpoints from the first second.
 pub(crate) fn check_loads(book: &Book, settings: &Settings) {
     for (i, bus) in settings.buses.iter().enumerate() {
-        let load = settings.bus_load(i);
-        let Some(percent) = load.percent.filter(|percent| *percent > REFUSED_PERCENT) else { continue };
-        let value = format!("{percent:.0} % full in the worst case ({} bits a cycle)", load.cycle_bits);
+        let Some(load) = settings.bus_load(i).filter(BusLoad::is_refused) else { continue };
+        let value = format!("{:.1} % full in the worst case", load.percent);
+        let best = settings.ways_out(i).into_iter().filter(|way| way.suffices).map(|way| way.what);
+        let ways: Vec<String> = best.take(2).collect();
         let expected = format!(
-            "at most {REFUSED_PERCENT} % on {}: use more buses or a longer cycle.period_us",
-            bus.interface
+            "at most {REFUSED_PERCENT} % on {}, for instance by {} (`taustream check` lists all ways out)",
+            bus.interface,
+            if ways.is_empty() { "more buses".to_owned() } else { ways.join("; or by ") }
         );
         book.add(None, &format!("bus[{i}]"), &value, &expected);
+    }
+}
+
+/// Rarer setpoints and answers only make sense within the limits of supervision.
+pub(crate) fn check_traffic(book: &Book, settings: &Settings) {
+    let period_ms = f64::from(settings.cycle.period_us) * 1e-3;
+    for (i, bus) in settings.buses.iter().enumerate() {
+        let Traffic { setpoint_every, feedback_every, packed, .. } = bus.traffic;
+        let servos = settings.servos.iter().filter(|servo| servo.bus == i).count();
+        if packed && servos < 2 {
+            book.add(None, &format!("bus[{i}].packed"), "true", "two servos on the bus that share a frame");
+        }
+        // What a drive waits for when all goes well, and the gap that it bridges on top, must not trip it.
+        let wait_periods = settings.cycle.tolerated_gap_periods + setpoint_every - 1;
+        let wait_ms = f64::from(wait_periods) * period_ms;
+        let watchdog_ms = settings.cycle.drive_watchdog_ms;
+        if setpoint_every > 1 && f64::from(watchdog_ms) <= wait_ms {
+            let expected = format!(
+                "setpoints that come, with the tolerated gap, more often than every drive_watchdog_ms = \
+                 {watchdog_ms} ({wait_ms} ms as it stands)"
+            );
+            book.add(None, &format!("bus[{i}].setpoint_every"), &setpoint_every.to_string(), &expected);
+        }
+        // One answer is one cycle old when it is looked at; below one more, jitter alone would stop the arm.
+        let age_s = settings.supervision.feedback_age_s_max;
+        let least_s = f64::from(feedback_every + 1) * period_ms * 1e-3;
+        if feedback_every > 1 && age_s < least_s {
+            let expected = format!(
+                "answers for which feedback_age_s_max = {age_s:?} has room: it must be {least_s} s or more"
+            );
+            book.add(None, &format!("bus[{i}].feedback_every"), &feedback_every.to_string(), &expected);
+        }
     }
 }

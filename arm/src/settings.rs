@@ -56,6 +56,12 @@ pub struct Traffic {
     pub packed: bool,
 }
 
+/// Slowest setpoints that settings may ask for, in cycles. Slower, the drive would choose much of the path itself, and
+/// supervision would look at one answer many times over.
+pub const SETPOINT_EVERY_MAX: u32 = 10;
+/// Slowest answers that settings may ask for, in SYNCs.
+pub const FEEDBACK_EVERY_MAX: u32 = 10;
+
 impl Traffic {
     /// One setpoint and one answer a servo in every cycle.
     pub const EVERY_CYCLE: Self =
@@ -208,9 +214,30 @@ impl Settings {
     /// # Errors
     /// Every fault at once, those of the robot and scene files included.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        let settings = Self::from_toml_overloaded(file, text)?;
+        let book = Book::new(file);
+        consistency::check_loads(&book, &settings);
+        book.close(Some(settings))
+    }
+    /// As [`Self::load`], but takes buses that are too full: for whoever shows what is wrong with them. Nothing may be
+    /// run on such settings.
+    ///
+    /// # Errors
+    /// Every other fault at once.
+    pub fn load_overloaded(file: &Path) -> Result<Self, Faults> {
+        Self::from_toml_overloaded(file, &document::read_text(file, "a settings file in TOML")?)
+    }
+    fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
         let book = Book::new(file);
         let settings = Self::read(&book, document::parse_toml(file, text)?, text);
         book.close(settings)
+    }
+    /// Cycles in a row that a bus may lose. Where the others go on, the drives of the lost one must not be told to catch
+    /// up beyond what they bridge: it has failed before.
+    #[must_use]
+    pub fn lost_cycles_max(&self) -> u32 {
+        let stated = self.supervision.lost_cycles_max;
+        if self.buses.len() > 1 { stated.min(self.cycle.tolerated_gap_periods) } else { stated }
     }
     fn read(book: &Book, node: Node, text: &str) -> Option<Self> {
         let mut top = Table::top(book, node)?;
@@ -242,7 +269,7 @@ impl Settings {
         };
         consistency::check_jump(book, &settings);
         consistency::check_damiao(book, &settings);
-        consistency::check_loads(book, &settings);
+        consistency::check_traffic(book, &settings);
         Some(settings)
     }
 }

@@ -272,7 +272,7 @@ const SETTINGS_CASES: &[Case] = &[
         "supervision.lost_cycles_max",
         "fewer cycles than drive_watchdog_ms",
     ),
-    (Settings, "virtual = true", "bitrate_bit_s = 500000", "bus[0]", "287 % full in the worst case"),
+    (Settings, "virtual = true", "bitrate_bit_s = 500000", "bus[0]", "287.9 % full in the worst case"),
     (Settings, "[[bus]]", "[[buses]]", "bus", "missing"),
     (
         Settings,

@@ -65,6 +65,11 @@ impl ServoDriver for BusDriver {
         &self.joints
     }
 
+    fn carries(&self, joint: usize) -> bool {
+        let driver = self.drivers.iter().find(|driver| driver.joints().contains(&joint));
+        driver.is_some_and(|driver| driver.carries(joint))
+    }
+
     fn status(&self, joint: usize) -> ServoStatus {
         let driver = self.drivers.iter().find(|driver| driver.joints().contains(&joint));
         driver.map_or(ServoStatus::UNKNOWN, |driver| driver.status(joint))

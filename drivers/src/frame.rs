@@ -63,6 +63,8 @@ pub const CLASSIC_SIZE: usize = 16;
 pub const FD_SIZE: usize = 72;
 /// `CANFD_FDF`: the frame is an FD frame.
 const FDF: u8 = 0x04;
+/// `CANFD_BRS`: its data phase has the other bit rate.
+const BRS: u8 = 0x01;
 
 impl CanFrame {
     /// A classic data frame; bytes beyond 8 are cut off.
@@ -73,7 +75,7 @@ impl CanFrame {
     /// An FD frame with bit rate switch; bytes beyond 64 are cut off.
     #[must_use]
     pub fn fd(id: CanId, bytes: &[u8]) -> Self {
-        Self::with(id, bytes, 64, FDF | 0x01)
+        Self::with(id, bytes, 64, FDF | BRS)
     }
     fn with(id: CanId, bytes: &[u8], most: usize, flags: u8) -> Self {
         let mut frame = Self { id, len: 0, flags, reserved: [0; 2], data: [0; 64] };
@@ -93,6 +95,11 @@ impl CanFrame {
     pub fn data(&self) -> &[u8] {
         let most = if self.is_fd() { 64 } else { 8 };
         self.data.get(..usize::from(self.len).min(most)).unwrap_or(&[])
+    }
+    /// True for an FD frame whose data phase has a bit rate of its own.
+    #[must_use]
+    pub fn switches_bit_rate(&self) -> bool {
+        self.is_fd() && self.flags & BRS != 0
     }
     /// True for an FD frame.
     #[must_use]

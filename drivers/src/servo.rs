@@ -137,6 +137,14 @@ pub trait ServoDriver: Send {
     /// The arm's joints that this driver serves.
     fn joints(&self) -> &[usize];
 
+    /// Whether the frames of the newest [`Self::encode`] hold the command of a joint of [`Self::joints`]; a driver
+    /// that sends every command in every cycle need not say so.
+    ///
+    /// Real time: no allocation.
+    fn carries(&self, _joint: usize) -> bool {
+        true
+    }
+
     /// What is known of a joint of [`Self::joints`]; [`ServoStatus::UNKNOWN`] for any other.
     fn status(&self, joint: usize) -> ServoStatus;
 

@@ -96,7 +96,7 @@ impl Buses {
         }
     }
 
-    /// Hands every bus's frames over.
+    /// Hands every bus's frames over, all of them before anything is read.
     ///
     /// Real time: one system call a bus, never waits.
     pub fn send(&mut self, facts: &mut Facts) {
@@ -116,6 +116,14 @@ impl Buses {
             found.syncs = bus.syncs;
             // Known before the commanded pose is: a bus that is silent has carried nothing.
             found.failed = bus.health.failed();
+            for joint in bus.driver.joints() {
+                if let Some(held_back) = facts.held_back.get_mut(*joint) {
+                    *held_back = taken.is_empty() || !bus.driver.carries(*joint);
+                }
+                if let Some(out) = facts.out_of_reach.get_mut(*joint) {
+                    *out = found.failed.is_some();
+                }
+            }
         }
     }
 

@@ -105,7 +105,7 @@ impl Core {
             track: Track::new(&limits, joints, cycle, rules),
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
-            supervisor: Supervisor::new(limits, joints, cycle, rules),
+            supervisor: Supervisor::new(settings),
             reporter: Reporter::new(settings.robot.digest, (joints, settings.buses.len()), cycle, recording),
         }
     }

@@ -190,6 +190,8 @@ pub struct Facts {
     pub restored: Option<Restored>,
     /// Joints on failed buses: what is known of them is old, and no command reaches them.
     pub out_of_reach: [bool; MAX_JOINTS],
+    /// Joints whose setpoint did not leave: it was not their turn, or their bus took nothing.
+    pub held_back: [bool; MAX_JOINTS],
     /// The drives, after receiving.
     pub servos: [ServoStatus; MAX_JOINTS],
     /// Pose of the last setpoint that left.
@@ -219,6 +221,7 @@ impl Facts {
             buses: [BusFacts::default(); BUSES_MAX],
             restored: None,
             out_of_reach: [false; MAX_JOINTS],
+            held_back: [false; MAX_JOINTS],
             servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
             commanded_rad: [0.0; MAX_JOINTS],
         }

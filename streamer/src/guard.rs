@@ -6,6 +6,9 @@
 //! its limits cannot exceed them by discretisation, skipped cycles included; what is left is rounding, for which
 //! `SLACK` is plenty. Hence the guard never trips in a verified motion.
 //!
+//! Each joint is judged against what it was told itself: where setpoints take turns, its last command is older than the
+//! cycle before. A command that is held back is judged all the same, since the average holds for any step.
+//!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
 use crate::facts::{Braking, Facts, Trip, TripKind};
 use crate::track::Wanted;
@@ -64,6 +67,8 @@ impl GuardedCommand {
 struct Past {
     position_rad: [f64; PAST],
     step_s: [f64; PAST],
+    /// Time since the newest of them at the last command that left for any joint.
+    waited_s: f64,
 }
 
 /// A joint's derivatives as the commands themselves show them.
@@ -78,7 +83,7 @@ struct Differences {
 
 impl Past {
     fn at_rest(position_rad: f64, period_s: f64) -> Self {
-        Self { position_rad: [position_rad; PAST], step_s: [period_s; PAST] }
+        Self { position_rad: [position_rad; PAST], step_s: [period_s; PAST], waited_s: 0.0 }
     }
 
     fn differences(&self, position_rad: f64, step_s: f64) -> Differences {
@@ -98,7 +103,7 @@ impl Past {
     fn push(&mut self, position_rad: f64, step_s: f64) {
         let [q1, q2, _] = self.position_rad;
         let [h1, h2, _] = self.step_s;
-        *self = Self { position_rad: [position_rad, q1, q2], step_s: [step_s, h1, h2] };
+        *self = Self { position_rad: [position_rad, q1, q2], step_s: [step_s, h1, h2], waited_s: 0.0 };
     }
 }
 
@@ -174,11 +179,14 @@ impl Guard {
         if !facts.setpoints_left() {
             return;
         }
-        for (past, position_rad) in self.past.iter_mut().zip(self.next.position_rad) {
+        let joints = self.past.iter_mut().zip(self.next.position_rad).zip(facts.held_back);
+        for ((past, position_rad), held_back) in joints {
             if self.restarted {
                 *past = Past::at_rest(position_rad, self.period_s);
+            } else if held_back {
+                past.waited_s += self.next_step_s;
             } else {
-                past.push(position_rad, self.next_step_s);
+                past.push(position_rad, past.waited_s + self.next_step_s);
             }
         }
         self.good = self.next;
@@ -219,7 +227,7 @@ impl Guard {
         });
         let joints = states.zip(&self.past).zip(&self.limits).take(self.joints);
         joints.enumerate().find_map(|(joint, ((state, past), limits))| {
-            let (kind, value, limit) = refuse(&state, past, limits, step_s)?;
+            let (kind, value, limit) = refuse(&state, past, limits, past.waited_s + step_s)?;
             Some(Trip { joint, kind, value, limit })
         })
     }
@@ -245,7 +253,8 @@ impl Guard {
         // Behind a stall the drives stand still at the last command: the brake is over there.
         if facts.frozen {
             facts.braking = Braking::Rested;
-            return Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
+            let position_rad = self.past.map(|past| past.position_rad[0]);
+            return Setpoint { position_rad, ..Setpoint::default() };
         }
         let now_s = running.sent_s + step_s;
         let mut setpoint = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
@@ -353,18 +362,7 @@ mod tests {
 
     /// Feeds one joint's positions with rates that belong to them, and returns the first trip.
     fn first_trip(motion: impl Fn(f64) -> JointState, ticks: u32) -> Option<(u32, Trip)> {
-        let mut guard = Guard::new(limits(), 6, 1_000);
-        (0..ticks).find_map(|tick| {
-            let state = motion(f64::from(tick) * PERIOD_S);
-            let mut facts = Facts::begin(Tick::default());
-            let mut setpoint = Setpoint::default();
-            setpoint.position_rad[2] = state.position_rad;
-            setpoint.velocity_rad_s[2] = state.velocity_rad_s;
-            setpoint.acceleration_rad_s2[2] = state.acceleration_rad_s2;
-            guard.limit(&Wanted { setpoint, periods: 1, restart: tick == 0, live: true }, &mut facts);
-            guard.commit(&facts);
-            facts.trip.map(|trip| (tick, trip))
-        })
+        first_trip_told_every(1, motion, ticks)
     }
 
     /// A sine from rest: position 1 - cos, so velocity and acceleration begin at 0 and at its peak.
@@ -387,6 +385,43 @@ mod tests {
     #[test]
     fn guard_on_a_smooth_motion_inside_the_limits_never_trips() {
         assert_eq!(first_trip(wave(0.5, 4.0), 5_000), None);
+    }
+
+    /// Feeds positions of which every `every`-th is told, and returns the first trip.
+    fn first_trip_told_every(
+        every: u32,
+        motion: impl Fn(f64) -> JointState,
+        ticks: u32,
+    ) -> Option<(u32, Trip)> {
+        let mut guard = Guard::new(limits(), 6, 1_000);
+        (0..ticks).find_map(|tick| {
+            let state = motion(f64::from(tick) * PERIOD_S);
+            let mut facts = Facts::begin(Tick::default());
+            facts.held_back[2] = !tick.is_multiple_of(every);
+            let mut setpoint = Setpoint::default();
+            setpoint.position_rad[2] = state.position_rad;
+            setpoint.velocity_rad_s[2] = state.velocity_rad_s;
+            setpoint.acceleration_rad_s2[2] = state.acceleration_rad_s2;
+            guard.limit(&Wanted { setpoint, periods: 1, restart: tick == 0, live: true }, &mut facts);
+            guard.commit(&facts);
+            facts.trip.map(|trip| (tick, trip))
+        })
+    }
+
+    #[test]
+    fn guard_with_setpoints_that_take_turns_trips_on_what_the_drive_is_told_and_on_nothing_else() {
+        let smooth = wave(0.5, 4.0);
+        for every in [1, 2, 4, 10] {
+            assert_eq!(first_trip_told_every(every, &smooth, 5_000), None, "every {every}");
+            // A leap of the commands is seen in the cycle in which it comes, told or not.
+            let leap = |t: f64| {
+                let state = smooth(t);
+                let by_rad = if t > 1.0 { 0.1 } else { 0.0 };
+                JointState { position_rad: state.position_rad + by_rad, ..state }
+            };
+            let (tick, trip) = first_trip_told_every(every, leap, 5_000).unwrap();
+            assert_eq!((tick, trip.joint), (1_001, 2), "every {every}: {trip:?}");
+        }
     }
 
     #[test]

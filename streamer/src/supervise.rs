@@ -9,7 +9,8 @@ use crate::phases::{self, Event};
 use crate::track::ScaleOrder;
 use crate::watch::Watch;
 use crate::words::{Answer, Why};
-use taustream_arm::settings::{Cycle, Supervision};
+use taustream_arm::Settings;
+use taustream_arm::settings::Supervision;
 use taustream_drivers::{DriveState, DriveWish, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Phase};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
@@ -68,14 +69,17 @@ pub struct Supervisor {
 impl Supervisor {
     /// A supervisor of an arm of which nothing is known.
     #[must_use]
-    pub fn new(limits: [JointLimits; MAX_JOINTS], joints: usize, cycle: &Cycle, rules: &Supervision) -> Self {
+    pub fn new(settings: &Settings) -> Self {
+        let limits = settings.robot.limits();
+        let joints = settings.robot.joints.len();
+        let (cycle, rules) = (&settings.cycle, &settings.supervision);
         Self {
             rules: *rules,
             limits,
             joints,
             stall_resume_s: f64::from(cycle.stall_resume_ms) * 1e-3,
             watchdog_s: f64::from(cycle.drive_watchdog_ms) * 1e-3,
-            watch: Watch::new(*rules, &limits, joints, cycle.period_us),
+            watch: Watch::new(settings),
             phase: Phase::Configuring,
             since: Nanos(0),
             cause: None,

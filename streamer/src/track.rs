@@ -66,6 +66,9 @@ pub struct Track {
     newest_generation: u64,
     sent: Mark,
     next: Mark,
+    /// What each joint was last told; older than `sent` for one whose turn has not come, or whose bus is lost. When the
+    /// drives have come to stand, they stand there, and the approach brings the joints together again.
+    told_rad: JointArray,
 }
 
 impl Track {
@@ -94,6 +97,7 @@ impl Track {
             newest_generation: 0,
             sent: Mark::default(),
             next: Mark::default(),
+            told_rad: [0.0; MAX_JOINTS],
         }
     }
 
@@ -161,6 +165,9 @@ impl Track {
                 self.scale = TimeScale::settled(0.0, self.ramp_s);
                 (self.sent.axis, self.next.axis) = (0, 0);
                 (facts.frozen, restart) = (true, true);
+                self.sent.position_rad = self.told_rad;
+                self.next.position_rad = self.sent.position_rad;
+                setpoint.position_rad = self.sent.position_rad;
                 let reached_rad = running.trajectory.sample(self.sent.s).position_rad;
                 self.approach = Approach::new(&self.sent.position_rad, &reached_rad, self.ramp_s);
                 (self.sent.approach, self.next.approach) = (0, 0);
@@ -198,8 +205,17 @@ impl Track {
     pub fn commit(&mut self, position_rad: &JointArray, facts: &mut Facts) {
         if facts.setpoints_left() {
             self.sent = Mark { position_rad: *position_rad, ..self.next };
+            let told = self.told_rad.iter_mut().zip(position_rad).zip(&facts.held_back);
+            told.filter(|(_, held_back)| !**held_back).for_each(|((told, position), _)| *told = *position);
             (self.starting, self.restart) = (false, false);
         }
+        // Where setpoints take turns, the last ones of a motion are still on their way: it ends when all are told.
+        let told = self.told_rad.iter().zip(&self.sent.position_rad).zip(&facts.out_of_reach);
+        let all_told = told
+            .take(self.joints)
+            .all(|((told, sent), out_of_reach)| *out_of_reach || told.to_bits() == sent.to_bits());
+        facts.end_reached &= all_told;
+        facts.at_rest &= all_told;
         facts.commanded_rad = self.sent.position_rad;
         let mut trial = self.scale;
         facts.can_ramp = trial.wish(1.0, self.seconds(self.sent.axis)).is_ok();
@@ -224,6 +240,7 @@ impl Track {
     /// Real time: nothing is freed.
     pub fn drop_trajectory(&mut self) -> Option<Boxed> {
         (self.starting, self.restart) = (false, true);
+        self.sent.position_rad = self.told_rad;
         self.sent.s = 0.0;
         self.scale = TimeScale::settled(0.0, self.ramp_s);
         self.sent.axis = 0;
@@ -235,6 +252,7 @@ impl Track {
     /// Real time: a copy.
     pub fn set_pose(&mut self, position_rad: &JointArray) {
         self.sent.position_rad = *position_rad;
+        self.told_rad = *position_rad;
         self.restart = true;
     }
 

@@ -2,15 +2,19 @@
 //!
 //! A setpoint of cycle N is sent behind SYNC N, taken over at SYNC N+1 and interpolated up to SYNC N+2; the position
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
-//! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay.
+//! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
+//! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
 use crate::facts::{Cause, Facts};
-use taustream_arm::settings::Supervision;
+use taustream_arm::Settings;
+use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};
 use taustream_drivers::{DriveState, Nanos};
 use taustream_messages::{BusTrouble, FaultReason};
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Cycles from a command to the measured position that answers it.
 pub const TRANSPORT_CYCLES: usize = 2;
+/// Commands that are remembered: enough for the slowest setpoints that settings may ask for.
+const COMMANDS: usize = TRANSPORT_CYCLES + SETPOINT_EVERY_MAX as usize;
 /// Cycles over which speed is measured to tell rest: long enough for coarse encoders.
 const REST_CYCLES: usize = 32;
 /// Speed below which a joint rests.
@@ -52,7 +56,9 @@ pub struct Watch {
     joints: usize,
     velocity_rad_s_max: JointArray,
     period_s: f64,
-    commands_rad: [JointArray; TRANSPORT_CYCLES + 1],
+    /// Cycles from a command to the measured position that answers it, by joint.
+    transport_cycles: [usize; MAX_JOINTS],
+    commands_rad: [JointArray; COMMANDS],
     answers: [Answers; MAX_JOINTS],
     slot: usize,
 }
@@ -60,18 +66,14 @@ pub struct Watch {
 impl Watch {
     /// Nothing heard yet.
     #[must_use]
-    pub fn new(
-        rules: Supervision,
-        limits: &[JointLimits; MAX_JOINTS],
-        joints: usize,
-        period_us: u32,
-    ) -> Self {
+    pub fn new(settings: &Settings) -> Self {
         Self {
-            rules,
-            joints,
-            velocity_rad_s_max: limits.map(|l| l.stop.velocity_rad_s),
-            period_s: f64::from(period_us) * 1e-6,
-            commands_rad: [[0.0; MAX_JOINTS]; TRANSPORT_CYCLES + 1],
+            rules: Supervision { lost_cycles_max: settings.lost_cycles_max(), ..settings.supervision },
+            joints: settings.robot.joints.len(),
+            velocity_rad_s_max: settings.robot.limits().map(|l| l.stop.velocity_rad_s),
+            period_s: f64::from(settings.cycle.period_us) * 1e-6,
+            transport_cycles: transport_cycles(settings),
+            commands_rad: [[0.0; MAX_JOINTS]; COMMANDS],
             answers: [Answers::NONE; MAX_JOINTS],
             slot: 0,
         }
@@ -86,11 +88,12 @@ impl Watch {
             self.commands_rad[0] = facts.commanded_rad;
         }
         self.slot = (self.slot + 1) % REST_CYCLES;
-        let command_rad = self.commands_rad[TRANSPORT_CYCLES];
-        let joints = self.answers.iter_mut().zip(&facts.servos).zip(&command_rad);
-        for (((answer, servo), command_rad), speed_max) in
-            joints.zip(&self.velocity_rad_s_max).take(self.joints)
+        let joints = self.answers.iter_mut().zip(&facts.servos).zip(&self.transport_cycles);
+        for (joint, (((answer, servo), transport_cycles), speed_max)) in
+            joints.zip(&self.velocity_rad_s_max).enumerate().take(self.joints)
         {
+            let command = self.commands_rad.get(*transport_cycles);
+            let command_rad = command.and_then(|pose| pose.get(joint)).copied().unwrap_or(f64::NAN);
             answer.past_rad[self.slot] = servo.position_rad;
             let told = reports(servo.state) && servo.position_rad.is_finite();
             answer.told_cycles = if told { answer.told_cycles.saturating_add(1) } else { 0 };
@@ -117,7 +120,7 @@ impl Watch {
     ///
     /// Real time: copies.
     pub fn restart(&mut self, pose_rad: &JointArray) {
-        self.commands_rad = [*pose_rad; TRANSPORT_CYCLES + 1];
+        self.commands_rad = [*pose_rad; COMMANDS];
         for answer in &mut self.answers {
             (answer.jump_rad, answer.tracking_rad, answer.tracking_rad_max) = (0.0, 0.0, 0.0);
         }
@@ -218,6 +221,18 @@ impl Watch {
     pub fn tracking_rad(&self) -> (JointArray, JointArray) {
         (self.answers.map(|a| a.tracking_rad), self.answers.map(|a| a.tracking_rad_max))
     }
+}
+
+/// Cycles from a command to the position that answers it, by joint.
+fn transport_cycles(settings: &Settings) -> [usize; MAX_JOINTS] {
+    let mut cycles = [TRANSPORT_CYCLES; MAX_JOINTS];
+    for servo in &settings.servos {
+        let every = settings.buses.get(servo.bus).map_or(1, |bus| bus.traffic.setpoint_every);
+        if let Some(slot) = cycles.get_mut(servo.joint) {
+            *slot = TRANSPORT_CYCLES + every.clamp(1, SETPOINT_EVERY_MAX) as usize - 1;
+        }
+    }
+    cycles
 }
 
 /// Whether a drive in this state reports its position every cycle; before, the last one that was read stands still.

@@ -1,4 +1,5 @@
 //! `taustream check`: is a configuration sound, and what does it mean?
+use super::bus_table::BusTable;
 use super::protocol_line::ProtocolLine;
 use crate::args::CheckArgs;
 use crate::arm;
@@ -7,20 +8,26 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
-use taustream_arm::bus_load::WARNED_PERCENT;
-use taustream_arm::{Bus, Robot, Scene, Servo, Settings, TrajectoryFile};
+use taustream_arm::{Robot, Scene, Servo, Settings, TrajectoryFile};
 use taustream_motion::time_scale::ramp_duration_s;
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
     match arm::find_any(&args.config)? {
-        arm::AnyFile::Settings(path) => form.print(&CheckedSettings::of(&Settings::load(&path)?)),
+        arm::AnyFile::Settings(path) => check_settings(form, &path),
         arm::AnyFile::Robot(path) => form.print(&CheckedRobot::of(&Robot::load(&path)?)),
         arm::AnyFile::Scene(path) => form.print(&CheckedScene::of(&Scene::load(&path)?)),
         arm::AnyFile::Trajectory(path) => {
             form.print(&CheckedTrajectory::of(&path, &TrajectoryFile::load(&path)?))
         }
     }
+}
+
+/// Settings whose only fault is a bus that is too full are shown with its table and the ways out, and refused all the same.
+fn check_settings(form: Form, path: &Path) -> Result<(), Failure> {
+    form.print(&CheckedSettings::of(&Settings::load_overloaded(path)?))?;
+    Settings::load(path)?;
+    Ok(())
 }
 
 /// One joint's limits.
@@ -199,54 +206,6 @@ impl fmt::Display for CheckedTrajectory {
     }
 }
 
-/// One bus and how full it gets in the worst case.
-#[derive(Debug, Serialize)]
-struct BusLine {
-    bus: String,
-    interface: String,
-    servos: usize,
-    /// Null for a virtual bus.
-    bitrate_bit_s: Option<u32>,
-    /// Worst-case bits of one cycle.
-    cycle_bits: u32,
-    /// Null for a virtual bus.
-    load_percent: Option<f64>,
-}
-
-impl BusLine {
-    fn of(settings: &Settings, index: usize, bus: &Bus) -> Self {
-        let load = settings.bus_load(index);
-        Self {
-            bus: bus.name.clone(),
-            interface: bus.interface.clone(),
-            servos: load.servos,
-            bitrate_bit_s: bus.kind.bitrate_bit_s(),
-            cycle_bits: load.cycle_bits,
-            load_percent: load.percent,
-        }
-    }
-}
-
-impl fmt::Display for BusLine {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "bus {} on {}: {} servos, ", self.bus, self.interface, self.servos)?;
-        let Some(percent) = self.load_percent else {
-            return write!(
-                f,
-                "VIRTUAL: no bit rate, so no load; taken on a vcan interface or the local link only"
-            );
-        };
-        write!(f, "{percent:.0} % full in the worst case ({} bits a cycle)", self.cycle_bits)?;
-        if percent > WARNED_PERCENT {
-            write!(
-                f,
-                ", WARNING: above {WARNED_PERCENT:.0} %, so configuration and repetitions have little room"
-            )?;
-        }
-        Ok(())
-    }
-}
-
 /// One servo's binding.
 #[derive(Debug, Serialize)]
 struct ServoLine {
@@ -272,7 +231,7 @@ struct CheckedSettings {
     period_us: u32,
     priority: u8,
     cpu: Option<usize>,
-    buses: Vec<BusLine>,
+    buses: Vec<BusTable>,
     servos: Vec<ServoLine>,
 }
 
@@ -288,6 +247,7 @@ impl CheckedSettings {
             zero_offset_rad: servo.zero_offset_rad,
             limp_is_safe: servo.limp_is_safe,
         };
+        let buses = settings.buses.iter().enumerate();
         Self {
             kind: "settings",
             name: settings.name.clone(),
@@ -297,7 +257,7 @@ impl CheckedSettings {
             period_us: settings.cycle.period_us,
             priority: settings.cycle.priority,
             cpu: settings.cycle.cpu,
-            buses: settings.buses.iter().enumerate().map(|(i, bus)| BusLine::of(settings, i, bus)).collect(),
+            buses: buses.filter_map(|(i, bus)| BusTable::of(settings, i, bus)).collect(),
             servos: settings.servos.iter().map(line).collect(),
         }
     }
@@ -325,6 +285,11 @@ impl fmt::Display for CheckedSettings {
                 s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
         }
-        write!(f, "no faults")
+        let full = self.buses.iter().filter(|bus| bus.is_refused()).count();
+        if full == 0 {
+            write!(f, "no faults")
+        } else {
+            write!(f, "{full} buses too full: these settings are refused")
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Commands that need files only.
 pub(crate) mod bench;
+mod bus_table;
 pub(crate) mod check;
 pub(crate) mod cost;
 pub(crate) mod plan;

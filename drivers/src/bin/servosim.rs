@@ -11,8 +11,8 @@ use taustream_arm::{Kind, Settings, runtime};
 use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
 use taustream_drivers::sim::serve::{StandardInput, serve};
-use taustream_drivers::sim::settings::drives;
-use taustream_drivers::sim::{FaultOrder, Rig, priority};
+use taustream_drivers::sim::settings::{drives, queue_frames};
+use taustream_drivers::sim::{FaultOrder, Rig, WiredRig, priority};
 use taustream_drivers::{Nanos, link};
 
 fn main() -> ExitCode {
@@ -40,7 +40,7 @@ fn fail(error: &anyhow::Error, code: u8) -> ExitCode {
 }
 
 /// Everything that can be wrong with arguments and files.
-fn prepare(args: &Arguments) -> anyhow::Result<(Settings, Rig)> {
+fn prepare(args: &Arguments) -> anyhow::Result<(Settings, WiredRig)> {
     let settings = Settings::load(&taustream_arm::find(Kind::Settings, &args.settings)?)?;
     let start_rad = args.start_rad.as_deref().map(|text| angles(text, &settings)).transpose()?;
     let setups = drives(&settings, start_rad.as_deref())?;
@@ -50,6 +50,7 @@ fn prepare(args: &Arguments) -> anyhow::Result<(Settings, Rig)> {
         let order = FaultOrder::parse(text, &joints).with_context(|| format!("--fault {text}"))?;
         rig.order(Nanos(0), order);
     }
+    let rig = WiredRig::new(rig, &settings.buses, queue_frames(&settings)?);
     Ok((settings, rig))
 }
 
@@ -77,7 +78,7 @@ fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
 }
 
 /// Opens the links and serves until told to stop.
-fn run(args: &Arguments, (settings, rig): (Settings, Rig)) -> anyhow::Result<()> {
+fn run(args: &Arguments, (settings, rig): (Settings, WiredRig)) -> anyhow::Result<()> {
     let runtime = runtime::directory()?;
     let mut links: Vec<Box<dyn CanLink>> = Vec::with_capacity(settings.buses.len());
     for bus in &settings.buses {

@@ -8,12 +8,11 @@ use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
 use crate::bring_up::power::{Heard, Power};
 use crate::bring_up::trouble::Trouble;
 use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
-use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING, encode_rpdo};
+use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING};
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
 use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
 use crate::codec::words::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
-use crate::frame::CanFrame;
 use crate::servo::{DriveState, DriveWish, Nanos};
 
 /// How long a boot-up may take.
@@ -62,6 +61,15 @@ pub struct Service {
     pub sdo: Option<SdoRequest>,
 }
 
+/// What a node is told in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setpoint {
+    /// Controlword.
+    pub control: u16,
+    /// Target in counts.
+    pub target_counts: i32,
+}
+
 /// The command for a node in this cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
@@ -85,7 +93,7 @@ pub struct Node {
     heard: bool,
     status: u16,
     position: Option<i32>,
-    sent_target: i32,
+    told: Option<i32>,
     tpdo_at: Nanos,
     heartbeat_at: Nanos,
     denials: u8,
@@ -104,12 +112,12 @@ impl Node {
             stage: Stage::Listen { since: Nanos(0), next: Nanos(0), trouble: None },
             sdo: SdoClient::default(),
             nmt: None,
-            power: Power::new(patience.step),
+            power: Power::new(patience.step, plan.feedback_every),
             wished: DriveWish::Disabled,
             heard: false,
             status: 0,
             position: None,
-            sent_target: 0,
+            told: None,
             tpdo_at: Nanos(0),
             heartbeat_at: Nanos(0),
             denials: 0,
@@ -177,10 +185,17 @@ impl Node {
         }
     }
 
-    /// This cycle's RPDO, while process data flows.
+    /// The newest target in counts, from the start of process data until the node is looked at anew. Nobody else may
+    /// guess one: a drive that still listens would go there.
+    #[must_use]
+    pub const fn told(&self) -> Option<i32> {
+        self.told
+    }
+
+    /// What the node is to be told in this cycle, while process data flows.
     ///
     /// Real time: arithmetic only.
-    pub fn setpoint(&mut self, cycle: Cycle, target: Target) -> Option<CanFrame> {
+    pub fn setpoint(&mut self, cycle: Cycle, target: Target) -> Option<Setpoint> {
         if !self.needs_sync() {
             self.power.watch(cycle.wish);
             return None;
@@ -198,8 +213,8 @@ impl Node {
         };
         // A command that is no number must never become one: the last good target stays.
         let wanted = if self.power.follows_commands() { target.counts } else { self.position };
-        self.sent_target = wanted.unwrap_or(self.sent_target);
-        Some(encode_rpdo(self.plan.node, control, self.sent_target))
+        self.told = wanted.or(self.told);
+        self.told.map(|target_counts| Setpoint { control, target_counts })
     }
 
     /// This cycle's network command and SDO request: at most one of each.
@@ -318,7 +333,8 @@ impl Node {
     /// Back to the start, where nothing is changed before the drive has been looked at.
     fn listen(&mut self, now: Nanos, trouble: Option<Trouble>) {
         self.sdo.cancel();
-        self.power = Power::new(self.patience.step);
+        self.power = Power::new(self.patience.step, self.plan.feedback_every);
+        self.told = None;
         self.power.watch(self.wished);
         (self.emcy, self.asked_error) = (0, false);
         self.stage = Stage::Listen { since: now, next: now, trouble };

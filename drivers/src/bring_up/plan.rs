@@ -5,10 +5,11 @@ use crate::codec::canopen::{
 use crate::codec::object::{self, Address};
 use crate::codec::sdo::SdoBytes;
 use crate::codec::sdo_client::SdoJob;
+use crate::codec::setpoint_frames::shared_cob_id;
 use taustream_arm::Reaction;
 
 /// Period of the heartbeats that drives send, and that this master sends.
-pub const HEARTBEAT_MS: u16 = 100;
+pub use taustream_arm::bus_load::HEARTBEAT_MS;
 /// Silence after which a node, or the master, counts as lost: three missed heartbeats and some jitter.
 pub const HEARTBEAT_LOST_MS: u16 = 350;
 
@@ -53,6 +54,20 @@ pub struct Step {
     pub optional: bool,
 }
 
+/// Where a node finds its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TargetPdo {
+    /// Behind the controlword in its first RPDO.
+    Own,
+    /// In the first or second half of a frame that two drives share; the first RPDO holds the controlword alone.
+    Shared {
+        /// Node whose second RPDO's identifier the frame has.
+        first_node: u8,
+        /// The second half is this node's.
+        second: bool,
+    },
+}
+
 /// What one node is configured with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodePlan {
@@ -60,10 +75,14 @@ pub struct NodePlan {
     pub node: u8,
     /// Period of SYNC.
     pub period_us: u32,
-    /// The same as value and power of ten (object 0x60C2).
+    /// Time between two setpoints of this node, as value and power of ten (object 0x60C2).
     pub interpolation: (u8, i8),
     /// What it is to do when its master is lost.
     pub reaction: Reaction,
+    /// Its targets.
+    pub target: TargetPdo,
+    /// It answers every so many SYNCs, 1 to 240 (transmission type of its TPDO).
+    pub feedback_every: u8,
 }
 
 impl NodePlan {
@@ -73,10 +92,13 @@ impl NodePlan {
         let mut steps = Steps(Vec::with_capacity(64));
         self.identify(&mut steps);
         self.supervise(&mut steps);
-        steps.pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, &RPDO1_ENTRIES);
-        steps.pdo(object::TPDO_COMMUNICATION, COB_TPDO1, self.node, &TPDO1_ENTRIES);
+        let rpdos = self.receive_pdos(&mut steps);
+        let tpdo1 = Pdo { number: 0, cob_id: cob_id(object::TPDO_COMMUNICATION, COB_TPDO1, self.node) };
+        steps.pdo(object::TPDO_COMMUNICATION, tpdo1, self.feedback_every, &TPDO1_ENTRIES);
         for number in 1..4 {
-            steps.no_pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, number);
+            if number >= rpdos {
+                steps.no_pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, number);
+            }
             steps.no_pdo(object::TPDO_COMMUNICATION, COB_TPDO1, self.node, number);
         }
         steps.write(object::MODE, SdoBytes::from_i8(object::MODE_CSP));
@@ -84,6 +106,25 @@ impl NodePlan {
         // Before the first RPDO the target must already be where the drive stands.
         steps.read(object::POSITION_ACTUAL, 4, Check::Position);
         steps.0
+    }
+
+    /// Configures the RPDOs; how many there are.
+    fn receive_pdos(&self, steps: &mut Steps) -> u16 {
+        let communication = object::RPDO_COMMUNICATION;
+        let rpdo1 = Pdo { number: 0, cob_id: cob_id(communication, COB_RPDO1, self.node) };
+        match self.target {
+            TargetPdo::Own => {
+                steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD, TARGET]);
+                1
+            }
+            TargetPdo::Shared { first_node, second } => {
+                let shared = Pdo { number: 1, cob_id: shared_cob_id(first_node).raw() };
+                let entries = if second { [SKIPPED, TARGET] } else { [TARGET, SKIPPED] };
+                steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD]);
+                steps.pdo(communication, shared, EVERY_SYNC, &entries);
+                2
+            }
+        }
     }
 
     fn identify(&self, steps: &mut Steps) {
@@ -117,10 +158,19 @@ impl NodePlan {
     }
 }
 
-const RPDO1_ENTRIES: [PdoEntry; 2] =
-    [PdoEntry::new(object::CONTROLWORD, 16), PdoEntry::new(object::TARGET_POSITION, 32)];
+const CONTROLWORD: PdoEntry = PdoEntry::new(object::CONTROLWORD, 16);
+const TARGET: PdoEntry = PdoEntry::new(object::TARGET_POSITION, 32);
+/// The part of another drive: a dummy entry of type UNSIGNED32.
+const SKIPPED: PdoEntry = PdoEntry::new(object::DUMMY_U32, 32);
 const TPDO1_ENTRIES: [PdoEntry; 2] =
     [PdoEntry::new(object::STATUSWORD, 16), PdoEntry::new(object::POSITION_ACTUAL, 32)];
+
+/// A PDO by its number, from 0, and its COB-ID.
+#[derive(Clone, Copy)]
+struct Pdo {
+    number: u16,
+    cob_id: u32,
+}
 
 struct Steps(Vec<Step>);
 
@@ -146,12 +196,12 @@ impl Steps {
     }
 
     /// The prescribed order: switch the PDO off, type, empty the mapping, entries, count, switch it on.
-    fn pdo(&mut self, communication: u16, base: u16, node: u8, entries: &[PdoEntry]) {
+    fn pdo(&mut self, first: u16, pdo: Pdo, kind: u8, entries: &[PdoEntry]) {
+        let communication = first + pdo.number;
         let mapping = communication + (object::RPDO_MAPPING - object::RPDO_COMMUNICATION);
-        let cob_id = cob_id(communication, base, node);
         let record = Address::new(communication, object::PDO_COB_ID);
-        self.write(record, SdoBytes::from_u32(cob_id | PDO_DISABLED));
-        self.write(Address::new(communication, object::PDO_TYPE), SdoBytes::from_u8(EVERY_SYNC));
+        self.write(record, SdoBytes::from_u32(pdo.cob_id | PDO_DISABLED));
+        self.write(Address::new(communication, object::PDO_TYPE), SdoBytes::from_u8(kind));
         self.write(Address::new(mapping, 0), SdoBytes::from_u8(0));
         let mut count = 0;
         for entry in entries {
@@ -159,7 +209,7 @@ impl Steps {
             self.write(Address::new(mapping, count), SdoBytes::from_u32(entry.encode()));
         }
         self.write(Address::new(mapping, 0), SdoBytes::from_u8(count));
-        self.write(record, SdoBytes::from_u32(cob_id));
+        self.write(record, SdoBytes::from_u32(pdo.cob_id));
     }
 
     /// Drives need not have this PDO at all.

@@ -12,7 +12,7 @@ use crate::servo::{DriveState, DriveWish, Nanos};
 
 /// Cycles for which 0 is sent before the rising edge of fault reset, so that a latched RPDO has surely passed.
 const RESET_LOW_CYCLES: u8 = 3;
-/// Cycles in a row without "follows the target" that make a trouble.
+/// Answers in a row without "follows the target" that make a trouble.
 const NOT_FOLLOWING_MAX: u8 = 3;
 
 /// What the drive last said, and when it may be trusted.
@@ -57,6 +57,8 @@ pub struct Power {
     wished: DriveWish,
     trouble: Option<Trouble>,
     not_following: u8,
+    /// Cycles in which that many answers come.
+    not_following_max: u8,
     step_timeout: Nanos,
 }
 
@@ -71,15 +73,16 @@ fn rung(step: Option<DriveStep>) -> u8 {
 }
 
 impl Power {
-    /// De-energised; `step_timeout` bounds each confirmation.
+    /// De-energised; `step_timeout` bounds each confirmation, and an answer comes every `answer_every` cycles.
     #[must_use]
-    pub const fn new(step_timeout: Nanos) -> Self {
+    pub const fn new(step_timeout: Nanos, answer_every: u8) -> Self {
         Self {
             phase: Phase::Off,
             reset: Reset::Idle,
             wished: DriveWish::TorqueOff,
             trouble: None,
             not_following: 0,
+            not_following_max: NOT_FOLLOWING_MAX.saturating_mul(answer_every),
             step_timeout,
         }
     }
@@ -216,7 +219,7 @@ impl Power {
             self.not_following = 0;
         } else {
             self.not_following = self.not_following.saturating_add(1);
-            if self.not_following >= NOT_FOLLOWING_MAX {
+            if self.not_following >= self.not_following_max {
                 // It stays energised: letting go of a drive that still holds would be worse.
                 self.note(Trouble::NotFollowing);
             }

@@ -3,7 +3,7 @@
 //! [`crate::ServoStatus::error_code`] holds kinds of codes that do not overlap: emergency codes (up to 0xFFFF), these
 //! (0x1 0000 to 0x1 FFFF), those of Damiao motors (0x2 0000 to 0x2 FFFF), and SDO abort codes (from 0x503 0000).
 use crate::bring_up::damiao_trouble as damiao;
-use crate::codec::words;
+use crate::codec::{object, words};
 
 /// A finding of the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +110,13 @@ pub fn explain_refusal(code: u32, object: u32) -> String {
         return sentence;
     }
     let (index, sub) = (object >> 8, object & 0xFF);
-    format!("object 0x{index:04X}:{sub:02}: {}", explain(code))
+    // The mapping of the second RPDO is written for shared setpoint frames alone.
+    let advice = if index == u32::from(object::RPDO_MAPPING) + 1 {
+        "; the drive does not skip the other drive's part of a shared setpoint frame: take `packed` off its bus"
+    } else {
+        ""
+    };
+    format!("object 0x{index:04X}:{sub:02}: {}{advice}", explain(code))
 }
 
 /// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.

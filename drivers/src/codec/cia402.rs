@@ -3,12 +3,13 @@
 //! One cycle on the bus: SYNC, which makes the drives apply the setpoints of the cycle before and sample their
 //! position; the new setpoints; then, one frame a node at most, configuration. So a command acts one period after it
 //! was sent, and a position is one period old when it is seen.
-use crate::bring_up::cia402::{Node, Target};
-use crate::bring_up::pace::{self, Patience, PatientClock};
-use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan};
+use crate::bring_up::cia402::{Node, Setpoint, Target};
+use crate::bring_up::pace::{self, Cycle, Patience, PatientClock};
+use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan, TargetPdo};
 use crate::bring_up::trouble;
 use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, sync};
 use crate::codec::sdo::SdoResponse;
+use crate::codec::setpoint_frames::{Group, Rhythm, encode_control, encode_pair, groups};
 use crate::frame::{CanFrame, FrameBatch};
 use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};
 use taustream_arm::{Servo, Settings};
@@ -59,11 +60,11 @@ pub enum Cia402Error {
     },
     /// The period cannot be stated in object 0x60C2.
     #[error(
-        "a cycle of {period_us} us cannot be told to a CiA 402 drive (object 0x60C2 takes 1 to 255 times a power of \
-         ten); choose 500, 1000, 2000 or 4000"
+        "a setpoint every {period_us} us (cycle.period_us x setpoint_every) cannot be told to a CiA 402 drive (object \
+         0x60C2 takes 1 to 255 times a power of ten); choose 500, 1000, 2000 or 4000"
     )]
     Period {
-        /// The period.
+        /// Time between two setpoints.
         period_us: u32,
     },
     /// A time or distance of the settings is not usable.
@@ -84,6 +85,10 @@ struct Drive {
     scale: CountScale,
     node: Node,
     received: Option<Nanos>,
+    /// Controlword of the newest frame that held one.
+    control: Option<u16>,
+    /// This cycle's frames hold its target.
+    carried: bool,
 }
 
 /// The master of all CiA 402 drives of one bus.
@@ -91,6 +96,8 @@ struct Drive {
 pub struct Cia402Driver {
     drives: Vec<Drive>,
     joints: Vec<usize>,
+    groups: Vec<Group>,
+    rhythm: Rhythm,
     /// Node id to index of drive.
     by_node: [Option<usize>; NODE_MAX as usize + 1],
     near_rad: f64,
@@ -104,12 +111,16 @@ impl Cia402Driver {
     /// # Errors
     /// When the settings cannot be told to CANopen drives.
     pub fn new(settings: &Settings, bus: usize) -> Result<Self, Cia402Error> {
-        if bus >= settings.buses.len() {
-            return Err(Cia402Error::NoSuchBus { bus, buses: settings.buses.len() });
-        }
+        let buses = settings.buses.len();
+        let Some(traffic) = settings.buses.get(bus).map(|bus| bus.traffic) else {
+            return Err(Cia402Error::NoSuchBus { bus, buses });
+        };
         let period_us = settings.cycle.period_us;
-        let interpolation = crate::codec::cia402_words::interpolation_period(period_us)
-            .ok_or(Cia402Error::Period { period_us })?;
+        let setpoint_us = period_us.saturating_mul(traffic.setpoint_every);
+        let interpolation = crate::codec::cia402_words::interpolation_period(setpoint_us)
+            .ok_or(Cia402Error::Period { period_us: setpoint_us })?;
+        let on_bus = settings.servos.iter().filter(|servo| servo.bus == bus);
+        let mine = || on_bus.clone().filter_map(|servo| Some((servo, CountScale::of(servo)?)));
         let supervision = &settings.supervision;
         let patience = Patience {
             step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
@@ -122,15 +133,25 @@ impl Cia402Driver {
         let mut driver = Self {
             drives: Vec::new(),
             joints: Vec::new(),
+            groups: groups(mine().count(), traffic.packed),
+            rhythm: Rhythm::new(traffic),
             by_node: [None; NODE_MAX as usize + 1],
             near_rad,
             clock: PatientClock::new(period_us),
             heartbeat_at: None,
         };
-        for servo in settings.servos.iter().filter(|s| s.bus == bus) {
-            let Some(scale) = CountScale::of(servo) else { continue };
-            let reaction = servo.reaction;
-            let plan = NodePlan { node: servo.node_id, period_us, interpolation, reaction };
+        // Bounded where settings are read; a drive that was told 240 would be silent for as many cycles.
+        let feedback_every = u8::try_from(traffic.feedback_every).unwrap_or(u8::MAX).clamp(1, 240);
+        let nodes: Vec<u8> = mine().map(|(servo, _)| servo.node_id).collect();
+        for (at, (servo, scale)) in mine().enumerate() {
+            let plan = NodePlan {
+                node: servo.node_id,
+                period_us,
+                interpolation,
+                reaction: servo.reaction,
+                target: target_pdo(&driver.groups, &nodes, at),
+                feedback_every,
+            };
             driver.add(servo, scale, Node::new(plan, patience))?;
         }
         Ok(driver)
@@ -149,7 +170,15 @@ impl Cia402Driver {
             return Err(Cia402Error::NodeTwice { joint, other, node_id });
         }
         *slot = Some(self.drives.len());
-        self.drives.push(Drive { joint, node_id, scale, node, received: None });
+        self.drives.push(Drive {
+            joint,
+            node_id,
+            scale,
+            node,
+            received: None,
+            control: None,
+            carried: false,
+        });
         self.joints.push(joint);
         Ok(())
     }
@@ -157,6 +186,34 @@ impl Cia402Driver {
     fn drive_mut(&mut self, node: u8) -> Option<&mut Drive> {
         let index = (*self.by_node.get(usize::from(node))?)?;
         self.drives.get_mut(index)
+    }
+
+    /// The setpoints whose turn it is, and whatever must not wait for a turn: a new controlword, and torque off.
+    fn push_setpoints(&mut self, cycle: Cycle, commands: &[JointCommand; MAX_JOINTS], out: &mut FrameBatch) {
+        let (rhythm, near_rad) = (self.rhythm, self.near_rad);
+        self.rhythm.advance();
+        for (number, group) in self.groups.iter().enumerate() {
+            let turn = rhythm.is_turn(number);
+            match *group {
+                Group::One(at) => {
+                    let Some(drive) = self.drives.get_mut(at) else { continue };
+                    drive.push_own(cycle, drive.target(commands, near_rad), turn, out);
+                }
+                Group::Pair([first, second]) => {
+                    let Ok([first, second]) = self.drives.get_disjoint_mut([first, second]) else { continue };
+                    let repeats = rhythm.repeats_control(number);
+                    // Its target comes with the other's: a drive must not be energised before both can be told.
+                    let together = first.node.told().is_some() && second.node.told().is_some();
+                    let mut news = false;
+                    for drive in [&mut *first, &mut *second] {
+                        let target = drive.target(commands, near_rad);
+                        let target = Target { near: target.near && together, ..target };
+                        news |= drive.push_control(cycle, target, repeats, out);
+                    }
+                    push_shared(first, second, turn || news, out);
+                }
+            }
+        }
     }
 
     /// Drives watch for this (object 0x1016) and stop by themselves when it ends.
@@ -168,6 +225,17 @@ impl Cia402Driver {
             self.heartbeat_at = Some(now);
         }
     }
+}
+
+/// Where the drive at place `at` finds its target.
+fn target_pdo(groups: &[Group], nodes: &[u8], at: usize) -> TargetPdo {
+    let pair = groups.iter().find_map(|group| match group {
+        Group::Pair([first, second]) if *first == at || *second == at => {
+            Some((nodes.get(*first)?, *second == at))
+        }
+        Group::Pair(_) | Group::One(_) => None,
+    });
+    pair.map_or(TargetPdo::Own, |(first_node, second)| TargetPdo::Shared { first_node: *first_node, second })
 }
 
 /// A positive time of the settings in nanoseconds.
@@ -187,13 +255,7 @@ impl ServoDriver for Cia402Driver {
         if self.drives.iter().any(|drive| drive.node.needs_sync()) {
             out.push(sync());
         }
-        let near_rad = self.near_rad;
-        for drive in &mut self.drives {
-            let target = drive.target(commands, near_rad);
-            if let Some(frame) = drive.node.setpoint(cycle, target) {
-                out.push(frame);
-            }
-        }
+        self.push_setpoints(cycle, commands, out);
         for drive in &mut self.drives {
             let service = drive.node.service(cycle);
             if let Some(nmt) = service.nmt {
@@ -233,6 +295,10 @@ impl ServoDriver for Cia402Driver {
 
     fn joints(&self) -> &[usize] {
         &self.joints
+    }
+
+    fn carries(&self, joint: usize) -> bool {
+        self.drives.iter().any(|drive| drive.joint == joint && drive.carried)
     }
 
     fn status(&self, joint: usize) -> ServoStatus {
@@ -275,7 +341,44 @@ impl ServoDriver for Cia402Driver {
     }
 }
 
+/// The frame that two drives share, when it is due and one of them works. The other's part repeats what that
+/// drive was last told; while nobody knows that, nothing is sent, for a drive that listens would go wherever it says.
+fn push_shared(first: &mut Drive, second: &mut Drive, due: bool, out: &mut FrameBatch) {
+    let works = [&*first, &*second].map(|drive| drive.control.is_some());
+    let told = (first.node.told(), second.node.told());
+    let carried = match told {
+        (Some(a), Some(b)) if due && works != [false; 2] => out.push(encode_pair(first.node_id, [a, b])),
+        _ => false,
+    };
+    (first.carried, second.carried) = (carried && works[0], carried && works[1]);
+}
+
 impl Drive {
+    /// Controlword and target in one frame.
+    fn push_own(&mut self, cycle: Cycle, target: Target, turn: bool, out: &mut FrameBatch) {
+        let before = self.control;
+        let setpoint = self.node.setpoint(cycle, target);
+        self.control = setpoint.map(|setpoint| setpoint.control);
+        let urgent = cycle.wish == DriveWish::TorqueOff || self.control != before;
+        self.carried = setpoint.is_some_and(|Setpoint { control, target_counts }| {
+            (turn || urgent) && out.push(encode_rpdo(self.node_id, control, target_counts))
+        });
+    }
+
+    /// The controlword of a drive whose target comes in a shared frame. True when the drive is told anything new: then
+    /// the target goes with it, so that a drive is never energised with an old one.
+    fn push_control(&mut self, cycle: Cycle, target: Target, repeats: bool, out: &mut FrameBatch) -> bool {
+        let before = self.control;
+        self.control = self.node.setpoint(cycle, target).map(|setpoint| setpoint.control);
+        let urgent = cycle.wish == DriveWish::TorqueOff || self.control != before;
+        if let Some(control) = self.control
+            && (repeats || urgent)
+        {
+            out.push(encode_control(self.node_id, control));
+        }
+        urgent
+    }
+
     fn position_rad(&self) -> f64 {
         self.node.position().map_or(f64::NAN, |counts| rad_from_counts(&self.scale, counts))
     }

@@ -10,6 +10,7 @@ pub mod mit;
 pub mod object;
 pub mod sdo;
 pub mod sdo_client;
+pub mod setpoint_frames;
 pub mod words;
 
 pub use canopen::{Emcy, Nmt, NmtState, PdoEntry};

@@ -38,6 +38,8 @@ macro_rules! objects {
 }
 
 objects! {
+    /// Data type UNSIGNED32: in the mapping of an RPDO, four bytes that are skipped.
+    DUMMY_U32 = 0x0007:0;
     /// Device type, u32: profile number in the low half.
     DEVICE_TYPE = 0x1000:0;
     /// Error register, u8.

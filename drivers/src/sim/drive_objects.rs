@@ -42,6 +42,9 @@ impl Objects for Session<'_> {
             return Err(drive.refuse_writes);
         }
         pdo::check_write(&drive.dictionary, address, value)?;
+        if !drive.parameters.dummy_mapping && pdo::maps_dummy(address, value) {
+            return Err(words::ABORT_NOT_MAPPABLE);
+        }
         drive.check_write(address, value)?;
         if !matches!(address.index, 0x1003 | 0x1010 | 0x1011 | 0x2002) {
             drive.dictionary.set(address.index, address.sub, value);

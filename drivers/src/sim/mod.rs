@@ -4,9 +4,10 @@
 //! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`Rig`] the servos of an arm with faults on request, [`serve`] runs
 //! a rig on links. All but the last are pure: frames and time in, frames out.
 //!
-//! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; links have no bit
-//! rate; of the modes of operation there is only cyclic synchronous position.
+//! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; a bus with a bit rate knows no
+//! bit errors ([`wire`]); of the modes of operation there is only cyclic synchronous position.
 pub mod arguments;
+pub mod bit_time;
 mod controller;
 mod dictionary;
 mod disturbance;
@@ -28,6 +29,8 @@ mod sdo_server;
 pub mod serve;
 mod servo;
 pub mod settings;
+pub mod wire;
+mod wired;
 
 pub use controller::LoopParameters;
 pub use disturbance::Disturbance;
@@ -38,3 +41,5 @@ pub use plant::PlantParameters;
 pub use power::PowerState;
 pub use rig::Rig;
 pub use servo::{ServoParameters, SimulatedServo};
+pub use wire::{Wire, WireFacts};
+pub use wired::WiredRig;

@@ -228,6 +228,14 @@ pub(crate) fn check_write(dictionary: &Dictionary, address: Address, value: i64)
     }
 }
 
+/// True when a write puts a dummy entry (an index below 0x20 is a data type) into a mapping.
+pub(crate) fn maps_dummy(address: Address, value: i64) -> bool {
+    const DATA_TYPES_END: i64 = 0x0020_0000;
+    matches!(address.index & 0xFF00, RPDO_MAPPING | TPDO_MAPPING)
+        && address.sub != 0
+        && (1..DATA_TYPES_END).contains(&value)
+}
+
 /// A COB-ID may change only while the PDO does not exist, and never to an identifier of the protocol itself.
 fn check_cob_id(old: i64, new: i64) -> Result<(), AbortCode> {
     /// Bit 30 (no remote requests) and bits 0 to 28 (identifier).

@@ -49,8 +49,27 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     Ok(setups)
 }
 
+/// Frames that the master's side of a simulated bus with a bit rate holds, from the section's `bus_queue_frames`.
+///
+/// # Errors
+/// When it is no whole number from 1 to 4096.
+pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
+    let empty = Table::new();
+    let table = settings.simulator.as_ref().unwrap_or(&empty);
+    let joints = settings.robot.joints.len();
+    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let frames: u32 = section.whole("bus_queue_frames", 0, QUEUE_FRAMES, 1..=4096);
+    let faults = section.faults.into_inner();
+    if faults.is_empty() { Ok(frames as usize) } else { Err(Faults(faults)) }
+}
+
+/// A few cycles of a six-joint arm: enough for a burst, and an overload shows within a tenth of a second.
+const QUEUE_FRAMES: u32 = 64;
+
 /// Every key, for unknown ones to be found, and for their neighbours to be told.
-const KEYS: [&str; 29] = [
+const KEYS: [&str; 31] = [
+    "bus_queue_frames",
+    "dummy_mapping",
     "start_rad",
     "inertia_kg_m2",
     "viscous_nm_s_rad",
@@ -141,6 +160,7 @@ impl Section<'_> {
             gear_ratio: cia402.gear_ratio,
             counts_per_rev: cia402.counts_per_rev,
             zero_offset_rad: servo.zero_offset_rad,
+            dummy_mapping: self.flag("dummy_mapping", at, true),
             start_rad: self.start_rad(at, limits),
             plant,
             loops: self.loops(at),

@@ -266,10 +266,11 @@ impl Rig {
             received: [None; MAX_JOINTS],
             position_rad: HOME_RAD,
         };
-        let lost_cycles_max = settings.supervision.lost_cycles_max;
+        let lost_cycles_max = settings.lost_cycles_max();
         let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), lost_cycles_max);
         let (queues, desk) = intake::pair();
-        let core = Core::new(&settings, Buses::new(vec![bus]).unwrap(), queues, true);
+        let buses = Buses::new(vec![bus]).unwrap();
+        let core = Core::new(&settings, buses, queues, true);
         let readers = core.readers();
         Self {
             core,

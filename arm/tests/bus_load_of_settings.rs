@@ -1,0 +1,70 @@
+//! The load of the buses of settings: what is refused, what is warned of, and the ways out.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+use std::path::{Path, PathBuf};
+use taustream_arm::Settings;
+
+fn file() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml")
+}
+
+/// The shipped six servos with their bus described by `bus`.
+fn text_with(bus: &str) -> String {
+    let text = std::fs::read_to_string(file()).unwrap();
+    assert!(text.contains("virtual = true"));
+    text.replace("virtual = true", bus)
+}
+
+fn load_of(bus: &str) -> taustream_arm::BusLoad {
+    let settings = Settings::from_toml(&file(), &text_with(bus)).unwrap_or_else(|faults| panic!("{faults}"));
+    settings.bus_load(0).unwrap()
+}
+
+#[test]
+fn six_servos_at_1_khz_are_refused_on_one_classic_bus_with_what_would_do() {
+    let faults = Settings::from_toml(&file(), &text_with("bitrate_bit_s = 1000000")).unwrap_err().to_string();
+    // 143.5 % of process data, and 7 heartbeats of 65 bits every 100 ms.
+    for words in ["bus[0] = 144.0 % full in the worst case", "by 2 buses, at most 3 servos on each"] {
+        assert!(faults.contains(words), "{faults}");
+    }
+}
+
+#[test]
+fn slower_cycle_and_rarer_frames_bring_six_servos_onto_one_bus() {
+    let slower = text_with("bitrate_bit_s = 1000000").replace("period_us = 1000", "period_us = 2000");
+    let slower = Settings::from_toml(&file(), &slower).unwrap().bus_load(0).unwrap();
+    assert!((slower.percent - 71.75 - 0.455).abs() < 1e-9, "{slower:?}");
+    assert!(!slower.is_warned());
+    let packed = load_of("bitrate_bit_s = 1000000\npacked = true\nfeedback_every = 2");
+    // SYNC 55, 3 x 135, 6 x 115 / 2; heartbeats; six controlwords of 75 bits in every eighth cycle.
+    assert!((packed.percent - 80.5 - 0.455 - 5.625).abs() < 1e-9, "{packed:?}");
+    assert!(packed.is_warned() && !packed.is_refused());
+    let rare = load_of("bitrate_bit_s = 1000000\nsetpoint_every = 2\nstagger = true\nfeedback_every = 2");
+    assert!((rare.percent - 5.5 - 34.5 - 34.5 - 0.455).abs() < 1e-9, "{rare:?}");
+    assert!(rare.fullest_cycle_percent > 100.0, "all six may answer the same SYNC: {rare:?}");
+}
+
+#[test]
+fn virtual_bus_is_never_refused_but_measured_against_a_usual_one() {
+    let load = load_of("virtual = true");
+    assert!(load.is_virtual && !load.is_refused() && !load.is_warned());
+    assert!((load.percent - 143.955).abs() < 1e-9, "{load:?}");
+}
+
+#[test]
+fn ways_out_state_the_load_that_the_settings_then_have() {
+    let settings = Settings::load(&file()).unwrap();
+    let ways = settings.ways_out(0);
+    for (what, bus) in [
+        ("packed = true", "virtual = true\npacked = true"),
+        ("feedback_every = 2", "virtual = true\nfeedback_every = 2"),
+        ("setpoint_every = 2", "virtual = true\nsetpoint_every = 2"),
+        ("packed = true and feedback_every = 2", "virtual = true\npacked = true\nfeedback_every = 2"),
+    ] {
+        let way = ways.iter().find(|way| way.what == what).unwrap_or_else(|| panic!("no {what}: {ways:?}"));
+        assert!((way.percent - load_of(bus).percent).abs() < 1e-9, "{way:?}");
+    }
+    let two = ways.iter().find(|way| way.what.starts_with("2 buses")).unwrap();
+    assert!((two.percent - 74.5 - 0.26).abs() < 1e-9 && two.suffices, "{two:?}");
+    assert_eq!(settings.bus_load(7), None);
+    assert!(settings.ways_out(7).is_empty());
+}

@@ -1,0 +1,204 @@
+//! The shipped cycle, its CiA 402 drivers and local links on one side, simulated drives on the other: one thread, on
+//! simulated time, so that tens of thousands of cycles take seconds and always run the same.
+use std::path::{Path, PathBuf};
+use taustream_arm::Settings;
+use taustream_drivers::drivers;
+use taustream_drivers::link::{self, LinkChoice, LinkRole};
+use taustream_drivers::sim::settings::{drives, queue_frames};
+use taustream_drivers::sim::{Rig, WiredRig};
+use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
+use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
+use taustream_motion::{JointArray, Stroke, Trajectory};
+use taustream_streamer::buses::{Bus, Buses};
+use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
+use taustream_streamer::facts::{Asked, Decision};
+use taustream_streamer::intake::{self, Desk};
+use taustream_streamer::names::Names;
+use taustream_streamer::report::{Readers, Record};
+use taustream_streamer::tick::Tick;
+
+const PERIOD_NS: u64 = 1_000_000;
+pub(crate) const JOINTS: usize = 6;
+const HOME_RAD: [f64; JOINTS] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
+
+/// Shipped settings, with the text of the file changed before it is read.
+pub(crate) fn shipped(file: &str, edit: impl Fn(&str) -> String) -> Settings {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings").join(file);
+    let text = std::fs::read_to_string(&path).unwrap();
+    Settings::from_toml(&path, &edit(&text)).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+/// The streamer's cycle on one end of its links, simulated drives on the other.
+pub(crate) struct Arm {
+    pub(crate) core: Core,
+    pub(crate) desk: Desk,
+    pub(crate) readers: Readers,
+    pub(crate) rig: WiredRig,
+    /// The drives' ends; `None` for a bus that was pulled out.
+    pub(crate) far_ends: Vec<Option<Box<dyn CanLink>>>,
+    /// What the streamer sent in the last cycle, by bus.
+    pub(crate) sent: Vec<Vec<CanFrame>>,
+    /// Called before and after what counts.
+    pub(crate) counting: fn(bool),
+    pub(crate) settings: Settings,
+    batch: FrameBatch,
+    out: Vec<Vec<CanFrame>>,
+    runtime: PathBuf,
+    pub(crate) digest: [u8; 32],
+    pub(crate) tick: u64,
+    generation: u64,
+    pub(crate) counted: u64,
+    pub(crate) held_rad: JointArray,
+    pub(crate) visited: Vec<Phase>,
+}
+
+impl Arm {
+    /// `settings` under a runtime directory of its own. Limp joints have brakes: a limp joint falls, and the streamer
+    /// rightly refuses to enable it while it does.
+    pub(crate) fn new(name: &str, settings: Settings) -> Self {
+        let runtime = std::env::temp_dir().join(format!("taustream-{name}-{}", std::process::id()));
+        let (mut far_ends, mut buses) = (Vec::new(), Vec::new());
+        for (index, bus) in settings.buses.iter().enumerate() {
+            far_ends.push(Some(link::open(bus, LinkChoice::Local, LinkRole::Servos, &runtime).unwrap()));
+            let near_end = link::open(bus, LinkChoice::Local, LinkRole::Master, &runtime).unwrap();
+            let driver = drivers::of_bus(&settings, index).unwrap();
+            buses.push(Bus::new(near_end, Box::new(driver), settings.lost_cycles_max()));
+        }
+        let (queues, desk) = intake::pair();
+        let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, true);
+        let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
+        setups.iter_mut().for_each(|setup| setup.parameters.plant_mut().brake = true);
+        let count = settings.buses.len();
+        let queue_frames = queue_frames(&settings).unwrap_or_else(|faults| panic!("{faults}"));
+        Self {
+            readers: core.readers(),
+            core,
+            desk,
+            rig: WiredRig::new(Rig::new(setups, count, 1), &settings.buses, queue_frames),
+            far_ends,
+            sent: vec![Vec::new(); count],
+            counting: |_| {},
+            batch: FrameBatch::new(),
+            out: vec![Vec::new(); count],
+            runtime,
+            digest: settings.robot.digest,
+            settings,
+            tick: 0,
+            generation: 0,
+            counted: 0,
+            held_rad: [0.0; 8],
+            visited: Vec::new(),
+        }
+    }
+
+    pub(crate) fn now(&self) -> Nanos {
+        Nanos(self.tick * PERIOD_NS)
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        self.core.supervisor().phase()
+    }
+
+    /// One counted cycle, then the drives' turn.
+    pub(crate) fn step<P: Probe>(&mut self, probe: &mut P) {
+        self.tick += 1;
+        let now = self.now();
+        let tick = Tick { number: self.tick, deadline: now, woke: now, skipped: 0, last_cycle_ns: 1 };
+        (self.counting)(true);
+        run_cycle(&mut self.core, tick, probe);
+        (self.counting)(false);
+        self.counted += 1;
+        for (bus, far_end) in self.far_ends.iter_mut().enumerate() {
+            self.sent[bus].clear();
+            let Some(far_end) = far_end else { continue };
+            far_end.receive(&mut self.batch);
+            self.sent[bus].extend_from_slice(self.batch.frames());
+            self.rig.receive(now, bus, self.batch.frames(), &mut self.out);
+        }
+        self.rig.advance(now, &mut self.out);
+        for (far_end, out) in self.far_ends.iter_mut().zip(&mut self.out) {
+            if let Some(far_end) = far_end {
+                for chunk in out.chunks(32) {
+                    far_end.send(chunk);
+                }
+            }
+            out.clear();
+        }
+        self.rig.rig.take_events();
+        while let Some(record) = self.readers.records.pop() {
+            match record {
+                Record::Cycle(cycle) => self.held_rad = cycle.position_rad,
+                Record::Transition(t) => self.visited.push(t.to),
+                Record::Accepted { .. } | Record::Lost(_) => {}
+            }
+        }
+        while self.readers.timings.pop().is_some() {}
+        while self.readers.reports.pop().is_some() {}
+        while self.readers.notes.pop().is_some() {}
+    }
+
+    pub(crate) fn run(&mut self, cycles: u64) {
+        for _ in 0..cycles {
+            self.step(&mut NoProbe);
+        }
+    }
+
+    pub(crate) fn run_until(&mut self, phase: Phase, cycles: u64) {
+        for _ in 0..cycles {
+            if self.phase() == phase {
+                return;
+            }
+            self.step(&mut NoProbe);
+        }
+        let cause = self.core.supervisor().cause();
+        panic!("{:?} instead of {phase:?} after {cycles} cycles, cause {cause:?}", self.phase());
+    }
+
+    pub(crate) fn ask(&mut self, command: Command) {
+        assert!(self.desk.ask(Asked { sequence: self.tick, command }));
+        self.step(&mut NoProbe);
+        let answer = self.desk.answer().unwrap();
+        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
+    }
+
+    pub(crate) fn move_it(&mut self, size: f64) {
+        // Towards the middle, so that motions that were cut short do not add up to the end of a range.
+        let size = if self.held_rad[0] > 0.0 { -size } else { size };
+        let stroke = |start_s: f64, sign: f64| Stroke {
+            start_s,
+            duration_s: 1.2,
+            n: 6,
+            delta_rad: [0.9, 0.2, -0.4, 0.3, 0.2, 0.5, 0.0, 0.0].map(|d| d * size * sign),
+        };
+        let strokes = [stroke(0.0, 1.0), stroke(0.8, -0.5), stroke(1.9, 0.5), stroke(2.6, -1.0)];
+        let trajectory = Trajectory::new(JOINTS, self.held_rad, &strokes).unwrap();
+        self.generation += 1;
+        let generation = self.generation;
+        let mut empty = self.desk.empty_box().expect("boxes go round");
+        *empty = CheckedTrajectory {
+            trajectory_id: generation,
+            generation,
+            robot_digest: self.digest,
+            replaces: Replaces::Rest,
+            trajectory,
+        };
+        self.desk.offer(empty);
+        self.step(&mut NoProbe);
+        let decision = self.desk.verdict().unwrap().decision;
+        assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
+    }
+
+    pub(crate) fn enable(&mut self) {
+        self.run_until(Phase::Disabled, 8_000);
+        self.run(50);
+        self.ask(Command::Enable);
+        self.run_until(Phase::Holding, 3_000);
+        self.run(1);
+    }
+}
+
+impl Drop for Arm {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.runtime);
+    }
+}
