@@ -12,6 +12,7 @@ mod manual;
 mod offline;
 mod output;
 mod plot;
+mod view;
 mod words;
 
 use args::{Action, Cli};
@@ -56,6 +57,7 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
+        Action::Watch(args) => live::watch::run(form, settings, args),
         Action::Bench(args) => offline::bench::run(form, settings, args),
         Action::Demo(args) => demo::run(form, args),
         Action::Completions { shell } => manual::completions(form, *shell),

@@ -7,3 +7,5 @@ mod common;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
+#[path = "cli/watch.rs"]
+mod watch;

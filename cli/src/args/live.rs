@@ -90,6 +90,32 @@ pub(crate) struct RunArgs {
     pub(crate) wait: bool,
 }
 
+const WATCH_HELP: &str = "\
+Examples:
+  taustream watch                                     q or Ctrl-C leaves; the arm goes on with what it does
+  taustream watch --rate-hz 2 > arm.log               one line every half second
+  taustream watch --json | jq '.joints[2].tracking_error_rad'
+  taustream watch --json --count 1                    the next report
+
+On a terminal it is a picture with bars against the limits of the settings (NO_COLOR turns colours off), elsewhere one
+line a report, with --json one object a report, as `status` prints it. Reports that end are said, and waited for; while
+they are missing, --json prints one object with \"phase\":null and the reason.";
+
+/// `taustream watch`
+#[derive(Args, Debug)]
+#[command(after_help = WATCH_HELP)]
+pub(crate) struct WatchArgs {
+    /// Most pictures or lines a second, Hz; without it 10 on a terminal, 1 elsewhere, and every report with --json.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = rate_hz)]
+    pub(crate) rate_hz: Option<f64>,
+    /// Leave after this long, s; without it when told to.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = waiting_s)]
+    pub(crate) seconds: Option<f64>,
+    /// Leave after this many pictures or lines.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) count: Option<u64>,
+}
+
 const DEMO_HELP: &str = "\
 Examples:
   taustream demo --output /tmp/demo
@@ -122,6 +148,14 @@ fn waiting_s(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
         _ => Err("expected seconds from 0 to 86400".to_owned()),
+    }
+}
+
+/// Pictures or lines a second.
+fn rate_hz(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(hz) if (0.001..=1_000.0).contains(&hz) => Ok(hz),
+        _ => Err("expected Hz from 0.001 to 1000".to_owned()),
     }
 }
 

@@ -2,7 +2,7 @@
 mod live;
 mod offline;
 
-pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs};
+pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs};
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CostArgs, ManArgs, MotionArgs, PlanArgs, SampleArgs,
 };
@@ -94,6 +94,8 @@ pub(crate) enum Action {
     ClearFault(CommandArgs),
     /// Show what the streamer does: phase, joints, timing, bus.
     Status,
+    /// Show what the streamer does, live, until you leave it; the arm does not notice.
+    Watch(WatchArgs),
     /// Run a measurement that the documentation quotes.
     Bench(BenchArgs),
     /// Start simulated servos, streamer and planner, and go through a few moves.

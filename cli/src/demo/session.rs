@@ -11,6 +11,7 @@ use crate::live::follow::follow;
 use crate::live::replan::ask_while;
 use crate::output::{Form, note};
 use crate::plot::Sample;
+use crate::view::Scale;
 use crate::words::fault_sentence;
 use std::cell::RefCell;
 use std::thread;
@@ -59,7 +60,7 @@ impl<'a> Session<'a> {
             arm,
             client: Client::join(&arm.name)?,
             seen: RefCell::new(Seen {
-                view: View::new(form, arm, demo.goals_rad.len()),
+                view: View::new(form, arm, Scale::of(&demo.settings), demo.goals_rad.len()),
                 samples: Vec::new(),
                 first_ns: None,
                 last: None,

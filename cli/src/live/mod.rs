@@ -5,3 +5,4 @@ pub(crate) mod follow;
 pub(crate) mod replan;
 pub(crate) mod run;
 pub(crate) mod status;
+pub(crate) mod watch;

@@ -70,7 +70,7 @@ struct MotionStatus {
 
 /// What the streamer says.
 #[derive(Debug, Serialize)]
-struct Status {
+pub(crate) struct Status {
     arm: String,
     robot_digest: String,
     phase: &'static str,
@@ -81,6 +81,8 @@ struct Status {
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
     buses: Vec<BusStatus>,
+    /// Number of the report; gaps are reports that this reader missed.
+    sequence: u64,
     tick: u64,
     time_ns: u64,
     cycles: u64,
@@ -108,7 +110,7 @@ pub(crate) fn run(form: Form, arm: &ArmName) -> Result<(), Failure> {
 }
 
 impl Status {
-    fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
+    pub(crate) fn of(r: &Report, phase: Phase, arm: &ArmName) -> Self {
         let fault = (r.fault_reason != 0).then(|| FaultStatus {
             reason: r.fault_reason,
             joint: (r.fault_joint != u32::MAX).then_some(r.fault_joint),
@@ -137,6 +139,7 @@ impl Status {
             motion,
             joints: joints(r, arm),
             buses: buses(r, arm),
+            sequence: r.sequence,
             tick: r.tick,
             time_ns: r.time_ns,
             cycles: r.cycles,

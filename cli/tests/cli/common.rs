@@ -62,14 +62,23 @@ impl Scratch {
 
     /// Runs `taustream` there.
     pub(crate) fn run(&self, words: &[&str]) -> Ran {
-        let output = Command::new(env!("CARGO_BIN_EXE_taustream"))
+        Ran::of(words, self.command(words).output().expect("taustream can be started"))
+    }
+
+    /// `taustream` as it will be run there.
+    pub(crate) fn command(&self, words: &[&str]) -> Command {
+        self.program(env!("CARGO_BIN_EXE_taustream"), words)
+    }
+
+    /// Another program in the same surroundings.
+    pub(crate) fn program(&self, program: &str, words: &[&str]) -> Command {
+        let mut command = Command::new(program);
+        command
             .args(words)
             .current_dir(&self.dir)
             .env_remove("TAUSTREAM_SETTINGS")
-            .env("TAUSTREAM_CONFIG_DIR", config())
-            .output()
-            .expect("taustream can be started");
-        Ran::of(words, output)
+            .env("TAUSTREAM_CONFIG_DIR", config());
+        command
     }
 }
 
