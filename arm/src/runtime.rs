@@ -28,6 +28,12 @@ pub fn directory() -> Result<PathBuf, RuntimeError> {
     prepare(choose(asked, uid, Path::new("/run")), uid)
 }
 
+/// Where [`directory`] would be for a user, below `run` (`/run`); nothing is made or refused.
+#[must_use]
+pub fn expected(uid: u32, run: &Path) -> PathBuf {
+    choose(std::env::var_os("TAUSTREAM_RUNTIME_DIR"), uid, run)
+}
+
 /// Chooses below `run` (`/run`); nothing is made.
 fn choose(asked: Option<OsString>, uid: u32, run: &Path) -> PathBuf {
     if let Some(path) = asked.filter(|path| !path.is_empty()) {

@@ -5,6 +5,7 @@ mod angles;
 mod args;
 mod arm;
 mod demo;
+mod doctor;
 mod failure;
 mod interrupt;
 mod live;
@@ -58,6 +59,7 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Watch(args) => live::watch::run(form, settings, args),
+        Action::Doctor(args) => doctor::run(form, settings, args),
         Action::Bench(args) => offline::bench::run(form, settings, args),
         Action::Demo(args) => demo::run(form, args),
         Action::Completions { shell } => manual::completions(form, *shell),

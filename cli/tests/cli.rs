@@ -3,6 +3,8 @@
 mod bad_input;
 #[path = "cli/common.rs"]
 mod common;
+#[path = "cli/doctor.rs"]
+mod doctor;
 #[path = "cli/good_path.rs"]
 mod good_path;
 #[path = "cli/manual.rs"]

@@ -11,6 +11,7 @@
 //! guard, encoding and supervision do their full work; decoding of answers is not in the figures, since nobody answers.
 mod peers;
 mod stages;
+mod wake;
 
 use crate::buses::{Bus, Buses};
 use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
@@ -32,6 +33,7 @@ use taustream_drivers::{
 };
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+pub use wake::{Bin, WakeUps, wake_ups};
 
 /// Cycles at the start of each slice that do not count: caches fill, and a slice begins at a new grid.
 const WARM_UP: u64 = 20;
@@ -81,7 +83,7 @@ pub enum BenchError {
 }
 
 /// Quantiles of times, ns.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Quantiles {
     /// How many.
     pub count: u64,

@@ -4,7 +4,7 @@ mod offline;
 
 pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs};
 pub(crate) use offline::{
-    BenchArgs, BenchName, CheckArgs, CostArgs, ManArgs, MotionArgs, PlanArgs, SampleArgs,
+    BenchArgs, BenchName, CheckArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs, SampleArgs,
 };
 
 use clap::{Parser, Subcommand};
@@ -96,6 +96,8 @@ pub(crate) enum Action {
     Status,
     /// Show what the streamer does, live, until you leave it; the arm does not notice.
     Watch(WatchArgs),
+    /// Examine this computer: kernel, rights, CPUs, CAN interfaces, memory; measures how late it wakes the cycle up.
+    Doctor(DoctorArgs),
     /// Run a measurement that the documentation quotes.
     Bench(BenchArgs),
     /// Start simulated servos, streamer and planner, and go through a few moves.

@@ -128,6 +128,29 @@ pub(crate) struct CheckArgs {
     pub(crate) config: PathBuf,
 }
 
+const DOCTOR_HELP: &str = "\
+Examples:
+  taustream doctor                                    this computer, and the interfaces of the usual settings
+  taustream doctor --settings my-arm.toml --seconds 600
+  taustream doctor --json | jq '.findings[] | select(.grade == \"problem\")'
+
+Every finding is ok, unknown (this computer does not say), a WARNING or a PROBLEM, with its cure. Nothing is changed.
+Exit code 1 means: at least one problem.
+
+It looks at a computer, not at an arm: a clean bill is no promise that the arm is safe.";
+
+/// `taustream doctor`
+#[derive(Args, Debug)]
+#[command(after_help = DOCTOR_HELP)]
+pub(crate) struct DoctorArgs {
+    /// How long to measure wake-ups, s; 0 leaves the measurement out.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 5.0, value_parser = measuring_s)]
+    pub(crate) seconds: f64,
+    /// Priority to measure at; without it that of the settings.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub(crate) priority: Option<u8>,
+}
+
 /// `taustream man`
 #[derive(Args, Debug)]
 #[command(
@@ -174,6 +197,14 @@ pub(crate) enum BenchName {
 pub(super) fn planner_kind() -> impl TypedValueParser<Value = PlannerKind> {
     PossibleValuesParser::new(PlannerKind::ALL.map(PlannerKind::name))
         .map(|name| PlannerKind::from_name(&name).unwrap_or_default())
+}
+
+/// A time to measure: nothing, or at least what gives a few samples.
+fn measuring_s(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s == 0.0 || (0.1..=3_600.0).contains(&s) => Ok(s),
+        _ => Err("expected 0, or seconds from 0.1 to 3600".to_owned()),
+    }
 }
 
 fn waypoints(text: &str) -> Result<usize, String> {

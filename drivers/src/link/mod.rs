@@ -6,6 +6,7 @@ use crate::frame::{CanFrame, FrameBatch};
 use std::os::fd::BorrowedFd;
 
 mod batch;
+mod controller;
 pub mod error_frame;
 mod facts;
 mod local;
@@ -13,6 +14,7 @@ mod lock;
 pub mod open;
 mod socketcan;
 
+pub use controller::{Controller, ControllerState, controller};
 pub use error_frame::ErrorFrame;
 pub use open::{Holder, LinkChoice, LinkRole, OpenError, open};
 
