@@ -252,8 +252,7 @@ impl Bench {
             let joints = servos.iter().map(|s| s.joint).collect();
             let (wish, now) = (DriveWish::Disabled, Nanos(0));
             let driver = BenchDriver { servos, joints, commands: at_base, wish, now };
-            let lost_cycles_max = settings.lost_cycles_max();
-            buses.push(Bus::new(peers.master(bus)?, Box::new(driver), lost_cycles_max));
+            buses.push(Bus::new(peers.master(bus)?, Box::new(driver), settings));
         }
         let buses = Buses::new(buses).map_err(|e| BenchError::System(e.to_string()))?;
         let link = buses.describe();

@@ -5,6 +5,7 @@
 //! (`health.rs`) until its link was started over by the service thread.
 use crate::facts::{BUSES_MAX, Facts};
 use crate::health::{Health, Seen};
+use taustream_arm::Settings;
 use taustream_drivers::{
     CanId, CanLink, DriveWish, ErrorFrame, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
 };
@@ -38,14 +39,13 @@ impl std::fmt::Debug for Bus {
 }
 
 impl Bus {
-    /// A bus of which nothing was sent or heard. It fails after `lost_cycles_max` cycles in a row without all their
-    /// frames.
+    /// A bus of which nothing was sent or heard; the settings say when it has failed.
     #[must_use]
-    pub fn new(link: Box<dyn CanLink>, driver: Box<dyn ServoDriver>, lost_cycles_max: u32) -> Self {
+    pub fn new(link: Box<dyn CanLink>, driver: Box<dyn ServoDriver>, settings: &Settings) -> Self {
         Self {
             link: Some(link),
             driver,
-            health: Health::new(lost_cycles_max),
+            health: Health::new(settings),
             outgoing: FrameBatch::new(),
             incoming: FrameBatch::new(),
             syncs: 0,

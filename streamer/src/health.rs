@@ -4,16 +4,40 @@
 //! drives have stopped where their own watchdogs left them while the other buses went on along the path, so the first
 //! setpoint after an outage would be a step, and whatever still waits in a queue is old. Only torque off is still tried.
 use crate::facts::BusFacts;
+use taustream_arm::Settings;
 use taustream_drivers::{ErrorFrame, LinkFault};
 use taustream_messages::BusTrouble;
 
-/// Longest history of what was sent, in cycles: the most that `lost_cycles_max` can ask for is cut to it.
+/// Longest history of what was sent, in cycles: a longer wait for confirmations is cut to it.
 const CYCLES_MAX: usize = 64;
+
+/// What a bus is forgiven.
+#[derive(Clone, Copy, Debug)]
+struct Tolerance {
+    /// Cycles in a row of which frames were lost.
+    lost_cycles: u32,
+    /// Cycles that a frame may take until it is seen on the wire.
+    unconfirmed_cycles: usize,
+}
+
+impl Tolerance {
+    /// From the settings. A bus that does not acknowledge must be told as such before its silence shows as late
+    /// feedback, and one that is late by less than feedback may be is none: so half of that.
+    fn of(settings: &Settings) -> Self {
+        let (cycle, rules) = (&settings.cycle, &settings.supervision);
+        let cycles = rules.feedback_age_s_max * 0.5e6 / f64::from(cycle.period_us.max(1));
+        let most = CYCLES_MAX - 1;
+        let unconfirmed = (1..most).find(|n| u32::try_from(*n).is_ok_and(|n| f64::from(n) >= cycles));
+        let lost_cycles = settings.lost_cycles_max().max(1);
+        let least = usize::try_from(lost_cycles).unwrap_or(most);
+        Self { lost_cycles, unconfirmed_cycles: unconfirmed.unwrap_or(most).max(least).min(most) }
+    }
+}
 
 /// What is remembered of one bus.
 #[derive(Debug)]
 pub(crate) struct Health {
-    lost_cycles_max: u32,
+    tolerance: Tolerance,
     lost_in_a_row: u32,
     failed: Option<BusTrouble>,
     passive: bool,
@@ -36,10 +60,14 @@ pub(crate) struct Seen {
 }
 
 impl Health {
-    /// A bus of which nothing was sent or heard; `lost_cycles_max` in a row make it fail.
-    pub(crate) fn new(lost_cycles_max: u32) -> Self {
+    /// A bus of which nothing was sent or heard.
+    pub(crate) fn new(settings: &Settings) -> Self {
+        Self::with(Tolerance::of(settings))
+    }
+
+    fn with(tolerance: Tolerance) -> Self {
         Self {
-            lost_cycles_max: lost_cycles_max.max(1),
+            tolerance,
             lost_in_a_row: 0,
             failed: None,
             passive: false,
@@ -63,7 +91,7 @@ impl Health {
 
     /// The link was started over: what was lost, unconfirmed or told by its controller is history.
     pub(crate) fn start_over(&mut self) {
-        let fresh = Self::new(self.lost_cycles_max);
+        let fresh = Self::with(self.tolerance);
         *self = Self { newest_error: self.newest_error, error_frames: self.error_frames, ..fresh };
     }
 
@@ -94,7 +122,7 @@ impl Health {
         let complete = found.sent == found.wanted;
         self.lost_in_a_row = if complete { 0 } else { self.lost_in_a_row.saturating_add(1) };
         // What was sent so many cycles ago and is not confirmed now is as good as lost.
-        let depth = usize::try_from(self.lost_cycles_max).unwrap_or(CYCLES_MAX).clamp(1, CYCLES_MAX - 1);
+        let depth = self.tolerance.unconfirmed_cycles;
         self.slot = (self.slot + 1) % CYCLES_MAX;
         self.history[self.slot] = self.sent;
         let overdue = self.history[(self.slot + CYCLES_MAX - depth) % CYCLES_MAX] > confirmed;
@@ -118,7 +146,7 @@ impl Health {
     /// Before drives are energised nothing depends on a cycle: drives that have no power yet do not acknowledge, and
     /// waiting for them is no fault.
     fn is_lost(&self, seen: Seen) -> bool {
-        seen.live && self.lost_in_a_row >= self.lost_cycles_max
+        seen.live && self.lost_in_a_row >= self.tolerance.lost_cycles
     }
 
     /// The first trouble is the one to report, unless a later one says more: a lost interface hides behind a full queue.

@@ -92,7 +92,7 @@ fn open_buses(settings: &Settings, choice: LinkChoice) -> Result<Buses> {
     for (index, bus) in settings.buses.iter().enumerate() {
         let link = link::open(bus, choice, LinkRole::Master, &runtime)?;
         let driver = drivers::of_bus(settings, index)?;
-        buses.push(Bus::new(link, Box::new(driver), settings.lost_cycles_max()));
+        buses.push(Bus::new(link, Box::new(driver), settings));
     }
     Ok(Buses::new(buses)?)
 }

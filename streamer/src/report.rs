@@ -217,7 +217,8 @@ impl Reporter {
         judged: (&Supervisor, &Orders),
     ) {
         let (supervisor, orders) = judged;
-        self.count(facts);
+        let stalls = self.stalls_now(facts);
+        self.count(facts, stalls);
         let joints = self.reached_rad.iter_mut().zip(&facts.commanded_rad).zip(&facts.out_of_reach);
         for ((reached_rad, commanded_rad), out_of_reach) in joints {
             if !out_of_reach {
@@ -241,13 +242,13 @@ impl Reporter {
         }
     }
 
-    fn count(&mut self, facts: &Facts) {
+    fn count(&mut self, facts: &Facts, stalls: bool) {
         let c = &mut self.counts;
         c.cycles += 1;
         c.cycles_skipped += facts.tick.skipped;
         c.cycles_late += u64::from(facts.tick.lateness_ns() > self.period_ns / 2);
         c.guard_trips += u64::from(facts.trip.is_some());
-        c.stalls += u64::from(facts.frozen && !self.frozen_before);
+        c.stalls += u64::from(stalls);
         for (found, bus) in facts.buses.iter().zip(&mut c.buses) {
             let lost = u64::from(lost_frames(found));
             bus.frames_sent += u64::from(found.sent);
@@ -259,6 +260,11 @@ impl Reporter {
             c.frames_lost += lost;
             c.frames_received += u64::from(found.received);
         }
+    }
+
+    /// The trajectory begins to stand still because the loop was late; a failed bus is told as what it is.
+    fn stalls_now(&self, facts: &Facts) -> bool {
+        facts.frozen && !self.frozen_before && facts.failed_bus().is_none()
     }
 
     /// Notes what a controller tells: at once when it is new, else once a second with its count, so that a flood of error
@@ -289,7 +295,7 @@ impl Reporter {
             let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad });
         }
         self.note_buses(facts);
-        if facts.frozen && !self.frozen_before {
+        if self.stalls_now(facts) {
             let _ = self.queues.notes.push(Note::Stall { gap_s: facts.gap_s });
         }
         self.frozen_before = facts.frozen;

@@ -1,10 +1,11 @@
 //! Scenarios over the real processes on a real vcan0: the machine they run in and what judges their recordings.
 //!
 //! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`stage`] starts the real processes
-//! for one of the [`scenarios`]. [`candump`] reads what an independent recorder saw on the bus, [`cycle_log`] what the
+//! for one of the [`scenarios`] and [`bus_scenarios`]. [`candump`] reads what an independent recorder saw on the bus, [`cycle_log`] what the
 //! streamer claims, and [`setpoints`] judges the one by the other.
 #![forbid(unsafe_code)]
 
+pub mod bus_scenarios;
 pub mod candump;
 pub mod cycle_log;
 pub mod machine;

@@ -107,6 +107,16 @@ pub enum Flaw {
     },
 }
 
+/// Whether cycles may be lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Losses {
+    /// Every cycle of the log is on the bus, whole.
+    None,
+    /// Cycles of which the log says that the bus took only a part, or nothing, are so on the bus. That nothing is on the
+    /// bus beyond what the log claims holds all the more.
+    AsLogged,
+}
+
 /// Judges one bus of a recording that began before the first SYNC.
 ///
 /// # Errors
@@ -114,6 +124,19 @@ pub enum Flaw {
 pub fn judge(
     frames: &[BusFrame],
     log: &[Event],
+    bus: usize,
+    encodings: &[Encoding],
+) -> Result<Verdict, Flaw> {
+    judge_with(Losses::None, (frames, log), bus, encodings)
+}
+
+/// Judges one bus of a recording in which cycles may have been lost.
+///
+/// # Errors
+/// The first flaw.
+pub fn judge_with(
+    losses: Losses,
+    (frames, log): (&[BusFrame], &[Event]),
     bus: usize,
     encodings: &[Encoding],
 ) -> Result<Verdict, Flaw> {
@@ -132,9 +155,23 @@ pub fn judge(
                 verdict.trajectories += 1;
             }
             Event::Cycle(cycle) => {
-                follows(last, cycle, bus)?;
-                verdict.setpoints += compare_bus(&on_bus, cycle, bus, encodings, &mut claimed)?;
+                let whole = is_whole(cycle, bus);
+                if !whole && losses == Losses::None {
+                    return Err(Flaw::Log(format!(
+                        "tick {}: frames lost on bus {bus}: {:?}",
+                        cycle.tick, cycle.lost
+                    )));
+                }
                 verdict.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                if is_lost(cycle, bus) {
+                    continue; // Nothing of it left: the next cycle takes its place.
+                }
+                follows(last, cycle, bus)?;
+                if whole {
+                    verdict.setpoints += compare_bus(&on_bus, cycle, bus, encodings, &mut claimed)?;
+                } else {
+                    verdict.setpoints += compare_rest(&on_bus, cycle, bus, encodings, &mut claimed)?;
+                }
                 last = Some(cycle);
             }
         }
@@ -194,9 +231,6 @@ fn target(data: &[u8]) -> Option<i32> {
 
 fn follows(last: Option<&Cycle>, cycle: &Cycle, bus: usize) -> Result<(), Flaw> {
     let flaw = |what: String| Err(Flaw::Log(format!("tick {}: {what}", cycle.tick)));
-    if cycle.lost.get(bus) != Some(&0) {
-        return flaw(format!("frames lost on bus {bus}: {:?}", cycle.lost));
-    }
     let Some(last) = last else { return Ok(()) };
     if cycle.tick <= last.tick || cycle.time_ns <= last.time_ns {
         return flaw(format!("does not come after tick {}", last.tick));
@@ -208,6 +242,44 @@ fn follows(last: Option<&Cycle>, cycle: &Cycle, bus: usize) -> Result<(), Flaw> 
         return flaw(format!("trajectory time went back from {} to {}", last.s, cycle.s));
     }
     Ok(())
+}
+
+/// All frames of the cycle were taken, and there were some.
+fn is_whole(cycle: &Cycle, bus: usize) -> bool {
+    cycle.lost.get(bus) == Some(&0) && !is_lost(cycle, bus)
+}
+
+/// No frame of the cycle was taken.
+fn is_lost(cycle: &Cycle, bus: usize) -> bool {
+    cycle.sent.get(bus).is_none_or(|sent| *sent == 0)
+}
+
+/// Compares what is left of a cycle that was lost in part: its SYNC, if that left, and the setpoints behind it.
+fn compare_rest(
+    on_bus: &[Vec<(u8, Vec<u8>)>],
+    cycle: &Cycle,
+    bus: usize,
+    encodings: &[Encoding],
+    claimed: &mut [bool],
+) -> Result<usize, Flaw> {
+    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
+    let flaw = |what: String| Flaw::Bus { sync, tick: cycle.tick, what };
+    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
+    let sent = at.and_then(|at| on_bus.get(at)).ok_or_else(|| flaw("is not on the bus".into()))?;
+    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
+        *slot = true;
+    }
+    for (node, data) in sent.iter().filter(|(_, data)| follows_target(data)) {
+        let encoding = encodings.iter().find(|e| e.node_id == *node);
+        let wish = encoding.and_then(|e| Some(e.counts(*cycle.position_rad.get(e.joint)?)));
+        if target(data) != wish {
+            return Err(flaw(format!(
+                "node {node} got target {:?}, the setpoint encodes to {wish:?}",
+                target(data)
+            )));
+        }
+    }
+    Ok(sent.len())
 }
 
 fn compare_bus(

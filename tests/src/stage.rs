@@ -9,7 +9,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use taustream_arm::Settings;
 use taustream_messages::service::{ReportSubscriber, Wire};
-use taustream_messages::{Phase, Report};
+use taustream_messages::{FaultReason, Phase, Report};
 
 /// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it judges no speed.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -157,11 +157,11 @@ impl Stage {
         let dir = place.output.join(scenario);
         fs::create_dir_all(&dir)?;
         let settings = Settings::load(&place.settings)?;
-        let bus = settings.buses.first().context("the settings have no bus")?.interface.clone();
         let settings_arg = place.settings.to_str().context("the settings' path is not UTF-8")?;
         let program = |name: &str| place.programs.join(name);
 
-        let candump_args = ["-L", "-r", "33554432", bus.as_str()];
+        // "any" goes on recording when an interface is deleted and made anew.
+        let candump_args = ["-L", "-r", "33554432", "any"];
         let candump = Process::start(Path::new("candump"), &candump_args, &dir, "candump")?;
         let simulator_args =
             ["--settings", settings_arg, "--link", "socketcan", "--start-rad", &place.start_rad];
@@ -199,6 +199,18 @@ impl Stage {
     #[must_use]
     pub fn dir(&self) -> &Path {
         &self.dir
+    }
+
+    /// Runs a program of the machine, its words separated by blanks.
+    ///
+    /// # Errors
+    /// When it fails; with what it said.
+    pub fn run(&self, program: &str, words: &str) -> Result<()> {
+        let output = Command::new(program).args(words.split(' ')).output();
+        let output = output.with_context(|| format!("cannot start {program}"))?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "{program} {words}: {}: {said}", output.status);
+        Ok(())
     }
 
     /// Starts the planner again, as a service manager would.
@@ -395,6 +407,16 @@ impl Stage {
             println!("       (the host stalled the machine: {} stalls so far; resuming)", report.stalls);
             self.cli_done(&["resume"])?;
         }
+    }
+
+    /// Whether the host held the machine up: the streamer counted stalls, or hears from no joint in time (the simulator
+    /// is held up with the rest, a fault of the arm concerns one joint or one bus).
+    pub fn was_stalled(&mut self) -> bool {
+        let limit_s = self.settings.supervision.feedback_age_s_max;
+        let Ok((report, _)) = self.report() else { return false };
+        let all_late = report.feedback_age_s.iter().take(report.joints()).all(|age_s| *age_s > limit_s);
+        let bus_well = report.buses().iter().all(|bus| bus.trouble == 0);
+        report.stalls > 0 || (all_late && bus_well) || report.fault() == Some(FaultReason::Stall)
     }
 
     /// Ends everything in order and leaves the recording: the candump text and the path of the cycle log.

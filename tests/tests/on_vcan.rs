@@ -2,7 +2,7 @@
 //!
 //! Runs in the vcan machine alone: `cargo test -p taustream-tests --test on_vcan --no-run`, then
 //! `vcan-machine -- BINARY`. Elsewhere every test fails and says so: a missing vcan is never skipped over.
-#![expect(clippy::panic, clippy::unwrap_used, reason = "a test ends by panicking")]
+#![expect(clippy::expect_used, clippy::panic, clippy::unwrap_used, reason = "a test ends by panicking")]
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -163,6 +163,114 @@ fn socketcan_stale_error_after_link_up_is_no_fault() {
         frames.extend(receive_all(servos.as_mut(), 2 - frames.len()));
         assert_eq!(frames, [numbered(round), numbered(round + 1)], "round {round}");
     }
+}
+
+/// Interfaces that hand a frame back when it was on the wire, as controllers do: vcan with `echo=1`. Every vcan of the
+/// machine is made anew for it, and again at the end.
+struct EchoingVcan(Vcan);
+
+impl EchoingVcan {
+    fn new(interface: &str) -> Self {
+        require_machine();
+        Self::load("vcan echo=1");
+        Self(Vcan::new(interface))
+    }
+    fn load(words: &str) {
+        run("modprobe", "-r vcan");
+        run("modprobe", words);
+    }
+}
+
+impl Drop for EchoingVcan {
+    fn drop(&mut self) {
+        for words in ["-r vcan", "vcan"] {
+            let _ = Command::new("modprobe").args(words.split(' ')).status();
+        }
+        for words in ["link add dev vcan0 type vcan", "link set vcan0 mtu 72", "link set vcan0 up"] {
+            for interface in ["vcan0", "vcan1"] {
+                let _ = Command::new("ip").args(words.replace("vcan0", interface).split(' ')).status();
+            }
+        }
+    }
+}
+
+/// Receives until so many own frames are confirmed, or a second has passed; nothing else may come.
+fn await_confirmed(link: &mut dyn CanLink, count: u64) -> u64 {
+    let mut batch = FrameBatch::new();
+    for _ in 0..1000 {
+        assert_eq!(link.receive(&mut batch), None);
+        assert!(batch.frames().is_empty(), "its own frames reach the master: {:?}", batch.frames());
+        if link.confirmed() >= Some(count) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    link.confirmed().unwrap()
+}
+
+/// Goal: a frame counts as confirmed when it was on the wire, not when it was queued; on an interface without an echo
+/// of its own, at once; and a servos' end, which needs none, has none.
+#[test]
+fn socketcan_frames_are_confirmed_when_they_were_on_the_wire() {
+    let frames: Vec<CanFrame> = (0..7).map(numbered).collect();
+    {
+        let vcan = Vcan::new("plain");
+        let (mut master, servos) = vcan.pair();
+        assert_eq!((master.confirmed(), servos.confirmed()), (Some(0), None));
+        assert_eq!(master.send(&frames).count, 7);
+        assert_eq!(await_confirmed(master.as_mut(), 7), 7);
+    }
+    let vcan = EchoingVcan::new("echo");
+    let (mut master, mut servos) = vcan.0.pair();
+    run("tc", "qdisc add dev echo root netem delay 300ms limit 100");
+    assert_eq!(master.send(&frames).count, 7);
+    let mut batch = FrameBatch::new();
+    assert_eq!(master.receive(&mut batch), None);
+    assert_eq!(master.confirmed(), Some(0), "confirmed before it was on the wire");
+    assert_eq!(await_confirmed(master.as_mut(), 7), 7);
+    assert_eq!(receive_all(servos.as_mut(), 7), frames);
+}
+
+/// Goal: what still waits in a queue after a fault never reaches a drive behind our back: a link is not started over
+/// before it has left, or was dropped by taking the interface down, which is the cure that the refusal names.
+#[test]
+fn socketcan_is_not_reopened_while_old_frames_wait_and_down_drops_them() {
+    let vcan = EchoingVcan::new("stale");
+    let (mut master, mut servos) = vcan.0.pair();
+    // One frame in a second or so, of those that a burst of two has left; netem would not do, for it disowns its frames.
+    run("tc", "qdisc add dev stale root tbf rate 100bit burst 32 limit 3200");
+    assert_eq!(master.send(&[1, 2, 3, 4, 5, 6].map(numbered)).count, 6);
+    let Err(refusal) = master.reopen() else { panic!("reopened over frames that wait") };
+    let cure = "ip link set stale down && ip link set stale up";
+    assert!(refusal.to_string().contains(cure), "{refusal}");
+    ip("link set stale down");
+    assert!(master.reopen().is_err(), "reopened on an interface that is down");
+    ip("link set stale up");
+    run("tc", "qdisc del dev stale root");
+    master.reopen().unwrap_or_else(|error| panic!("the queue was not dropped: {error}"));
+    assert_eq!(master.confirmed(), Some(0));
+    assert_eq!(master.send(&[numbered(9)]).fault, None);
+    let mut batch = FrameBatch::new();
+    let mut seen = Vec::new();
+    for _ in 0..100 {
+        // The first call may tell of the time when the interface was down.
+        let _told = servos.receive(&mut batch);
+        seen.extend_from_slice(batch.frames());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let first = seen.iter().position(|frame| *frame == numbered(9)).expect("the new frame");
+    assert!(first <= 2 && seen.len() == first + 1, "old frames were still sent: {seen:?}");
+}
+
+/// Goal: closing the socket alone drops nothing that waits: this is why reopening has to look first.
+#[test]
+fn socketcan_closed_with_frames_in_the_queue_still_sends_them() {
+    let vcan = EchoingVcan::new("closed");
+    let (mut master, mut servos) = vcan.0.pair();
+    run("tc", "qdisc add dev closed root netem delay 200ms limit 100");
+    assert_eq!(master.send(&[numbered(5)]).count, 1);
+    drop(master);
+    assert_eq!(receive_all(servos.as_mut(), 1), [numbered(5)]);
 }
 
 /// Goal: everything that a controller tells of itself reaches the master as error frames; lost arbitration and bare bus

@@ -33,7 +33,9 @@ pub(crate) fn run() -> Result<ExitCode> {
     }
     let programs = workspace::target(&root).join("debug");
     links_on_vcan(&root, &programs)?;
-    independent_master_on_vcan(&root, &programs)?;
+    let python = python_with_peers(&root)?;
+    independent_master_on_vcan(&root, &programs, &python)?;
+    independent_devices_on_vcan(&root, &programs, &python)?;
     scenarios_on_vcan(&root, &programs)?;
     figures_on_vcan(&root, &programs)?;
     println!("\nTEST OK: everything passed, nothing was skipped, {:.0} s", since.elapsed().as_secs_f64());
@@ -87,15 +89,32 @@ fn links_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     perform("links on a real vcan0", &mut command)
 }
 
-/// Somebody else's CANopen master, in pinned versions, drives the simulated drives.
-fn independent_master_on_vcan(root: &Path, programs: &Path) -> Result<()> {
-    let (target, peers) = (workspace::target(root), root.join("tests/peers"));
-    let venv = target.join("venv");
-    perform("a place for the independent master", Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
+/// A Python that has the independent peers, in pinned versions.
+fn python_with_peers(root: &Path) -> Result<PathBuf> {
+    let venv = workspace::target(root).join("venv");
+    perform("a place for independent peers", Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
     let python = venv.join("bin/python");
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"]);
-    perform("the independent master from PyPI", install.arg(peers.join("requirements.txt")))?;
+    let list = root.join("tests/peers/requirements.txt");
+    perform("independent peers from PyPI", install.arg(list))?;
+    Ok(python)
+}
+
+/// Somebody else's CANopen devices are brought up and moved by our own programs.
+fn independent_devices_on_vcan(root: &Path, programs: &Path, python: &Path) -> Result<()> {
+    let (target, peers) = (workspace::target(root), root.join("tests/peers"));
+    let words = machine(programs, &target.join("peers"))?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command.args(rest).arg(python).arg(peers.join("durand_drives.py")).arg(programs);
+    command.arg(peers.join("durand.toml")).current_dir(root);
+    perform("independent CANopen devices on a real vcan0", &mut command)
+}
+
+/// Somebody else's CANopen master drives the simulated drives.
+fn independent_master_on_vcan(root: &Path, programs: &Path, python: &Path) -> Result<()> {
+    let (target, peers) = (workspace::target(root), root.join("tests/peers"));
     let words = machine(programs, &target.join("peers"))?;
     let (program, rest) = words.split_first().context("no program to run")?;
     let mut command = Command::new(program);

@@ -44,7 +44,8 @@ pub enum Trouble {
 }
 
 impl Trouble {
-    const ALL: [Self; 16] = [
+    /// Every finding.
+    pub const ALL: [Self; 16] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,

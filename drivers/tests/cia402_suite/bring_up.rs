@@ -1,5 +1,5 @@
 //! Bring-up of drives: what is asked, what is refused, and what an energised drive keeps.
-use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, frame, hex, settings};
+use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, SWITCH_ON_DISABLED, frame, hex, settings};
 use taustream_arm::Reaction;
 use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::{DriveState, DriveWish, ServoDriver};
@@ -177,6 +177,62 @@ fn bring_up_of_a_drive_that_answers_for_another_object_is_refused_naming_the_ask
         assert!(words.starts_with(&format!("object 0x{:04X}:{:02}: ", object.0, object.1)), "{words}");
         assert!(words.contains("no SDO answer in time"), "{words}");
     }
+}
+
+/// Goal: a node that answers under another's id is as good as absent, and the other comes up as what it is: with its own
+/// position, its own state, and nothing energised that did not answer for itself.
+#[test]
+fn bring_up_of_a_node_that_answers_for_another_leaves_it_absent_and_the_other_whole() {
+    let mut bench = Bench::new(3);
+    let other = bench.drives[0].id;
+    bench.drives[1].answers_as = Some(other);
+    bench.steps(4_000);
+    assert_eq!(bench.states(), [DriveState::Disabled, DriveState::Absent, DriveState::Disabled]);
+    let words = bench.driver.explain(bench.status(1).error_code);
+    assert!(words.contains("does not answer"), "{words}");
+    let at = |bench: &Bench, joint: usize| bench.heard[joint].map(|(_, counts)| counts);
+    assert_eq!(at(&bench, 0), Some(bench.drives[0].position), "the position is another node's");
+    assert!(
+        bench.drives[1].seen.iter().all(|f| f.id().raw() != 0),
+        "a node that never answered was reset or started"
+    );
+    bench.wish = DriveWish::Enabled;
+    bench.steps(500);
+    assert_eq!(bench.status(1).state, DriveState::Absent);
+    assert_eq!(bench.drives[1].status, SWITCH_ON_DISABLED);
+}
+
+/// Goal: after a bus was lost nothing is taken for granted: until each drive was looked at again, only questions leave, and
+/// one that is found energised is left as it is.
+#[test]
+fn starting_over_asks_before_it_changes_anything() {
+    let mut bench = Bench::new(2);
+    bench.until(DriveState::Disabled, 2_000);
+    for (joint, command) in bench.commands.iter_mut().enumerate().take(2) {
+        command.position_rad = bench.driver.status(joint).position_rad;
+    }
+    bench.wish = DriveWish::Enabled;
+    bench.until(DriveState::Enabled, 500);
+    // While the bus was away one drive was switched off by its own watchdog; the other holds.
+    bench.drives[1].status = SWITCH_ON_DISABLED;
+    bench.drives.iter_mut().for_each(|drive| drive.obeys = false);
+    bench.wish = DriveWish::Disabled;
+    bench.driver.start_over();
+    assert_eq!(bench.states(), [DriveState::Absent, DriveState::Absent]);
+    assert!(
+        bench.status(0).position_rad.is_nan() && bench.status(0).received.is_none(),
+        "old feedback counts"
+    );
+    for _ in 0..90 {
+        bench.step();
+        let is_question =
+            |f: &taustream_drivers::CanFrame| f.id().raw() == 0x77F || f.data().first() == Some(&0x40);
+        assert!(bench.sent.iter().all(is_question), "in cycle {}: {:?}", bench.ms, bench.sent);
+    }
+    bench.drives[1].obeys = true;
+    bench.steps(2_000);
+    assert_eq!(bench.states(), [DriveState::EnergisedUnowned, DriveState::Disabled]);
+    assert_eq!(bench.drives[0].status & 0x6F, 0x27, "the drive that holds was touched");
 }
 
 /// Goal: a drive slower than one request's time-out, but not than all its tries, comes up with the right mapping.

@@ -9,8 +9,9 @@ use taustream_drivers::{
     CanFrame, CanId, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 
-mod alloc;
 mod bring_up;
+#[path = "../counting/mod.rs"]
+mod counting;
 mod encoding;
 mod frames;
 mod operation;
@@ -18,7 +19,7 @@ mod properties;
 mod scripted;
 mod sdo_client;
 
-pub(crate) use alloc::{CountingAllocator, allocations};
+pub(crate) use counting::{CountingAllocator, allocations};
 pub(crate) use scripted::{
     ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, Scripted, frame, hex,
 };

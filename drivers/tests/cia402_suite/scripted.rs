@@ -41,6 +41,8 @@ pub(crate) struct Scripted {
     pub(crate) segments: bool,
     /// Requests for this object are answered under the name of the next one.
     pub(crate) misnamed: Option<(u16, u8)>,
+    /// Everything that it sends stands under the node id of another.
+    pub(crate) answers_as: Option<u8>,
     /// Time that an SDO answer takes.
     pub(crate) answer_ms: u64,
     /// Answers on their way, with the time at which they come.
@@ -74,6 +76,7 @@ impl Scripted {
             obeys: true,
             segments: false,
             misnamed: None,
+            answers_as: None,
             answer_ms: 0,
             late: Vec::new(),
             ms: 0,
@@ -89,6 +92,10 @@ impl Scripted {
 
     fn me(&self, base: u16) -> u16 {
         base + u16::from(self.id)
+    }
+
+    fn mine(&self, base: u16) -> u16 {
+        base + u16::from(self.answers_as.unwrap_or(self.id))
     }
 
     pub(crate) fn take(&mut self, sent: &CanFrame, out: &mut Vec<CanFrame>) {
@@ -127,7 +134,7 @@ impl Scripted {
     pub(crate) fn boot(&mut self, out: &mut Vec<CanFrame>) {
         self.nmt = 0x7F;
         self.heartbeat_ms = 0;
-        out.push(frame(self.me(0x700), &[0x00]));
+        out.push(frame(self.mine(0x700), &[0x00]));
     }
 
     fn release(&mut self, out: &mut Vec<CanFrame>) {
@@ -139,7 +146,7 @@ impl Scripted {
         self.ms = ms;
         self.release(out);
         if self.heartbeat_ms > 0 && ms.is_multiple_of(self.heartbeat_ms) && !self.silent {
-            out.push(frame(self.me(0x700), &[self.nmt]));
+            out.push(frame(self.mine(0x700), &[self.nmt]));
         }
     }
 
@@ -154,7 +161,7 @@ impl Scripted {
             }
         }
         let ([a, b], [c, d, e, f]) = (self.status.to_le_bytes(), self.position.to_le_bytes());
-        out.push(frame(self.me(0x180), &[a, b, c, d, e, f]));
+        out.push(frame(self.mine(0x180), &[a, b, c, d, e, f]));
     }
 
     fn obey(&mut self, control: u16) {
@@ -172,7 +179,7 @@ impl Scripted {
     }
 
     fn sdo(&mut self, data: &[u8], out: &mut Vec<CanFrame>) {
-        let reply = self.me(0x580);
+        let reply = self.mine(0x580);
         let (index, sub) = (u16::from_le_bytes([data[1], data[2]]), data[3]);
         let number = u32::from_le_bytes(data[4..8].try_into().unwrap());
         let wrong = u8::from(self.misnamed == Some((index, sub)));

@@ -38,12 +38,14 @@ pub(crate) struct Arm {
     pub(crate) far_ends: Vec<Option<Box<dyn CanLink>>>,
     /// What the streamer sent in the last cycle, by bus.
     pub(crate) sent: Vec<Vec<CanFrame>>,
-    /// Called before and after what counts.
-    pub(crate) counting: fn(bool),
+    /// Runs a cycle, and says how often it called the allocator, where that is counted.
+    pub(crate) around: fn(&mut dyn FnMut()) -> usize,
+    /// The sum of it.
+    pub(crate) calls: usize,
     pub(crate) settings: Settings,
     batch: FrameBatch,
     out: Vec<Vec<CanFrame>>,
-    runtime: PathBuf,
+    pub(crate) runtime: PathBuf,
     pub(crate) digest: [u8; 32],
     pub(crate) tick: u64,
     generation: u64,
@@ -62,7 +64,7 @@ impl Arm {
             far_ends.push(Some(link::open(bus, LinkChoice::Local, LinkRole::Servos, &runtime).unwrap()));
             let near_end = link::open(bus, LinkChoice::Local, LinkRole::Master, &runtime).unwrap();
             let driver = drivers::of_bus(&settings, index).unwrap();
-            buses.push(Bus::new(near_end, Box::new(driver), settings.lost_cycles_max()));
+            buses.push(Bus::new(near_end, Box::new(driver), &settings));
         }
         let (queues, desk) = intake::pair();
         let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, true);
@@ -77,7 +79,11 @@ impl Arm {
             rig: WiredRig::new(Rig::new(setups, count, 1), &settings.buses, queue_frames),
             far_ends,
             sent: vec![Vec::new(); count],
-            counting: |_| {},
+            around: |cycle| {
+                cycle();
+                0
+            },
+            calls: 0,
             batch: FrameBatch::new(),
             out: vec![Vec::new(); count],
             runtime,
@@ -104,9 +110,10 @@ impl Arm {
         self.tick += 1;
         let now = self.now();
         let tick = Tick { number: self.tick, deadline: now, woke: now, skipped: 0, last_cycle_ns: 1 };
-        (self.counting)(true);
-        run_cycle(&mut self.core, tick, probe);
-        (self.counting)(false);
+        let core = &mut self.core;
+        self.calls += (self.around)(&mut || {
+            run_cycle(core, tick, probe);
+        });
         self.counted += 1;
         for (bus, far_end) in self.far_ends.iter_mut().enumerate() {
             self.sent[bus].clear();

@@ -266,8 +266,7 @@ impl Rig {
             received: [None; MAX_JOINTS],
             position_rad: HOME_RAD,
         };
-        let lost_cycles_max = settings.lost_cycles_max();
-        let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), lost_cycles_max);
+        let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), &settings);
         let (queues, desk) = intake::pair();
         let buses = Buses::new(vec![bus]).unwrap();
         let core = Core::new(&settings, buses, queues, true);

@@ -1,14 +1,14 @@
 //! Runs every scenario on a real vcan0 and judges every recording. Meant to run inside the test machine.
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Error, Result, anyhow, bail, ensure};
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 use taustream_arm::Settings;
-use taustream_tests::scenarios::{ALL, Goals, Scenario};
-use taustream_tests::setpoints::{BusFrame, Encoding, Verdict, judge};
+use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
+use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
 use taustream_tests::stage::{Place, Stage};
-use taustream_tests::{candump, cycle_log};
+use taustream_tests::{bus_scenarios, candump, cycle_log};
 
 /// Runs the scenarios over the real processes on a real vcan0.
 #[derive(Parser, Debug)]
@@ -47,7 +47,8 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let bus = settings.buses.first().context("the settings have no bus")?;
     let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
     ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
-    let chosen: Vec<&Scenario> = ALL.iter().filter(|s| s.name.contains(&arguments.only)).collect();
+    let all = scenarios::ALL.iter().chain(bus_scenarios::ALL);
+    let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
     let mut failed = 0;
     for scenario in &chosen {
@@ -69,46 +70,64 @@ fn run(arguments: &Arguments) -> Result<usize> {
     Ok(failed)
 }
 
+/// A scenario that did not end well.
+struct Failed {
+    error: Error,
+    /// The host held the machine up: the streamer's own counters say so.
+    stalled: bool,
+}
+
+impl From<Error> for Failed {
+    fn from(error: Error) -> Self {
+        Self { error, stalled: false }
+    }
+}
+
 /// Tries a scenario again, aloud, when the host held the whole machine up: the arm then pauses or faults, as it must,
 /// and the scenario's own event never comes. A fault of the product comes back in every try.
 fn perform_with_patience(scenario: &Scenario, place: &Place, goals: &Goals) -> Result<Verdict> {
     for attempt in 1..TRIES {
-        let folder = format!("{}-{attempt}", scenario.name);
-        match perform(scenario, place, goals, &folder) {
-            Err(error) if was_stalled(place, &folder) => {
+        match perform(scenario, place, goals, attempt) {
+            Err(Failed { error, stalled: true }) => {
                 let reason: String = error.to_string().chars().take(160).collect();
                 println!("       {}: the host stalled the machine, trying again: {reason}", scenario.name);
             }
-            outcome => return outcome,
+            outcome => return outcome.map_err(|failed| failed.error),
         }
     }
-    perform(scenario, place, goals, &format!("{}-{TRIES}", scenario.name))
+    perform(scenario, place, goals, TRIES).map_err(|failed| failed.error)
 }
 
-/// True when the streamer could not run for longer than the drives bridge.
-fn was_stalled(place: &Place, folder: &str) -> bool {
-    let said = std::fs::read_to_string(place.output.join(folder).join("streamer.err")).unwrap_or_default();
-    let all_late = "holding -> fault: feedback late (s): joint 1 ";
-    ["no setpoint left for", "loop stalled", all_late].iter().any(|sign| said.contains(sign))
-}
-
-fn perform(scenario: &Scenario, place: &Place, goals: &Goals, folder: &str) -> Result<Verdict> {
-    let mut stage = Stage::open(place, folder)?;
+fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
+    let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
     let encodings = encodings(&stage.settings);
-    (scenario.run)(&mut stage, goals)?;
+    if let Err(error) = (scenario.run)(&mut stage, goals) {
+        let stalled = stage.was_stalled();
+        return Err(Failed { error, stalled });
+    }
+    let bus = stage.settings.buses.first().context("the settings have no bus")?.interface.clone();
     let (recording, log) = stage.close()?;
-    let verdict = judge(&frames(&recording)?, &cycle_log::read(&log)?, 0, &encodings)?;
-    // A recording without motion would pass every comparison.
-    ensure!(verdict.on_trajectory > 0, "nothing was compared with a trajectory");
+    let losses = match scenario.judged {
+        Judged::Exactly => Losses::None,
+        Judged::WithLosses => Losses::AsLogged,
+    };
+    let log = cycle_log::read(&log).map_err(Error::from)?;
+    let verdict =
+        judge_with(losses, (&frames(&recording, &bus)?, &log), 0, &encodings).map_err(Error::from)?;
+    if verdict.on_trajectory == 0 {
+        return Err(anyhow!("nothing was compared with a trajectory: it would pass every comparison").into());
+    }
     Ok(verdict)
 }
 
-fn frames(recording: &str) -> Result<Vec<BusFrame>> {
+/// What was seen on one interface.
+fn frames(recording: &str, interface: &str) -> Result<Vec<BusFrame>> {
     let seen = |record: candump::Record| BusFrame {
         id: record.frame.id().raw(),
         data: record.frame.data().to_vec(),
     };
-    Ok(candump::parse(recording)?.into_iter().map(seen).collect())
+    let records = candump::parse(recording)?.into_iter();
+    Ok(records.filter(|record| record.interface == interface).map(seen).collect())
 }
 
 fn encodings(settings: &Settings) -> Vec<Encoding> {

@@ -1,4 +1,6 @@
-//! An allocator that counts, so that "no allocation" is measured and not claimed.
+//! An allocator that counts, so that "no allocation" is measured and not claimed: one for the tests of every room.
+//!
+//! The binary that includes it sets [`CountingAllocator`] as its global allocator.
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -1,0 +1,179 @@
+//! What must hold when a bus fails under a moving arm: it stops, says why and what to do, stays silent whatever the bus
+//! does, and comes back by command alone.
+use crate::scenarios::{Goals, Judged, Scenario, arrive, enable, is_ready_to_enable};
+use crate::stage::{PATIENCE, Stage};
+use anyhow::{Result, ensure};
+use std::time::{Duration, Instant};
+use taustream_messages::{BusTrouble, FaultReason, Phase, Report};
+
+/// How far a commanded pose may be from the measured one right after enabling.
+const AT_REST_RAD: f64 = 5e-3;
+
+/// Every scenario, in the order in which they run.
+pub const ALL: &[Scenario] = &[
+    scenario("bus_queue_full_mid_motion_is_silent_until_cleared", queue_full),
+    scenario("bus_interface_down_mid_motion_is_silent_until_cleared", interface_down),
+    scenario("bus_interface_gone_mid_motion_is_reopened_by_clear_fault", interface_gone),
+    scenario("bus_off_and_restarted_mid_motion_is_silent_until_cleared", bus_off),
+    scenario("bus_error_passive_mid_motion_stops_on_path_and_holds", error_passive),
+    scenario("bus_unacknowledged_mid_motion_is_silent_until_cleared", unacknowledged),
+];
+
+const fn scenario(name: &'static str, run: fn(&mut Stage, &Goals) -> Result<()>) -> Scenario {
+    Scenario { name, run, judged: Judged::WithLosses }
+}
+
+/// Under way to the first goal, slowly: joints that lose their drives coast before their brakes hold them.
+fn under_way(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.cli_done(&["speed", "20"])?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    Ok(())
+}
+
+/// The fault that a bus brought, with what `status` says about it.
+fn bus_fault(stage: &mut Stage, trouble: BusTrouble, words: &[&str]) -> Result<Report> {
+    let report = stage.await_phase(Phase::Fault)?;
+    let cause = report.cause();
+    let found = cause.and_then(|c| BusTrouble::from_code(c.code));
+    ensure!(
+        cause.is_some_and(|c| c.reason == FaultReason::BusFault && c.bus == Some(0))
+            && found == Some(trouble),
+        "a bus fault by {trouble:?} was expected, the report says {cause:?}"
+    );
+    ensure!(report.trajectory_s < report.trajectory_duration_s, "the motion had ended before the fault");
+    let status = stage.cli_done(&["status"])?.stdout;
+    for word in words {
+        ensure!(status.contains(word), "no `{word}` in the status: {status}");
+    }
+    stage.cli_refused(&["replan", "--goal", "0,0,0,0,0,0"], "fault")?;
+    stage.cli_refused(&["enable"], "clear-fault")?;
+    Ok(report)
+}
+
+/// Watches for a while: no frame leaves, nothing is commanded, and the phase stays.
+fn stays_silent(stage: &mut Stage) -> Result<()> {
+    let (before, _) = stage.report()?;
+    let since = Instant::now();
+    while since.elapsed() < Duration::from_millis(600) {
+        std::thread::sleep(Duration::from_millis(50));
+        let (report, phase) = stage.report()?;
+        ensure!(phase == Phase::Fault, "the arm goes on by itself: {}", phase.word());
+        ensure!(report.buses[0].silent == 1, "the bus is not silent");
+        ensure!(report.frames_sent == before.frames_sent, "frames left on a failed bus");
+        let bits = |r: &Report| r.command_rad.map(f64::to_bits);
+        ensure!(bits(&report) == bits(&before), "the commanded pose moved");
+    }
+    Ok(())
+}
+
+/// The way back: clear-fault (the drives' own watchdogs may have left faults, too), enable, a new plan.
+fn way_back(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    stays_silent(stage)?;
+    let since = Instant::now();
+    while !is_ready_to_enable(stage)? {
+        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared: {}", stage.streamer.said());
+        let _asked_again_if_refused = stage.cli(&["clear-fault"])?;
+    }
+    move_on(stage, goals)
+}
+
+fn move_on(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    let (report, _) = stage.report()?;
+    let joints = report.command_rad.iter().zip(&report.measured_rad).take(report.joints());
+    for (joint, (commanded, measured)) in joints.enumerate() {
+        let by_rad = (commanded - measured).abs();
+        ensure!(by_rad < AT_REST_RAD, "joint {} is enabled {by_rad} rad from where it stands", joint + 1);
+    }
+    stage.replan(&goals.text(1)?)?;
+    arrive(stage, goals.rad(1)?)?;
+    Ok(())
+}
+
+/// A token bucket in front of the interface takes a third of the frames: ENOBUFS and partial batches.
+fn queue_full(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("tc", "qdisc add dev vcan0 root tbf rate 500kbit burst 160 limit 320")?;
+    let words = ["transmit queue full (ENOBUFS)", "bus `arm` (vcan0)", "silent until `clear-fault`"];
+    let report = bus_fault(stage, BusTrouble::QueueFull, &words)?;
+    ensure!(report.buses[0].cycles_lost >= 3 && report.frames_lost > 0, "lost cycles are not counted");
+    stage.run("tc", "qdisc del dev vcan0 root")?;
+    way_back(stage, goals)
+}
+
+fn interface_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("ip", "link set vcan0 down")?;
+    bus_fault(stage, BusTrouble::Down, &["interface is down (ENETDOWN)", "ip link set vcan0 up"])?;
+    stage.cli_refused(&["clear-fault"], "ip link set vcan0 up")?;
+    stage.cli_refused(&["disable"], "no drive can be told")?;
+    stage.run("ip", "link set vcan0 up")?;
+    way_back(stage, goals)
+}
+
+fn interface_gone(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("ip", "link del vcan0")?;
+    bus_fault(stage, BusTrouble::Gone, &["interface has gone (ENODEV)"])?;
+    stage.cli_refused(&["clear-fault"], "interface vcan0 does not exist")?;
+    add_interface(stage, "vcan0")?;
+    way_back(stage, goals)
+}
+
+fn add_interface(stage: &Stage, interface: &str) -> Result<()> {
+    stage.run("ip", &format!("link add dev {interface} type vcan"))?;
+    stage.run("ip", &format!("link set {interface} mtu 72"))?;
+    stage.run("ip", &format!("link set {interface} up"))
+}
+
+/// The kernel's own frames, by anybody's hand: bus-off, then the controller's return. vcan itself has no such state.
+fn bus_off(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("cansend", "vcan0 20000240#000000000000F803")?;
+    let words = ["controller is bus-off", "ip link set vcan0 type can restart", "tx=248"];
+    bus_fault(stage, BusTrouble::BusOff, &words)?;
+    stage.run("cansend", "vcan0 20000100#0000000000000000")?;
+    let report =
+        stage.await_report("the restarted controller's word", |r, _| r.buses[0].error_frames >= 2)?;
+    ensure!(report.buses[0].error_class == 0x100, "class {:#x}", report.buses[0].error_class);
+    way_back(stage, goals)
+}
+
+/// The bus still carries frames: the arm stops on its path, holds, and is cleared when the controller has recovered.
+fn error_passive(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("cansend", "vcan0 20000004#0020000000000000")?;
+    let report = bus_fault(stage, BusTrouble::ErrorPassive, &["controller is error-passive", "tx passive"])?;
+    ensure!(report.energised == 1, "the drives do not hold");
+    let before = report.frames_sent;
+    stage.await_report("setpoints to hold by", |r, _| r.frames_sent > before + 100)?;
+    stage.cli_refused(&["clear-fault"], "error-passive")?;
+    stage.run("cansend", "vcan0 20000004#0040000000000000")?;
+    stage.await_report("the recovered controller", |r, _| r.buses[0].trouble == 0)?;
+    stage.cli_done(&["clear-fault"])?;
+    stage.await_phase(Phase::Locked)?;
+    move_on(stage, goals)
+}
+
+/// An interface that hands frames back when they were on the wire, as real ones do, and a wire that takes its time.
+fn unacknowledged(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    // The interface has to be made anew for this, which is a fault of its own.
+    stage.run("modprobe", "-r vcan")?;
+    stage.await_phase(Phase::Fault)?;
+    stage.run("modprobe", "vcan echo=1")?;
+    add_interface(stage, "vcan0")?;
+    add_interface(stage, "vcan1")?;
+    way_back(stage, goals)?;
+    stage.cli_done(&["speed", "20"])?;
+    stage.replan(&goals.text(2)?)?;
+    stage.await_under_way(0.1)?;
+    stage.run("tc", "qdisc add dev vcan0 root netem delay 700ms limit 1000")?;
+    let report = bus_fault(stage, BusTrouble::Unconfirmed, &["frames are not acknowledged", "in flight"])?;
+    ensure!(report.fault_value >= 7.0, "only {} frames in flight", report.fault_value);
+    stage.await_report("the late frames to be on the wire", |r, _| r.buses[0].in_flight == 0)?;
+    stage.run("tc", "qdisc del dev vcan0 root")?;
+    way_back(stage, goals)
+}
