@@ -1,47 +1,42 @@
 //! What a robot file says, key by key, before anything is derived from it.
 //!
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
-use crate::document::{Node, Value};
+use crate::document::{Node, Value, shown};
 use crate::reader::{Book, Bounds, Table};
 use crate::robot::link_name;
-use std::f64::consts::TAU;
+use crate::rows::{self, Row};
+use crate::urdf::{self, JointFacts, UrdfArm};
 use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 
-/// Which convention a Denavit-Hartenberg row follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RowKind {
-    /// `dh`: a and alpha of this frame, behind the joint.
-    Standard,
-    /// `mdh`: a and alpha of the last frame, in front of the joint (Craig).
-    Modified,
+/// One joint of the arm.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Joint {
+    pub(crate) name: String,
+    pub(crate) limits: JointLimits,
 }
 
-/// One `[[joint]]` table.
+/// Where links and joints are.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct JointRow {
-    pub(crate) name: String,
-    pub(crate) kind: RowKind,
-    pub(crate) a_m: f64,
-    pub(crate) alpha_rad: f64,
-    pub(crate) d_m: f64,
-    pub(crate) theta_offset_rad: f64,
-    pub(crate) link_radius_m: f64,
-    pub(crate) limits: JointLimits,
+pub(crate) enum Geometry {
+    /// One row a joint.
+    Rows(Vec<Row>),
+    /// A URDF's chain from base to tip.
+    Urdf(Box<UrdfArm>),
 }
 
 /// A robot file without faults.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Description {
     pub(crate) name: String,
-    pub(crate) joints: Vec<JointRow>,
+    /// Base to tip.
+    pub(crate) joints: Vec<Joint>,
+    pub(crate) geometry: Geometry,
     /// Link pairs, lower index first, sorted, each once.
     pub(crate) allowed_contacts: Vec<(usize, usize)>,
+    /// What the owner should know about the joints' limits, in words.
+    pub(crate) notices: Vec<String>,
 }
 
-/// Arms of this project reach a few metres; more is a slip of the unit (millimetres).
-const LENGTH_M: Bounds = Bounds::within(-10.0, 10.0, "m");
-const ANGLE_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
-const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
 /// Sixteen turns; a larger number is a slip of the unit (degrees).
 const POSITION_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
@@ -57,100 +52,199 @@ impl Description {
     pub(crate) fn read(book: &Book, node: Node) -> Option<Self> {
         let mut top = Table::top(book, node)?;
         let name = top.name("name");
-        // Rows are not asked for when a URDF was to give the geometry: one fault says it, not one a joint.
-        let from_urdf = refuse_urdf(&mut top);
-        let tables = top.tables("joint");
-        let count = tables.len();
-        if !(1..=MAX_JOINTS).contains(&count) {
-            top.fault("joint", &format!("{count} tables"), "1 to 8 tables [[joint]], base to tip");
-        }
-        let rows: Vec<Option<JointRow>> =
-            tables.into_iter().map(|table| read_joint(table, from_urdf)).collect();
-        let allowed = read_contacts(&mut top, count);
+        let mut notices = Vec::new();
+        let from_urdf = top.has("urdf");
+        let read = if from_urdf { read_urdf(&mut top, &mut notices) } else { read_rows(&mut top) };
+        let allowed_contacts = read_contacts(&mut top, read.links.as_deref());
         top.done();
-        check_names(book, &rows);
-        check_kinds(book, &rows);
-        let joints: Vec<JointRow> = rows.into_iter().flatten().collect();
-        book.is_clean().then_some(Self { name: name?, joints, allowed_contacts: allowed })
+        let (joints, geometry) = read.whole?;
+        book.is_clean().then_some(Self { name: name?, joints, geometry, allowed_contacts, notices })
     }
 }
 
-/// Robots from URDF are a later version; until then the keys are refused by name, not as unknown ones.
-fn refuse_urdf(top: &mut Table<'_>) -> bool {
-    let mut found = false;
-    for key in ["urdf", "srdf", "tip_link"] {
+/// Joints and geometry, and as much of it as there is after a fault.
+struct Read {
+    /// Names of the links.
+    links: Option<Vec<String>>,
+    whole: Option<(Vec<Joint>, Geometry)>,
+}
+
+fn read_rows(top: &mut Table<'_>) -> Read {
+    // Asked for, so that it is listed among the known keys.
+    top.take("urdf");
+    for key in urdf::KEYS.iter().skip(1) {
         if let Some(node) = top.take(key) {
-            let expected = "Denavit-Hartenberg rows (dh or mdh in each [[joint]]); \
-                            robots from URDF files come in a later version";
-            top.fault(key, &node.to_string(), expected);
-            found = true;
+            top.fault(key, &node.to_string(), "this key only beside `urdf`");
         }
     }
-    found
+    let tables = top.tables("joint");
+    let count = tables.len();
+    if !(1..=MAX_JOINTS).contains(&count) {
+        top.fault("joint", &format!("{count} tables"), "1 to 8 tables [[joint]], base to tip");
+    }
+    let mut read: Vec<Option<(Joint, Row)>> = Vec::new();
+    for mut table in tables {
+        // Every key is read before the first `?`, so that one fault does not hide the next.
+        let name = table.name("name");
+        let row = rows::read(&mut table);
+        let limits = read_limits(&mut table, &Known::Nothing, &mut Vec::new());
+        table.done();
+        read.push(name.zip(limits).zip(row).map(|((name, limits), row)| (Joint { name, limits }, row)));
+    }
+    check_names(
+        top.book(),
+        &read.iter().map(|j| j.as_ref().map(|(j, _)| j.name.as_str())).collect::<Vec<_>>(),
+    );
+    let rows: Vec<_> =
+        read.iter().map(|j| j.as_ref().map(|(joint, row)| (joint.name.as_str(), row))).collect();
+    rows::check_kinds(top.book(), &rows);
+    let (joints, rows): (Vec<Joint>, Vec<Row>) = read.into_iter().flatten().unzip();
+    // The names of the links follow from the number of tables, faulty ones included.
+    let links = (0..=count).map(link_name).collect();
+    Read { links: Some(links), whole: (joints.len() == count).then_some((joints, Geometry::Rows(rows))) }
 }
 
-/// Every key is read before the first `?`, so that one fault does not hide the next.
-fn read_joint(mut table: Table<'_>, from_urdf: bool) -> Option<JointRow> {
-    let name = table.name("name");
-    let row = read_row(&mut table, from_urdf);
-    let link_radius_m = if from_urdf {
-        table.number_or("link_radius_m", 0.0, &RADIUS_M)
-    } else {
-        table.number("link_radius_m", &RADIUS_M)
-    };
-    let position_rad = table.interval("position_rad", &POSITION_RAD);
+/// The URDF gives the joints and their order; the tables give what a URDF does not know.
+fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
+    let arm = UrdfArm::read(top);
+    let facts = arm.as_ref().map(UrdfArm::joints);
+    let mut limits: Vec<Option<JointLimits>> = vec![None; facts.as_ref().map_or(0, Vec::len)];
+    let mut names: Vec<Option<String>> = Vec::new();
+    for mut table in top.tables("joint") {
+        let name = table.text("name", "the name of a joint of the URDF");
+        let at = facts.as_ref().zip(name.as_ref()).and_then(|(facts, name)| {
+            let at = facts.iter().position(|joint| joint.name == *name);
+            if at.is_none() {
+                let known: Vec<&str> = facts.iter().map(|joint| joint.name.as_str()).collect();
+                table.fault(
+                    "name",
+                    &shown(name),
+                    &format!("a joint between base and tip: {}", known.join(", ")),
+                );
+            }
+            at
+        });
+        let known = match at.and_then(|at| facts.as_ref()?.get(at)) {
+            Some(joint) => Known::Urdf(joint),
+            None => Known::Something,
+        };
+        let read = read_limits(&mut table, &known, notices);
+        table.done();
+        if let Some(slot) = at.and_then(|at| limits.get_mut(at)) {
+            *slot = read;
+        }
+        names.push(name);
+    }
+    check_names(top.book(), &names.iter().map(Option::as_deref).collect::<Vec<_>>());
+    let links = arm.as_ref().map(UrdfArm::links);
+    let Some((arm, facts)) = arm.zip(facts) else { return Read { links, whole: None } };
+    for joint in facts.iter().filter(|joint| !names.iter().flatten().any(|name| *name == joint.name)) {
+        let expected = format!(
+            "one table [[joint]] with name = {}: a URDF has no accelerations and jerks, and they have no default",
+            shown(&joint.name)
+        );
+        top.fault("joint", "missing", &expected);
+    }
+    let joints: Option<Vec<Joint>> = facts
+        .into_iter()
+        .zip(limits)
+        .map(|(facts, limits)| Some(Joint { name: facts.name, limits: limits? }))
+        .collect();
+    Read { links, whole: joints.map(|joints| (joints, Geometry::Urdf(Box::new(arm)))) }
+}
+
+/// What is known of a joint's limits besides its table.
+enum Known<'a> {
+    /// Nothing: the table must say everything.
+    Nothing,
+    /// A URDF has it.
+    Urdf(&'a JointFacts),
+    /// A URDF was to have it, but could not be read, or has no such joint: one fault says so, not one a limit.
+    Something,
+}
+
+fn read_limits(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<JointLimits> {
+    let position_rad = read_position(table, known);
     let motion = table.table("motion", "a table of velocity_rad_s, acceleration_rad_s2, jerk_rad_s3");
-    let motion = motion.and_then(read_motion);
+    let motion = motion.and_then(|motion| read_motion(motion, known, notices));
     let stop = match table.table_if_there("stop") {
         Some(stop) => read_stop(stop, motion.as_ref()),
         None => motion.map(default_stop),
     };
-    table.done();
-    let (kind, [a_m, alpha_rad, d_m, theta_offset_rad]) = row?;
-    let limits = JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? };
-    Some(JointRow {
-        name: name?,
-        kind,
-        a_m,
-        alpha_rad,
-        d_m,
-        theta_offset_rad,
-        link_radius_m: link_radius_m?,
-        limits,
-    })
+    Some(JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? })
 }
 
-/// The row of exactly one of the two conventions.
-fn read_row(table: &mut Table<'_>, from_urdf: bool) -> Option<(RowKind, [f64; 4])> {
-    const KEYS: &str = "a table of a_m, alpha_rad, d_m, theta_offset_rad";
-    let standard = table.table_if_there("dh");
-    let modified = table.table_if_there("mdh");
-    let (kind, mut row) = match (standard, modified) {
-        (Some(row), None) => (RowKind::Standard, row),
-        (None, Some(row)) => (RowKind::Modified, row),
-        (Some(_), Some(_)) => {
-            table.fault("mdh", "given beside dh", "one of dh (standard) and mdh (modified, Craig)");
+/// A URDF's range is where the mechanics end, so a file may narrow it and never widen it.
+fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
+    let stated = match known {
+        Known::Nothing => return table.interval("position_rad", &POSITION_RAD),
+        Known::Something if !table.has("position_rad") => {
+            table.take("position_rad");
             return None;
         }
-        (None, None) => {
-            // A row that is there but is no table was refused as such already.
-            if !from_urdf && !table.had("dh") && !table.had("mdh") {
-                table.fault("dh", "missing", &format!("{KEYS} (or mdh, the modified convention)"));
-            }
-            return None;
-        }
+        Known::Something => None,
+        Known::Urdf(facts) => facts.position_rad,
     };
-    let a_m = row.number("a_m", &LENGTH_M);
-    let alpha_rad = row.number("alpha_rad", &ANGLE_RAD);
-    let d_m = row.number("d_m", &LENGTH_M);
-    let theta_offset_rad = row.number("theta_offset_rad", &ANGLE_RAD);
-    row.done();
-    Some((kind, [a_m?, alpha_rad?, d_m?, theta_offset_rad?]))
+    if table.has("position_rad") {
+        let [low, high] = table.interval("position_rad", &POSITION_RAD)?;
+        if let Some([lowest, highest]) = stated
+            && (low < lowest || high > highest)
+        {
+            let value = format!("[{low:?}, {high:?}]");
+            table.fault(
+                "position_rad",
+                &value,
+                &format!("a range inside the URDF's [{lowest:?}, {highest:?}]"),
+            );
+            return None;
+        }
+        return Some([low, high]);
+    }
+    table.take("position_rad");
+    match stated {
+        Some([low, high]) if low < high && POSITION_RAD.hold(low) && POSITION_RAD.hold(high) => {
+            Some([low, high])
+        }
+        Some([low, high]) => {
+            let value = format!("[{low:?}, {high:?}] by the URDF");
+            table.fault(
+                "position_rad",
+                &value,
+                "a range with the lowest below the highest, within 100 rad; give one here",
+            );
+            None
+        }
+        None => {
+            let expected =
+                "[lowest, highest]: the URDF states no range (the joint is continuous, or has no limit)";
+            table.fault("position_rad", "missing", expected);
+            None
+        }
+    }
 }
 
-/// No default: what plans may ask of a joint is the owner's word, not ours.
-fn read_motion(mut table: Table<'_>) -> Option<LimitSet> {
-    let velocity_rad_s = table.number("velocity_rad_s", &VELOCITY_RAD_S);
+/// No default for acceleration and jerk: what plans may ask of a joint is the owner's word, not ours.
+fn read_motion(mut table: Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
+    let stated = if let Known::Urdf(facts) = known { facts.velocity_rad_s } else { None };
+    let velocity_rad_s = match stated.filter(|v| VELOCITY_RAD_S.hold(*v)) {
+        Some(stated) if !table.has("velocity_rad_s") => {
+            table.take("velocity_rad_s");
+            Some(stated)
+        }
+        _ if matches!(known, Known::Something) && !table.has("velocity_rad_s") => {
+            table.take("velocity_rad_s");
+            None
+        }
+        _ => table.number("velocity_rad_s", &VELOCITY_RAD_S),
+    };
+    if let (Some(given), Some(stated), Known::Urdf(facts)) = (velocity_rad_s, stated, known)
+        && given > stated
+    {
+        let name = shown(&facts.name);
+        notices.push(format!(
+            "joint {name}: motion.velocity_rad_s = {given} is above the URDF's limit of {stated} rad/s"
+        ));
+    }
     let acceleration_rad_s2 = table.number("acceleration_rad_s2", &ACCELERATION_RAD_S2);
     let jerk_rad_s3 = table.number("jerk_rad_s3", &JERK_RAD_S3);
     table.done();
@@ -193,8 +287,8 @@ fn read_stop(mut table: Table<'_>, motion: Option<&LimitSet>) -> Option<LimitSet
     })
 }
 
-/// Pairs of link names as pairs of indices.
-fn read_contacts(top: &mut Table<'_>, joints: usize) -> Vec<(usize, usize)> {
+/// Pairs of link names as pairs of indices; the names are not known after a fault in the geometry.
+fn read_contacts(top: &mut Table<'_>, links: Option<&[String]>) -> Vec<(usize, usize)> {
     let Some(node) = top.take("allowed_contacts") else { return Vec::new() };
     let Value::List(items) = &node.value else {
         top.fault(
@@ -204,19 +298,18 @@ fn read_contacts(top: &mut Table<'_>, joints: usize) -> Vec<(usize, usize)> {
         );
         return Vec::new();
     };
+    let Some(links) = links else { return Vec::new() };
     let mut pairs = Vec::new();
     for (i, item) in items.iter().enumerate() {
-        match pair_of(item, joints) {
+        let key = format!("allowed_contacts[{i}]");
+        match pair_of(item, links) {
             Some(pair) if !pairs.contains(&pair) => pairs.push(pair),
-            Some(_) => top.book().add(
-                item.line,
-                &format!("allowed_contacts[{i}]"),
-                &item.to_string(),
-                "each pair once",
-            ),
+            Some(_) => top.book().add(item.line, &key, &item.to_string(), "each pair once"),
             None => {
-                let expected = format!("two different links of \"base\", \"link1\" to \"link{joints}\"");
-                top.book().add(item.line, &format!("allowed_contacts[{i}]"), &item.to_string(), &expected);
+                let names: Vec<String> = links.iter().take(LINKS_SHOWN_MAX).map(|name| shown(name)).collect();
+                let more = if links.len() > LINKS_SHOWN_MAX { ", .." } else { "" };
+                let expected = format!("two different links of {}{more}", names.join(", "));
+                top.book().add(item.line, &key, &item.to_string(), &expected);
             }
         }
     }
@@ -224,42 +317,26 @@ fn read_contacts(top: &mut Table<'_>, joints: usize) -> Vec<(usize, usize)> {
     pairs
 }
 
-fn pair_of(item: &Node, joints: usize) -> Option<(usize, usize)> {
+/// Names of links that a fault lists.
+const LINKS_SHOWN_MAX: usize = 30;
+
+fn pair_of(item: &Node, links: &[String]) -> Option<(usize, usize)> {
     let Value::List(names) = &item.value else { return None };
     let [first, second] = names.as_slice() else { return None };
     let index = |node: &Node| {
         let Value::Text(name) = &node.value else { return None };
-        (0..=joints).find(|link| link_name(*link) == *name)
+        links.iter().position(|link| link == name)
     };
     let (first, second) = (index(first)?, index(second)?);
     (first != second).then_some((first.min(second), first.max(second)))
 }
 
 /// Settings bind servos by joint name: two of one name would leave a joint to chance.
-fn check_names(book: &Book, rows: &[Option<JointRow>]) {
-    for (i, joint) in rows.iter().enumerate() {
-        let Some(joint) = joint else { continue };
-        if rows.iter().take(i).flatten().any(|other| other.name == joint.name) {
-            book.add(
-                None,
-                &format!("joint[{i}].name"),
-                &format!("{:?}", joint.name),
-                "each joint's name once",
-            );
+fn check_names(book: &Book, names: &[Option<&str>]) {
+    for (i, name) in names.iter().enumerate() {
+        let Some(name) = name else { continue };
+        if names.iter().take(i).flatten().any(|other| other == name) {
+            book.add(None, &format!("joint[{i}].name"), &shown(name), "each joint's name once");
         }
-    }
-}
-
-/// One arm has one convention: a mixed table is a copying mistake, and a silent one.
-fn check_kinds(book: &Book, rows: &[Option<JointRow>]) {
-    let Some(first) = rows.iter().flatten().next() else { return };
-    for (i, joint) in rows.iter().enumerate() {
-        let Some(joint) = joint.as_ref().filter(|joint| joint.kind != first.kind) else { continue };
-        let (key, other) = match joint.kind {
-            RowKind::Standard => ("dh", "mdh"),
-            RowKind::Modified => ("mdh", "dh"),
-        };
-        let expected = format!("{other}, as in joint {:?}: one convention for the whole arm", first.name);
-        book.add(None, &format!("joint[{i}].{key}"), "a row", &expected);
     }
 }

@@ -8,60 +8,78 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 24 | the ASCII text `taustream robot digest 1` |
+//! | 24 | the ASCII text `taustream robot digest 2` |
 //! | string | name of the robot |
 //! | u32 | number of joints |
 //! | per joint, base to tip: | |
 //! | string | name of the joint |
-//! | u8 | kind of row: 0 standard (`dh`), 1 modified (`mdh`) |
-//! | 4 x f64 | `a_m`, `alpha_rad`, `d_m`, `theta_offset_rad` |
-//! | f64 | `link_radius_m` |
 //! | 2 x f64 | lowest and highest `position_rad` |
 //! | 3 x f64 | motion: `velocity_rad_s`, `acceleration_rad_s2`, `jerk_rad_s3` |
 //! | 3 x f64 | stop: the same (with the defaults filled in) |
 //! | then: | |
 //! | u32 | number of pairs in `allowed_contacts` |
 //! | 2 x u32 | per pair: indices of the links, lower first, pairs in rising order |
+//! | u8 | kind of geometry: 0 rows, 1 a URDF |
+//! | rows, per joint: | |
+//! | u8 | kind of row: 0 standard (`dh`), 1 modified (`mdh`) |
+//! | 4 x f64 | `a_m`, `alpha_rad`, `d_m`, `theta_offset_rad` |
+//! | f64 | `link_radius_m` |
+//! | a URDF: | |
+//! | 2 x u32 | base link and tip link; links, joints and parts are counted from 0 in the order of the file |
+//! | u32 | number of links; per link: string name; u8 0, or 1 with f64 mass and the origin of its `<inertial>` |
+//! | u32 | number of joints; per joint: string name; u8 type (0 fixed, 1 revolute, 2 continuous, 3 prismatic, 4 planar, 5 floating); u32 parent; u32 child; origin; 3 x f64 axis |
+//! | u32 | number of joints that are held; per joint: u32 joint; f64 position |
+//! | u32 | number of solid parts; per part: u32 link; origin; u8 kind; the mesh file's SHA-256 (32) for a mesh; numbers: sphere (0) radius, box (1) 3 sizes, cylinder (2) and capsule (3) radius and length, mesh (4) 3 scales |
+//! | u32 | number of pairs that the SRDF lets touch; per pair 2 x u32, as above |
 //!
-//! A string is its length in bytes as u32, then its UTF-8 bytes. An f64 is its IEEE 754 bits; -0.0 is written as 0.0,
-//! because both mean the same.
-use crate::description::{Description, JointRow, RowKind};
+//! A string is its length in bytes as u32, then its UTF-8 bytes. An origin is x, y, z, roll, pitch, yaw as 6 x f64. An f64 is its
+//! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
+use crate::description::{Description, Geometry, Joint};
+use crate::rows::{Row, RowKind};
 use sha2::{Digest, Sha256};
 
-const HEADER: &[u8; 24] = b"taustream robot digest 1";
+const HEADER: &[u8; 24] = b"taustream robot digest 2";
 
 /// The digest of a description.
 pub(crate) fn of(description: &Description) -> [u8; 32] {
     Sha256::digest(bytes(description)).into()
 }
 
+/// The digest of a file's bytes.
+pub(crate) fn of_bytes(bytes: &[u8]) -> [u8; 32] {
+    Sha256::digest(bytes).into()
+}
+
 fn bytes(description: &Description) -> Vec<u8> {
+    // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
+    let Description { name, joints, geometry, allowed_contacts, notices: _ } = description;
     let mut out = HEADER.to_vec();
-    put_text(&mut out, &description.name);
-    put_count(&mut out, description.joints.len());
-    for joint in &description.joints {
+    put_text(&mut out, name);
+    put_count(&mut out, joints.len());
+    for joint in joints {
         put_joint(&mut out, joint);
     }
-    put_count(&mut out, description.allowed_contacts.len());
-    for (first, second) in &description.allowed_contacts {
+    put_count(&mut out, allowed_contacts.len());
+    for (first, second) in allowed_contacts {
         put_count(&mut out, *first);
         put_count(&mut out, *second);
+    }
+    match geometry {
+        Geometry::Rows(rows) => {
+            out.push(0);
+            rows.iter().for_each(|row| put_row(&mut out, row));
+        }
+        Geometry::Urdf(arm) => {
+            out.push(1);
+            arm.put(&mut out);
+        }
     }
     out
 }
 
-fn put_joint(out: &mut Vec<u8>, joint: &JointRow) {
-    // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
-    let JointRow { name, kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, limits } = joint;
+fn put_joint(out: &mut Vec<u8>, Joint { name, limits }: &Joint) {
     put_text(out, name);
-    out.push(match kind {
-        RowKind::Standard => 0,
-        RowKind::Modified => 1,
-    });
-    let [low, high] = limits.position_rad;
-    for number in [a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, &low, &high] {
-        put_number(out, *number);
-    }
+    limits.position_rad.iter().for_each(|number| put_number(out, *number));
     for set in [&limits.motion, &limits.stop] {
         for number in [set.velocity_rad_s, set.acceleration_rad_s2, set.jerk_rad_s3] {
             put_number(out, number);
@@ -69,17 +87,28 @@ fn put_joint(out: &mut Vec<u8>, joint: &JointRow) {
     }
 }
 
-fn put_text(out: &mut Vec<u8>, text: &str) {
+fn put_row(out: &mut Vec<u8>, row: &Row) {
+    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m } = row;
+    out.push(match kind {
+        RowKind::Standard => 0,
+        RowKind::Modified => 1,
+    });
+    for number in [a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m] {
+        put_number(out, *number);
+    }
+}
+
+pub(crate) fn put_text(out: &mut Vec<u8>, text: &str) {
     put_count(out, text.len());
     out.extend_from_slice(text.as_bytes());
 }
 
 /// Counts here are at most a few thousand: names are short, joints few.
-fn put_count(out: &mut Vec<u8>, count: usize) {
+pub(crate) fn put_count(out: &mut Vec<u8>, count: usize) {
     out.extend_from_slice(&u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes());
 }
 
-fn put_number(out: &mut Vec<u8>, number: f64) {
+pub(crate) fn put_number(out: &mut Vec<u8>, number: f64) {
     // Adding zero turns -0.0 into 0.0 and changes nothing else.
     out.extend_from_slice(&(number + 0.0).to_bits().to_le_bytes());
 }
@@ -169,6 +198,6 @@ mod tests {
     /// other means (Python's struct and hashlib).
     #[test]
     fn digest_of_a_known_description_is_a_known_number() {
-        assert_eq!(digest(TEXT), "5ef061ec36ea2d10d007e4ae3175537548722ee4de324458a20cebcfa3b2b63b");
+        assert_eq!(digest(TEXT), "69918f5e2cbd7a47b0c2f80f0ea37caeecc93f3357638f973b7bfb9cdafe4e6b");
     }
 }

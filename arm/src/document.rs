@@ -114,7 +114,12 @@ pub(crate) fn read_file(file: &Path, bytes_max: u64, what: &str) -> Result<Vec<u
 
 /// Reads a text file.
 pub(crate) fn read_text(file: &Path, what: &str) -> Result<String, Faults> {
-    let bytes = read_file(file, TEXT_BYTES_MAX, what)?;
+    read_text_of(file, TEXT_BYTES_MAX, what)
+}
+
+/// Reads a text file of at most `bytes_max` bytes.
+pub(crate) fn read_text_of(file: &Path, bytes_max: u64, what: &str) -> Result<String, Faults> {
+    let bytes = read_file(file, bytes_max, what)?;
     String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         let line = e.as_bytes().iter().take(at).filter(|b| **b == b'\n').count() + 1;
@@ -141,13 +146,13 @@ pub(crate) fn parse_toml(file: &Path, text: &str) -> Result<Node, Faults> {
 }
 
 /// Where lines begin, so that finding the line of a value is a search and not a count from the start.
-struct Lines(Vec<usize>);
+pub(crate) struct Lines(Vec<usize>);
 
 impl Lines {
-    fn of(text: &str) -> Self {
+    pub(crate) fn of(text: &str) -> Self {
         Self(text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect())
     }
-    fn at(&self, byte: usize) -> usize {
+    pub(crate) fn at(&self, byte: usize) -> usize {
         self.0.partition_point(|newline| *newline < byte) + 1
     }
 }

@@ -5,24 +5,36 @@
 #![forbid(unsafe_code)]
 
 mod binding;
+pub mod body;
 pub mod bus_load;
+pub mod closed_form;
 mod consistency;
 mod contact;
 mod description;
 pub mod digest;
 mod document;
+pub mod draw;
 pub mod fault;
+<<<<<<< HEAD
 mod identifiers;
+=======
+mod hull;
+>>>>>>> c55633e (Read robots from URDF and SRDF files: chain, solid parts, hulls of meshes, pairs that may touch)
 pub mod lookup;
 mod mesh;
 pub mod protocol;
 mod reader;
 pub mod robot;
+mod rows;
 pub mod runtime;
 pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
+<<<<<<< HEAD
 pub mod trust;
+=======
+mod urdf;
+>>>>>>> c55633e (Read robots from URDF and SRDF files: chain, solid parts, hulls of meshes, pairs that may touch)
 
 pub use bus_load::BusLoad;
 pub use fault::{Fault, Faults};

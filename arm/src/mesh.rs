@@ -2,8 +2,8 @@
 //!
 //! A mesh is a set of triangles; colours, normals and materials are left out. Both formats hold single-precision
 //! numbers here, which is a ten-thousandth of a millimetre at arm's length.
-use crate::Faults;
 use crate::document::read_file;
+use crate::{Faults, digest};
 use nalgebra::Point3;
 use std::io::Cursor;
 use std::path::Path;
@@ -32,17 +32,47 @@ pub(crate) type Refusal = (String, String);
 
 /// Reads and checks a mesh file; the name's ending says which format it is.
 pub(crate) fn load(file: &Path, scale: f64) -> Result<Mesh, Refusal> {
+    let (ending, bytes) = read(file)?;
+    parse(&ending, bytes, scale).map_err(|(value, expected)| refusal(file, &value, &expected))
+}
+
+/// The corners of a mesh file, for its hull.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cloud {
+    pub(crate) points_m: Vec<Point3<f64>>,
+    /// SHA-256 of the file.
+    pub(crate) digest: [u8; 32],
+}
+
+/// Reads a mesh file for its corners alone, each coordinate scaled by its own factor. Triangles without an area, which
+/// programs leave behind in many meshes, do no harm here.
+pub(crate) fn load_points(file: &Path, scale: [f64; 3]) -> Result<Cloud, Refusal> {
+    let (ending, bytes) = read(file)?;
+    let digest = digest::of_bytes(&bytes);
+    let soup = soup(&ending, bytes);
+    let points = soup.and_then(|(corners, triangles)| {
+        check_count(&triangles)?;
+        place(corners, scale)
+    });
+    let points_m = points.map_err(|(value, expected)| refusal(file, &value, &expected))?;
+    Ok(Cloud { points_m, digest })
+}
+
+/// The ending of a mesh file's name in small letters, and its bytes.
+fn read(file: &Path) -> Result<(String, Vec<u8>), Refusal> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     if ending != "stl" && ending != "obj" {
-        return Err(refusal(file, "is neither .stl nor .obj", "a mesh file named .stl or .obj"));
+        let expected = "a mesh file named .stl or .obj; others (COLLADA .dae) can be turned into one, \
+                        for example with assimp export IN.dae OUT.stl";
+        return Err(refusal(file, "is neither .stl nor .obj", expected));
     }
     let bytes = read_file(file, MESH_BYTES_MAX, "a mesh file").map_err(|faults| first_of(file, &faults))?;
-    parse(&ending, bytes, scale).map_err(|(value, expected)| refusal(file, &value, &expected))
+    Ok((ending, bytes))
 }
 
 /// Reads and checks the bytes of a mesh file with the given ending.
 fn parse(ending: &str, bytes: Vec<u8>, scale: f64) -> Result<Mesh, Refusal> {
-    let (corners, triangles) = if ending == "stl" { read_stl(bytes)? } else { read_obj(&bytes)? };
+    let (corners, triangles) = soup(ending, bytes)?;
     check(corners, triangles, scale)
 }
 
@@ -55,6 +85,10 @@ fn first_of(file: &Path, faults: &Faults) -> Refusal {
         Some(fault) => refusal(file, &format!("is {}", fault.value), &fault.expected),
         None => refusal(file, "cannot be read", "a mesh file"),
     }
+}
+
+fn soup(ending: &str, bytes: Vec<u8>) -> Result<Soup, Refusal> {
+    if ending == "stl" { read_stl(bytes) } else { read_obj(&bytes) }
 }
 
 type Soup = (Vec<[f32; 3]>, Vec<[usize; 3]>);
@@ -110,25 +144,8 @@ fn read_obj(bytes: &[u8]) -> Result<Soup, Refusal> {
 }
 
 fn check(corners: Vec<[f32; 3]>, triangles: Vec<[usize; 3]>, scale: f64) -> Result<Mesh, Refusal> {
-    // An obstacle without triangles would be no obstacle at all, and nobody would notice.
-    if triangles.is_empty() {
-        return Err(("has no triangles".to_owned(), "a mesh of at least one triangle".to_owned()));
-    }
-    if triangles.len() > TRIANGLES_MAX {
-        let value = format!("has {} triangles", triangles.len());
-        return Err((value, format!("at most {TRIANGLES_MAX}; simplify the mesh")));
-    }
-    let vertices_m: Vec<Point3<f64>> =
-        corners.into_iter().map(|corner| Point3::from(corner.map(f64::from)) * scale).collect();
-    for (i, vertex) in vertices_m.iter().enumerate() {
-        // A comparison that NaN fails too.
-        if !vertex.iter().all(|c| c.abs() <= REACH_M_MAX) {
-            let value = format!("has corner {i} at {vertex} m after scaling by {scale}");
-            let expected =
-                format!("finite coordinates up to {REACH_M_MAX} m; millimetres want scale = 0.001");
-            return Err((value, expected));
-        }
-    }
+    check_count(&triangles)?;
+    let vertices_m = place(corners, [scale; 3])?;
     let mut checked = Vec::with_capacity(triangles.len());
     for (i, triangle) in triangles.into_iter().enumerate() {
         checked.push(check_triangle(&vertices_m, triangle).ok_or_else(|| {
@@ -137,6 +154,37 @@ fn check(corners: Vec<[f32; 3]>, triangles: Vec<[usize; 3]>, scale: f64) -> Resu
         })?);
     }
     Ok(Mesh { vertices_m, triangles: checked })
+}
+
+/// An obstacle without triangles would be no obstacle at all, and nobody would notice.
+fn check_count(triangles: &[[usize; 3]]) -> Result<(), Refusal> {
+    if triangles.is_empty() {
+        return Err(("has no triangles".to_owned(), "a mesh of at least one triangle".to_owned()));
+    }
+    if triangles.len() > TRIANGLES_MAX {
+        let value = format!("has {} triangles", triangles.len());
+        return Err((value, format!("at most {TRIANGLES_MAX}; simplify the mesh")));
+    }
+    Ok(())
+}
+
+/// The corners in metres, each of them finite and near.
+fn place(corners: Vec<[f32; 3]>, scale: [f64; 3]) -> Result<Vec<Point3<f64>>, Refusal> {
+    let [x, y, z] = scale;
+    let scaled = |corner: [f32; 3]| {
+        Point3::from([f64::from(corner[0]) * x, f64::from(corner[1]) * y, f64::from(corner[2]) * z])
+    };
+    let vertices_m: Vec<Point3<f64>> = corners.into_iter().map(scaled).collect();
+    for (i, vertex) in vertices_m.iter().enumerate() {
+        // A comparison that NaN fails too.
+        if !vertex.iter().all(|c| c.abs() <= REACH_M_MAX) {
+            let value = format!("has corner {i} at {vertex} m after scaling by {scale:?}");
+            let expected =
+                format!("finite coordinates up to {REACH_M_MAX} m; millimetres want scale = 0.001");
+            return Err((value, expected));
+        }
+    }
+    Ok(vertices_m)
 }
 
 /// The triangle with small indices; `None` when a corner does not exist or the area is next to nothing.

@@ -80,7 +80,7 @@ impl Bounds {
     pub(crate) const fn above(low: f64, high: f64, unit: &'static str) -> Self {
         Self { low, high, low_excluded: true, unit }
     }
-    fn hold(&self, number: f64) -> bool {
+    pub(crate) fn hold(&self, number: f64) -> bool {
         // NaN fails every comparison, so it is out of any bounds.
         let low_kept = if self.low_excluded { number > self.low } else { number >= self.low };
         number.is_finite() && low_kept && number <= self.high

@@ -1,10 +1,9 @@
 //! A robot: its chain, limits and collision shapes.
-use crate::contact;
-use crate::description::{Description, JointRow, RowKind};
-use crate::digest;
-use crate::document;
+use crate::description::{Description, Geometry};
 use crate::reader::Book;
+use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
+use crate::{contact, digest, document};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -23,14 +22,27 @@ pub struct RobotJoint {
 /// One collision shape, rigid with a frame of the chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkShape {
-    /// Index of the link in [`Robot::links`]; link 0 is the base, link i moves with joint i.
+    /// Index of the link in [`Robot::links`].
     pub link: usize,
-    /// Index into [`Chain::frames`]: 0 is the base.
+    /// Index into [`Chain::frames`]: 0 is the base, which stands still; frame i moves with joint i.
     pub frame: usize,
     /// Where the shape stands in that frame.
     pub pose: Pose,
     /// The shape.
     pub shape: Shape,
+}
+
+/// The mass of one link; kept for what needs it later, nothing here does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkMass {
+    /// Index of the link in [`Robot::links`].
+    pub link: usize,
+    /// Index into [`Chain::frames`].
+    pub frame: usize,
+    /// The mass.
+    pub mass_kg: f64,
+    /// Its centre in that frame.
+    pub center_m: Point3<f64>,
 }
 
 /// A checked robot description.
@@ -42,14 +54,24 @@ pub struct Robot {
     pub file: PathBuf,
     /// 1 to 8 joints, base to tip.
     pub joints: Vec<RobotJoint>,
-    /// Kinematics.
+    /// Kinematics. Frame 0 is the base; the last frame is the flange of the last row, or the tip link of a URDF.
     pub chain: Chain,
-    /// Names of the links: "base", "link1", ...
+    /// Names of the links: "base", "link1", ... with rows, where link i has frame i; those of the URDF otherwise.
     pub links: Vec<String>,
-    /// Collision shapes.
+    /// Collision shapes. Where they stand in a pose: `chain.frames(pose)[shape.frame] * shape.pose`.
     pub shapes: Vec<LinkShape>,
-    /// Link pairs (lower index first) that may touch because the file says so.
+    /// Masses of the links that state one.
+    pub masses: Vec<LinkMass>,
+    /// Names of the links without a shape: nothing keeps them from being hit.
+    pub bare_links: Vec<String>,
+    /// The URDF's link whose frame is the base, and the one whose frame is the tip; none for rows.
+    pub ends: Option<[String; 2]>,
+    /// What was left out of a URDF or deserves a look, in words.
+    pub notices: Vec<String>,
+    /// Link pairs (lower index first) that may touch because the robot file says so.
     pub allowed_by_file: Vec<(usize, usize)>,
+    /// Link pairs that may touch because the SRDF file says so.
+    pub allowed_by_srdf: Vec<(usize, usize)>,
     /// Link pairs that may touch by the contact rule (neighbours, and pairs that touch in every one of 10,000 seeded poses).
     pub allowed_by_rule: Vec<(usize, usize)>,
     /// Hash over everything that changes what a setpoint means.
@@ -57,7 +79,7 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Reads and checks a robot file (TOML, design: DH or modified DH rows).
+    /// Reads and checks a robot file (TOML, with DH or modified DH rows, or the name of a URDF).
     ///
     /// # Errors
     /// Every fault at once.
@@ -76,26 +98,34 @@ impl Robot {
     }
     /// Makes the robot of a description without faults.
     fn build(book: &Book, description: &Description) -> Option<Self> {
-        let rows = &description.joints;
-        let joints: Vec<ChainJoint> = rows.iter().map(chain_joint).collect();
-        let Some(chain) = Chain::new(&joints) else {
-            book.add(None, "joint", &format!("{} tables", rows.len()), "1 to 8 joints");
+        let parts = Parts::of(description);
+        let Some(chain) = Chain::new(&parts.chain) else {
+            book.add(None, "joint", &format!("{} tables", parts.chain.len()), "1 to 8 joints");
             return None;
         };
-        let shapes: Vec<LinkShape> =
-            rows.iter().enumerate().filter_map(|(i, row)| link_shape(i + 1, row)).collect();
-        let limits: Vec<JointLimits> = rows.iter().map(|row| row.limits).collect();
-        let joint = |row: &JointRow| RobotJoint { name: row.name.clone(), limits: row.limits };
+        let limits: Vec<JointLimits> = description.joints.iter().map(|joint| joint.limits).collect();
+        let known = [description.allowed_contacts.as_slice(), &parts.allowed].concat();
+        let ruled = contact::allowed_by_rule(&chain, &parts.shapes, &limits, (&parts.neighbours, &known));
+        let allowed_by_rule = ruled.map_err(|shape| {
+            let link = parts.shapes.get(shape).and_then(|shape| parts.links.get(shape.link));
+            book.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
+        });
+        let joints = description.joints.iter();
         Some(Self {
             name: description.name.clone(),
             file: book.file().to_owned(),
-            joints: rows.iter().map(joint).collect(),
-            links: (0..=rows.len()).map(link_name).collect(),
+            joints: joints.map(|j| RobotJoint { name: j.name.clone(), limits: j.limits }).collect(),
+            links: parts.links,
+            shapes: parts.shapes,
+            masses: parts.masses,
+            bare_links: parts.bare_links,
+            ends: parts.ends,
+            notices: [parts.notices, description.notices.clone()].concat(),
             allowed_by_file: description.allowed_contacts.clone(),
-            allowed_by_rule: contact::allowed_by_rule(&chain, &shapes, &limits),
+            allowed_by_srdf: parts.allowed,
+            allowed_by_rule: allowed_by_rule.ok()?,
             digest: digest::of(description),
             chain,
-            shapes,
         })
     }
     /// Limits as the motion crate takes them; unused slots are zero.
@@ -107,11 +137,12 @@ impl Robot {
         }
         limits
     }
-    /// True when the two links may touch: a link with itself, by the file, or by the contact rule.
+    /// True when the two links may touch: a link with itself, by the robot file, by the SRDF, or by the contact rule.
     #[must_use]
     pub fn may_touch(&self, a: usize, b: usize) -> bool {
         let pair = (a.min(b), a.max(b));
-        a == b || self.allowed_by_file.contains(&pair) || self.allowed_by_rule.contains(&pair)
+        let lists = [&self.allowed_by_file, &self.allowed_by_srdf, &self.allowed_by_rule];
+        a == b || lists.iter().any(|list| list.contains(&pair))
     }
     /// The digest in hexadecimal, as trajectory files hold it.
     #[must_use]
@@ -130,7 +161,56 @@ pub(crate) fn link_name(link: usize) -> String {
     if link == 0 { "base".to_owned() } else { format!("link{link}") }
 }
 
-fn chain_joint(row: &JointRow) -> ChainJoint {
+/// What rows and URDF files both come down to.
+struct Parts {
+    chain: Vec<ChainJoint>,
+    links: Vec<String>,
+    shapes: Vec<LinkShape>,
+    masses: Vec<LinkMass>,
+    bare_links: Vec<String>,
+    ends: Option<[String; 2]>,
+    neighbours: Vec<(usize, usize)>,
+    allowed: Vec<(usize, usize)>,
+    notices: Vec<String>,
+}
+
+impl Parts {
+    fn of(description: &Description) -> Self {
+        match &description.geometry {
+            Geometry::Rows(rows) => Self::of_rows(rows),
+            Geometry::Urdf(arm) => Self {
+                chain: arm.chain(),
+                links: arm.links(),
+                shapes: arm.shapes(),
+                masses: arm.masses(),
+                bare_links: arm.bare_links(),
+                ends: arm.ends(),
+                neighbours: arm.neighbours(),
+                allowed: arm.allowed.clone(),
+                notices: arm.notices.clone(),
+            },
+        }
+    }
+    fn of_rows(rows: &[Row]) -> Self {
+        let shapes: Vec<LinkShape> =
+            rows.iter().enumerate().filter_map(|(i, row)| link_shape(i + 1, row)).collect();
+        let links: Vec<String> = (0..=rows.len()).map(link_name).collect();
+        let is_bare = |link: &usize| shapes.iter().all(|shape| shape.link != *link);
+        Self {
+            chain: rows.iter().map(chain_joint).collect(),
+            bare_links: (0..links.len()).filter(is_bare).map(link_name).collect(),
+            links,
+            shapes,
+            masses: Vec::new(),
+            ends: None,
+            neighbours: (0..rows.len()).map(|link| (link, link + 1)).collect(),
+            allowed: Vec::new(),
+            notices: Vec::new(),
+        }
+    }
+}
+
+fn chain_joint(row: &Row) -> ChainJoint {
     let (a_m, alpha_rad, d_m, theta_rad) = (row.a_m, row.alpha_rad, row.d_m, row.theta_offset_rad);
     match row.kind {
         RowKind::Standard => ChainJoint::from_dh(a_m, alpha_rad, d_m, theta_rad),
@@ -143,7 +223,7 @@ fn chain_joint(row: &JointRow) -> ChainJoint {
 /// Standard rows turn about the *last* frame's z, so the segment is rigid with frame i; modified rows turn about
 /// *this* frame's z, so it is rigid with frame i-1, and moves with joint i-1. A shape belongs to the link that it
 /// moves with: that is what decides which pairs can approach each other.
-fn link_shape(joint: usize, row: &JointRow) -> Option<LinkShape> {
+fn link_shape(joint: usize, row: &Row) -> Option<LinkShape> {
     if row.link_radius_m <= 0.0 {
         return None;
     }
@@ -176,7 +256,9 @@ impl LinkShape {
         let (half_m, radius_m) = match self.shape {
             Shape::Capsule { radius_m, length_m } => (0.5 * length_m, radius_m),
             Shape::Sphere { radius_m } => (0.0, radius_m),
-            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } => return None,
+            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } | Shape::Hull { .. } => {
+                return None;
+            }
         };
         let end = |z| self.pose * Point3::new(0.0, 0.0, z);
         Some(([end(-half_m), end(half_m)], radius_m))

@@ -43,6 +43,15 @@ pub enum Shape {
         /// Corner indices of each triangle.
         triangles: Vec<[u32; 3]>,
     },
+    /// A solid convex body: all points within `rounding_m` of the polyhedron.
+    Hull {
+        /// Corners of the polyhedron.
+        vertices_m: Vec<Point3<f64>>,
+        /// Its faces, counter-clockwise from outside.
+        triangles: Vec<[u32; 3]>,
+        /// How far the body goes beyond the polyhedron: what its few corners leave out of the mesh it was made of.
+        rounding_m: f64,
+    },
 }
 
 /// One obstacle.
@@ -161,7 +170,7 @@ fn read_mesh(table: &mut Table<'_>) -> Option<Shape> {
 }
 
 /// The URDF convention: R = Rz(yaw) Ry(pitch) Rx(roll), about fixed axes roll first.
-fn pose(center_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
+pub(crate) fn pose(center_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
     Pose::from_parts(Translation3::from(center_m), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
 

@@ -79,7 +79,7 @@ fn distance_m(obstacle: &Obstacle, point: &Point3<f64>) -> f64 {
         Shape::Capsule { radius_m, length_m } => {
             radial_m.hypot((local.z.abs() - 0.5 * length_m).max(0.0)) - radius_m
         }
-        Shape::Mesh { .. } => panic!("no shipped scene has a mesh"),
+        Shape::Mesh { .. } | Shape::Hull { .. } => panic!("no shipped scene has a mesh"),
     }
 }
 

@@ -10,7 +10,8 @@ use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector
 /// A pose: rotation and translation in metres.
 pub type Pose = Isometry3<f64>;
 
-/// One joint: frame = parent * pre * rotation(axis, q + offset) * post.
+/// One joint: frame = parent * pre * rotation(axis, q + offset) * post. Denavit-Hartenberg rows and the joints of a URDF,
+/// fixed ones before and behind them included, are all of this form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainJoint {
     /// From the parent's frame to the joint.
@@ -66,6 +67,11 @@ impl Chain {
     #[must_use]
     pub fn joints(&self) -> usize {
         self.count
+    }
+    /// A joint by its index, base first; `None` beyond the last.
+    #[must_use]
+    pub fn joint(&self, index: usize) -> Option<&ChainJoint> {
+        self.joints.get(index).filter(|_| index < self.count)
     }
     /// The base frame (index 0, identity) and the frame after each joint; unused ones repeat the last.
     ///

@@ -8,7 +8,6 @@
 pub mod arguments;
 pub mod collide;
 pub mod cost;
-pub mod draw;
 pub mod leave;
 pub mod optimize;
 pub mod papers;
@@ -23,6 +22,8 @@ pub mod tree;
 pub mod verify;
 pub mod work;
 pub mod world;
+
+pub use taustream_arm::draw;
 
 pub use cost::{CostError, CostModel, PaperCost, paper_cost};
 pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, StartMargin, plan};

@@ -3,11 +3,12 @@
 //! Obstacles keep the scene's margin; links keep more than 0 m from each other unless the robot file or the
 //! contact rule lets them touch. The base does not move, so that it is not checked against obstacles: planning
 //! could not change it.
-use crate::collide::body::to_parry;
 use crate::collide::{Body, Posed};
 use crate::verify::Contact;
 use parry3d_f64::math::{Pose, Vector};
+use taustream_arm::body::to_parry;
 use taustream_arm::{Robot, Scene};
+use taustream_motion::chain::ChainJoint;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// The other side of a pair.
@@ -145,18 +146,16 @@ impl<'a> World<'a> {
     fn joint_reach_m(&self) -> JointArray {
         let mut snapshot = Snapshot::default();
         self.place(&[0.0; MAX_JOINTS], &mut snapshot);
-        // Lengths between consecutive frames do not depend on the pose.
-        let steps: Vec<f64> = snapshot
-            .frames
-            .windows(2)
-            .map(|f| if let [a, b] = f { (b.translation - a.translation).length() } else { 0.0 })
-            .collect();
+        let joint = |index: usize| self.robot.chain.joint(index);
+        let before_m = |index: usize| joint(index).map_or(0.0, |j| j.pre.translation.vector.norm());
+        let behind_m = |index: usize| joint(index).map_or(0.0, |j| j.post.translation.vector.norm());
         let mut reach_m = [0.0; MAX_JOINTS];
         for (joint, reach) in reach_m.iter_mut().enumerate().take(self.robot.joints.len()) {
             for (body, at) in self.links.iter().zip(&snapshot.at).filter(|(b, _)| b.frame > joint) {
                 let own_m =
                     snapshot.frames.get(body.frame).map_or(0.0, |f| (at.centre - f.translation).length());
-                let chain_m: f64 = steps.get(joint..body.frame).unwrap_or(&[]).iter().sum();
+                let chain_m = behind_m(joint)
+                    + (joint + 1..body.frame).map(|next| before_m(next) + behind_m(next)).sum::<f64>();
                 *reach = f64::max(*reach, chain_m + own_m + body.body.bound_m());
             }
         }
@@ -322,28 +321,14 @@ impl<'a> World<'a> {
     }
 }
 
-/// The joints' axes, each in the frame before it, found from the kinematics: turning joint j by a quarter maps a
-/// point x of the frame before to R x + t, and leaves the axis where it is. With R a quarter turn about u,
-/// R - R^T = 2 [u]x, and the axis' point nearest to the origin is (t + u x t) / 2 with t across u.
+/// The joints' axes, each in the frame before it.
 fn axes(robot: &Robot) -> Vec<Axis> {
-    let zero = robot.chain.frames(&[0.0; MAX_JOINTS]);
-    (0..robot.joints.len())
-        .map(|joint| {
-            let mut turned = [0.0; MAX_JOINTS];
-            turned[joint] = std::f64::consts::FRAC_PI_2;
-            let turned = robot.chain.frames(&turned);
-            let base = zero[joint].inverse();
-            let map = (base * turned[joint + 1]) * (base * zero[joint + 1]).inverse();
-            let r = map.rotation.to_rotation_matrix();
-            let r = r.matrix();
-            let direction =
-                0.5 * Vector::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
-            let direction = direction.normalize_or_zero();
-            let t = Vector::new(map.translation.x, map.translation.y, map.translation.z);
-            let across = t - direction * t.dot(direction);
-            Axis { point: 0.5 * (across + direction.cross(across)), direction }
-        })
-        .collect()
+    let axis = |joint: &ChainJoint| {
+        let pre = to_parry(&joint.pre);
+        let axis = joint.axis.into_inner();
+        Axis { point: pre.translation, direction: pre.rotation * Vector::new(axis.x, axis.y, axis.z) }
+    };
+    (0..robot.joints.len()).filter_map(|joint| robot.chain.joint(joint).map(axis)).collect()
 }
 
 #[cfg(test)]

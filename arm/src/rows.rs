@@ -1,0 +1,78 @@
+//! Denavit-Hartenberg rows: geometry as a robot file states it itself.
+use crate::reader::{Book, Bounds, Table};
+use std::f64::consts::TAU;
+
+/// Which convention a row follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowKind {
+    /// `dh`: a and alpha of this frame, behind the joint.
+    Standard,
+    /// `mdh`: a and alpha of the last frame, in front of the joint (Craig).
+    Modified,
+}
+
+/// One row, and the radius of the capsule along it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) kind: RowKind,
+    pub(crate) a_m: f64,
+    pub(crate) alpha_rad: f64,
+    pub(crate) d_m: f64,
+    pub(crate) theta_offset_rad: f64,
+    pub(crate) link_radius_m: f64,
+}
+
+/// Arms of this project reach a few metres; more is a slip of the unit (millimetres).
+const LENGTH_M: Bounds = Bounds::within(-10.0, 10.0, "m");
+const ANGLE_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
+const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
+
+/// Takes the row of a joint's table.
+pub(crate) fn read(table: &mut Table<'_>) -> Option<Row> {
+    let row = read_row(table);
+    let link_radius_m = table.number("link_radius_m", &RADIUS_M);
+    let (kind, [a_m, alpha_rad, d_m, theta_offset_rad]) = row?;
+    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m: link_radius_m? })
+}
+
+/// The row of exactly one of the two conventions.
+fn read_row(table: &mut Table<'_>) -> Option<(RowKind, [f64; 4])> {
+    const KEYS: &str = "a table of a_m, alpha_rad, d_m, theta_offset_rad";
+    let standard = table.table_if_there("dh");
+    let modified = table.table_if_there("mdh");
+    let (kind, mut row) = match (standard, modified) {
+        (Some(row), None) => (RowKind::Standard, row),
+        (None, Some(row)) => (RowKind::Modified, row),
+        (Some(_), Some(_)) => {
+            table.fault("mdh", "given beside dh", "one of dh (standard) and mdh (modified, Craig)");
+            return None;
+        }
+        (None, None) => {
+            // A row that is there but is no table was refused as such already.
+            if !table.had("dh") && !table.had("mdh") {
+                table.fault("dh", "missing", &format!("{KEYS} (or mdh, the modified convention)"));
+            }
+            return None;
+        }
+    };
+    let a_m = row.number("a_m", &LENGTH_M);
+    let alpha_rad = row.number("alpha_rad", &ANGLE_RAD);
+    let d_m = row.number("d_m", &LENGTH_M);
+    let theta_offset_rad = row.number("theta_offset_rad", &ANGLE_RAD);
+    row.done();
+    Some((kind, [a_m?, alpha_rad?, d_m?, theta_offset_rad?]))
+}
+
+/// One arm has one convention: a mixed table is a copying mistake, and a silent one. `rows` are joints' names with their rows.
+pub(crate) fn check_kinds(book: &Book, rows: &[Option<(&str, &Row)>]) {
+    let Some((first_name, first)) = rows.iter().flatten().next() else { return };
+    for (i, row) in rows.iter().enumerate() {
+        let Some((_, row)) = row.filter(|(_, row)| row.kind != first.kind) else { continue };
+        let (key, other) = match row.kind {
+            RowKind::Standard => ("dh", "mdh"),
+            RowKind::Modified => ("mdh", "dh"),
+        };
+        let expected = format!("{other}, as in joint {first_name:?}: one convention for the whole arm");
+        book.add(None, &format!("joint[{i}].{key}"), "a row", &expected);
+    }
+}

@@ -1,0 +1,461 @@
+//! The arm in a URDF: the chain from base to tip, and the geometry that hangs on it.
+//!
+//! Links are gathered by the frame that they are rigid with: frame 0 is the base link, frame i the link behind the i-th
+//! joint of the arm, and the last frame the tip link. Joints off the chain do not move.
+use super::model::{Joint, Kind, Model, Origin, Solid};
+use super::tree::Tree;
+use super::xml::{self, Context, Element};
+use super::{package, srdf};
+use crate::document::{self, Value, shown};
+use crate::reader::{Book, Table};
+use crate::robot::{LinkMass, LinkShape};
+use crate::scene::{self, Shape};
+use crate::{hull, mesh};
+use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use taustream_motion::MAX_JOINTS;
+use taustream_motion::chain::{ChainJoint, Pose};
+
+/// Keys of a robot file that say where a URDF is and which part of it is the arm.
+pub(crate) const KEYS: [&str; 5] = ["urdf", "srdf", "tip_link", "base_link", "package_dirs"];
+
+/// What a URDF says about a joint of the arm.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct JointFacts {
+    pub(crate) name: String,
+    /// Range; none for continuous joints, and where the file states none.
+    pub(crate) position_rad: Option<[f64; 2]>,
+    /// Above 0; none where the file states none.
+    pub(crate) velocity_rad_s: Option<f64>,
+}
+
+/// A solid part with its mesh read.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SolidPart {
+    pub(crate) link: usize,
+    pub(crate) origin: Origin,
+    pub(crate) shape: Shape,
+    /// Of a mesh: the hash of its file, and its scale.
+    pub(crate) mesh: Option<([u8; 32], [f64; 3])>,
+}
+
+/// A joint that is held still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) joint: usize,
+    /// rad or m.
+    pub(crate) position: f64,
+}
+
+/// A checked arm.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct UrdfArm {
+    pub(crate) model: Model,
+    pub(crate) tree: Tree,
+    /// Index of the base link.
+    pub(crate) base: usize,
+    /// Index of the tip link.
+    pub(crate) tip: usize,
+    /// The joints from base to tip, fixed ones included.
+    pub(crate) path: Vec<usize>,
+    /// Those of them that move.
+    pub(crate) moving: Vec<usize>,
+    pub(crate) held: Vec<Held>,
+    pub(crate) parts: Vec<SolidPart>,
+    /// Pairs that may touch by the SRDF, lower index first, in rising order.
+    pub(crate) allowed: Vec<(usize, usize)>,
+    /// What was left out, in words.
+    pub(crate) notices: Vec<String>,
+}
+
+/// The keys of the robot file, read.
+struct Keys {
+    urdf: PathBuf,
+    srdf: Option<PathBuf>,
+    tip_link: Option<String>,
+    base_link: Option<String>,
+    package_dirs: Vec<PathBuf>,
+}
+
+impl UrdfArm {
+    /// Takes its keys from a robot file and reads what they name; faults go into the table's book.
+    pub(crate) fn read(top: &mut Table<'_>) -> Option<Self> {
+        let keys = read_keys(top)?;
+        let own = Book::new(&keys.urdf);
+        let model = read_model(&own);
+        let tree = model.as_ref().and_then(|model| Tree::of(&own, model));
+        let (model, tree) = match own.close(model.zip(tree)) {
+            Ok(both) => both,
+            Err(faults) => {
+                top.book().take_over(faults);
+                return None;
+            }
+        };
+        let own = Book::new(&keys.urdf);
+        let parts = read_parts(&own, &model, &keys);
+        let faults = own.close(Some(())).err();
+        faults.into_iter().for_each(|faults| top.book().take_over(faults));
+        let allowed = keys.srdf.as_ref().map(|file| srdf::load(top.book(), file, &model)).unwrap_or_default();
+        let tip = named_link(top, &model, &tree, "tip_link", keys.tip_link.as_deref());
+        let base = match &keys.base_link {
+            Some(name) => named_link(top, &model, &tree, "base_link", Some(name)),
+            None => tree.order.first().copied(),
+        };
+        let (base, tip) = (base?, tip?);
+        let path = path(top, &model, &tree, (base, tip))?;
+        let moving = moving(top, &model, &path)?;
+        let (parts, mut notices) = parts?;
+        let held = held(&model, &moving, &mut notices);
+        say_bare_links(&model, &mut notices);
+        let arm = Self { model, tree, base, tip, path, moving, held, parts, allowed, notices };
+        top.book().is_clean().then_some(arm)
+    }
+    /// What the file says about the arm's joints, base to tip.
+    pub(crate) fn joints(&self) -> Vec<JointFacts> {
+        let facts = |joint: &Joint| JointFacts {
+            name: joint.name.clone(),
+            position_rad: if joint.kind == Kind::Continuous { None } else { joint.position },
+            velocity_rad_s: joint.velocity,
+        };
+        self.moving.iter().filter_map(|joint| self.model.joints.get(*joint)).map(facts).collect()
+    }
+    /// The links' names, in the order of the file.
+    pub(crate) fn links(&self) -> Vec<String> {
+        self.model.links.iter().map(|link| link.name.clone()).collect()
+    }
+    /// Names of the base link and the tip link.
+    pub(crate) fn ends(&self) -> Option<[String; 2]> {
+        let name = |link: usize| self.model.links.get(link).map(|link| link.name.clone());
+        Some([name(self.base)?, name(self.tip)?])
+    }
+    /// Names of the links that have no collision geometry.
+    pub(crate) fn bare_links(&self) -> Vec<String> {
+        self.model.links.iter().filter(|link| link.parts.is_empty()).map(|link| link.name.clone()).collect()
+    }
+    /// The chain; fixed joints are part of what stands before the next joint that moves, or behind the last.
+    pub(crate) fn chain(&self) -> Vec<ChainJoint> {
+        let mut joints: Vec<ChainJoint> = Vec::new();
+        let mut before = Pose::identity();
+        for index in &self.path {
+            let Some(joint) = self.model.joints.get(*index) else { continue };
+            before *= pose(&joint.origin);
+            if self.moving.contains(index) {
+                let axis = Unit::new_normalize(Vector3::from(joint.axis));
+                joints.push(ChainJoint { pre: before, axis, offset_rad: 0.0, post: Pose::identity() });
+                before = Pose::identity();
+            }
+        }
+        if let Some(last) = joints.last_mut() {
+            last.post = before;
+        }
+        joints
+    }
+    /// Where each link stands: the frame that it is rigid with, and its pose there.
+    pub(crate) fn placed(&self) -> Vec<(usize, Pose)> {
+        let mut placed = vec![(0, Pose::identity()); self.model.links.len()];
+        for &link in &self.tree.order {
+            let joint = self.tree.joint_before.get(link).copied().flatten();
+            let Some((index, joint)) = joint.and_then(|index| Some((index, self.model.joints.get(index)?)))
+            else {
+                continue;
+            };
+            let before = placed.get(joint.parent).copied().unwrap_or_default();
+            let here = match self.moving.iter().position(|moving| *moving == index) {
+                Some(moving) => (moving + 1, Pose::identity()),
+                None => (before.0, before.1 * pose(&joint.origin) * self.motion(index, joint)),
+            };
+            if let Some(slot) = placed.get_mut(link) {
+                *slot = here;
+            }
+        }
+        // Frame 0 is the base link and not the root, the last frame the tip link and not the link behind the last joint.
+        let inside = |link: usize| placed.get(link).map_or(Pose::identity(), |(_, pose)| pose.inverse());
+        let (from_base, from_tip) = (inside(self.base), inside(self.tip));
+        for (frame, pose) in &mut placed {
+            if *frame == 0 {
+                *pose = from_base * *pose;
+            } else if *frame == self.moving.len() {
+                *pose = from_tip * *pose;
+            }
+        }
+        placed
+    }
+    /// The motion of a joint that is held; none for the others.
+    fn motion(&self, index: usize, joint: &Joint) -> Pose {
+        let Some(held) = self.held.iter().find(|held| held.joint == index) else { return Pose::identity() };
+        let axis = Unit::new_normalize(Vector3::from(joint.axis));
+        match joint.kind {
+            Kind::Revolute | Kind::Continuous => Pose::from_parts(
+                Translation3::identity(),
+                UnitQuaternion::from_axis_angle(&axis, held.position),
+            ),
+            Kind::Prismatic => {
+                Pose::from_parts((axis.into_inner() * held.position).into(), UnitQuaternion::identity())
+            }
+            // At 0 these two change nothing.
+            Kind::Fixed | Kind::Planar | Kind::Floating => Pose::identity(),
+        }
+    }
+    /// The solid parts in their frames.
+    pub(crate) fn shapes(&self) -> Vec<LinkShape> {
+        let placed = self.placed();
+        let shape = |part: &SolidPart| {
+            let (frame, link_pose) = placed.get(part.link).copied().unwrap_or_default();
+            LinkShape {
+                link: part.link,
+                frame,
+                pose: link_pose * pose(&part.origin),
+                shape: part.shape.clone(),
+            }
+        };
+        self.parts.iter().map(shape).collect()
+    }
+    /// The links' masses in their frames.
+    pub(crate) fn masses(&self) -> Vec<LinkMass> {
+        let placed = self.placed();
+        let links = self.model.links.iter().zip(placed).enumerate();
+        let mass = |(index, (link, (frame, link_pose))): (usize, (&super::model::Link, (usize, Pose)))| {
+            let inertial = link.inertial?;
+            let center_m = link_pose * Point3::from(inertial.origin.xyz_m);
+            Some(LinkMass { link: index, frame, mass_kg: inertial.mass_kg, center_m })
+        };
+        links.filter_map(mass).collect()
+    }
+    /// Links with geometry that meet at a joint; links without any between them do not count, as in set-up assistants.
+    pub(crate) fn neighbours(&self) -> Vec<(usize, usize)> {
+        let is_solid = |link: usize| self.model.links.get(link).is_some_and(|link| !link.parts.is_empty());
+        let before = |link: usize| {
+            self.model.joints.get((*self.tree.joint_before.get(link)?)?).map(|joint| joint.parent)
+        };
+        let mut pairs = Vec::new();
+        for link in (0..self.model.links.len()).filter(|link| is_solid(*link)) {
+            let mut other = before(link);
+            while let Some(bare) = other.filter(|link| !is_solid(*link)) {
+                other = before(bare);
+            }
+            pairs.extend(other.map(|other| (link.min(other), link.max(other))));
+        }
+        pairs.sort_unstable();
+        pairs
+    }
+}
+
+/// The pose of an origin.
+fn pose(origin: &Origin) -> Pose {
+    scene::pose(origin.xyz_m, origin.rpy_rad)
+}
+
+fn read_keys(top: &mut Table<'_>) -> Option<Keys> {
+    let robot_file = top.book().file().to_owned();
+    let beside = |named: &str| document::beside(&robot_file, named);
+    let urdf = top.text("urdf", "the path of a URDF file, relative to this file");
+    let srdf = top.text_if_there("srdf", "the path of an SRDF file, relative to this file");
+    let tip_link = top.text("tip_link", "the name of the link whose frame is the tip");
+    let base_link =
+        top.text_if_there("base_link", "the name of the link whose frame is the base (default: the root)");
+    let package_dirs = read_package_dirs(top);
+    Some(Keys {
+        urdf: beside(&urdf?),
+        srdf: srdf.map(|named| beside(&named)),
+        tip_link,
+        base_link,
+        package_dirs: package_dirs.iter().map(|named| beside(named)).collect(),
+    })
+}
+
+fn read_package_dirs(top: &mut Table<'_>) -> Vec<String> {
+    const EXPECTED: &str = "a list of folders that packages are looked for in";
+    let Some(node) = top.take("package_dirs") else { return Vec::new() };
+    let texts: Option<Vec<String>> = match &node.value {
+        Value::List(items) => items
+            .iter()
+            .map(|item| if let Value::Text(text) = &item.value { Some(text.clone()) } else { None })
+            .collect(),
+        Value::Flag(_)
+        | Value::Integer(_)
+        | Value::Number(_)
+        | Value::Text(_)
+        | Value::Table(_)
+        | Value::Other(_) => None,
+    };
+    if texts.is_none() {
+        top.fault("package_dirs", &node.to_string(), EXPECTED);
+    }
+    texts.unwrap_or_default()
+}
+
+fn read_model(book: &Book) -> Option<Model> {
+    let text = xml::read(book.file(), "a URDF file").map_err(|faults| book.take_over(faults)).ok()?;
+    let document = xml::parse(book.file(), &text).map_err(|faults| book.take_over(faults)).ok()?;
+    let context = Context::new(book, &text);
+    Model::read(&context, &Element::robot(&context, &document)?)
+}
+
+/// The parts with their meshes, and what is to be said about them.
+fn read_parts(book: &Book, model: &Model, keys: &Keys) -> Option<(Vec<SolidPart>, Vec<String>)> {
+    let mut read: BTreeMap<(PathBuf, [u64; 3]), Option<MeshPart>> = BTreeMap::new();
+    let (mut parts, mut notices) = (Vec::new(), Vec::new());
+    for (link, part) in
+        model.links.iter().enumerate().flat_map(|(i, link)| link.parts.iter().map(move |p| (i, p)))
+    {
+        let refuse = |value: &str, expected: &str| {
+            book.add(part.line, &format!("{}.geometry.mesh.filename", part.path), value, expected);
+        };
+        let (shape, mesh) = match &part.solid {
+            Solid::Primitive(shape) => (shape.clone(), None),
+            Solid::Mesh { named, scale } => {
+                let file = match package::find(&keys.urdf, &keys.package_dirs, named) {
+                    Ok(file) => file,
+                    Err(expected) => {
+                        refuse(&shown(named), &expected);
+                        continue;
+                    }
+                };
+                let made = read.entry((file.clone(), scale.map(f64::to_bits))).or_insert_with(|| {
+                    let made = MeshPart::load(&file, *scale);
+                    made.map_err(|(value, expected)| refuse(&value, &expected)).ok()
+                });
+                let Some(made) = made else { continue };
+                notices.push(format!("{}: {}", part.path, made.words));
+                (made.shape.clone(), Some((made.digest, *scale)))
+            }
+        };
+        parts.push(SolidPart { link, origin: part.origin, shape, mesh });
+    }
+    book.is_clean().then_some((parts, notices))
+}
+
+/// A mesh as a hull.
+struct MeshPart {
+    shape: Shape,
+    digest: [u8; 32],
+    words: String,
+}
+
+impl MeshPart {
+    fn load(file: &std::path::Path, scale: [f64; 3]) -> Result<Self, mesh::Refusal> {
+        let cloud = mesh::load_points(file, scale)?;
+        let hull = hull::of(&cloud.points_m).map_err(|thickness_m| {
+            let value = format!(
+                "{} has {} corners and is {thickness_m:.1e} m thick",
+                file.display(),
+                cloud.points_m.len()
+            );
+            (value, "a mesh with an inside: at least 4 corners that do not lie in one plane".to_owned())
+        })?;
+        let what = if hull.is_box { "the box around it" } else { "its convex hull" };
+        let words = format!(
+            "mesh {} counts as {what} ({} of {} corners, widened by {:.2} mm)",
+            file.display(),
+            hull.vertices_m.len(),
+            cloud.points_m.len(),
+            1e3 * hull.rounding_m
+        );
+        let hull::Hull { vertices_m, triangles, rounding_m, .. } = hull;
+        Ok(Self { shape: Shape::Hull { vertices_m, triangles, rounding_m }, digest: cloud.digest, words })
+    }
+}
+
+fn named_link(
+    top: &Table<'_>,
+    model: &Model,
+    tree: &Tree,
+    key: &'static str,
+    name: Option<&str>,
+) -> Option<usize> {
+    let name = name?;
+    let link = model.link(name);
+    if link.is_none() {
+        // Most often the tip is one of the ends.
+        let is_end = |link: &usize| model.joints.iter().all(|joint| joint.parent != *link);
+        let ends = tree.order.iter().filter(|link| is_end(link)).filter_map(|link| model.links.get(*link));
+        let ends: Vec<&str> = ends.take(12).map(|link| link.name.as_str()).collect();
+        let root =
+            tree.order.first().and_then(|link| model.links.get(*link)).map_or("", |link| link.name.as_str());
+        let expected = format!(
+            "a link of robot {}; its root is {root}, its ends are {}",
+            shown(&model.name),
+            ends.join(", ")
+        );
+        top.fault(key, &shown(name), &expected);
+    }
+    link
+}
+
+fn path(top: &Table<'_>, model: &Model, tree: &Tree, (base, tip): (usize, usize)) -> Option<Vec<usize>> {
+    let path = tree.path(model, base, tip);
+    if path.is_none() {
+        let name = |link: usize| model.links.get(link).map_or(String::new(), |link| shown(&link.name));
+        top.fault("tip_link", &name(tip), &format!("a link that hangs on the base link {}", name(base)));
+    }
+    path
+}
+
+/// The joints of the arm: revolute or continuous ones, each free.
+fn moving(top: &Table<'_>, model: &Model, path: &[usize]) -> Option<Vec<usize>> {
+    let mut moving = Vec::new();
+    for (index, joint) in path.iter().filter_map(|index| Some((*index, model.joints.get(*index)?))) {
+        let value = format!("joint {} ({}) between base and tip", shown(&joint.name), joint.kind.word());
+        match (joint.kind, &joint.mimic) {
+            (Kind::Fixed, _) => {}
+            (Kind::Revolute | Kind::Continuous, None) => moving.push(index),
+            (Kind::Revolute | Kind::Continuous, Some(mimic)) => {
+                let expected = "joints that each have a servo of their own; linkages are not supported";
+                top.fault(
+                    "tip_link",
+                    &format!("{value}, which follows joint {}", shown(&mimic.joint)),
+                    expected,
+                );
+            }
+            (Kind::Prismatic | Kind::Planar | Kind::Floating, _) => {
+                let expected = "revolute, continuous and fixed joints only: angles, limits and servos are in radians here";
+                top.fault("tip_link", &value, expected);
+            }
+        }
+    }
+    if (1..=MAX_JOINTS).contains(&moving.len()) {
+        return Some(moving);
+    }
+    let expected = format!("1 to {MAX_JOINTS} joints between base and tip");
+    top.fault("tip_link", &format!("{} joints that move", moving.len()), &expected);
+    None
+}
+
+/// Joints off the chain stay where they are; at 0, or as near to it as their range goes.
+fn held(model: &Model, moving: &[usize], notices: &mut Vec<String>) -> Vec<Held> {
+    let mut held = Vec::new();
+    for (index, joint) in model.joints.iter().enumerate() {
+        if joint.kind == Kind::Fixed || moving.contains(&index) {
+            continue;
+        }
+        let free = joint.mimic.as_ref().map_or(0.0, |mimic| mimic.offset);
+        let position = match (joint.kind, joint.position) {
+            (Kind::Revolute | Kind::Prismatic, Some([low, high])) => free.clamp(low, high),
+            (Kind::Planar | Kind::Floating, _) => 0.0,
+            (Kind::Fixed | Kind::Continuous, _) | (Kind::Revolute | Kind::Prismatic, None) => free,
+        };
+        let unit = if joint.kind == Kind::Prismatic { "m" } else { "rad" };
+        let why = match &joint.mimic {
+            Some(mimic) => format!("is to follow joint {}, which is ignored", shown(&mimic.joint)),
+            None => "is not between base and tip".to_owned(),
+        };
+        notices.push(format!(
+            "joint {} ({}) {why}: held at {position} {unit}",
+            shown(&joint.name),
+            joint.kind.word()
+        ));
+        held.push(Held { joint: index, position });
+    }
+    held
+}
+
+/// A link that can be seen but not touched is most often an oversight.
+fn say_bare_links(model: &Model, notices: &mut Vec<String>) {
+    for link in model.links.iter().filter(|link| link.parts.is_empty() && link.is_visible) {
+        notices.push(format!(
+            "link {} has visual but no collision geometry: NOTHING keeps it from being hit",
+            shown(&link.name)
+        ));
+    }
+}

@@ -1,0 +1,97 @@
+//! The part of the robot digest that comes from a URDF; the table is in [`crate::digest`].
+use super::arm::{Held, SolidPart, UrdfArm};
+use super::model::{Inertial, Joint, Kind, Link, Model, Origin};
+use crate::digest::{put_count, put_number, put_text};
+use crate::scene::Shape;
+
+impl UrdfArm {
+    /// Appends the canonical bytes of everything that decides where the arm is and what it can hit.
+    ///
+    /// Numbers as the files state them, and not what is derived from them: a sine may differ by a bit between two
+    /// machines, a digest must not.
+    pub(crate) fn put(&self, out: &mut Vec<u8>) {
+        // Taken apart, so that a new field cannot be forgotten here without the compiler saying so. Path and moving
+        // joints follow from the rest, notices mean nothing.
+        let Self { model, tree: _, base, tip, path: _, moving: _, held, parts, allowed, notices: _ } = self;
+        let Model { name: _, links, joints } = model;
+        put_count(out, *base);
+        put_count(out, *tip);
+        put_count(out, links.len());
+        for link in links {
+            put_link(out, link);
+        }
+        put_count(out, joints.len());
+        for joint in joints {
+            put_joint(out, joint);
+        }
+        put_count(out, held.len());
+        for Held { joint, position } in held {
+            put_count(out, *joint);
+            put_number(out, *position);
+        }
+        put_count(out, parts.len());
+        for part in parts {
+            put_part(out, part);
+        }
+        put_count(out, allowed.len());
+        for (first, second) in allowed {
+            put_count(out, *first);
+            put_count(out, *second);
+        }
+    }
+}
+
+fn put_link(out: &mut Vec<u8>, link: &Link) {
+    // Its parts come later, with their meshes read; whether it can be seen does not matter.
+    let Link { name, parts: _, is_visible: _, inertial } = link;
+    put_text(out, name);
+    match inertial {
+        None => out.push(0),
+        Some(Inertial { mass_kg, origin }) => {
+            out.push(1);
+            put_number(out, *mass_kg);
+            put_origin(out, origin);
+        }
+    }
+}
+
+fn put_joint(out: &mut Vec<u8>, joint: &Joint) {
+    // Limits are the robot file's, which may only narrow these; a joint that follows another is held.
+    let Joint { name, line: _, kind, parent, child, origin, axis, position: _, velocity: _, mimic: _ } =
+        joint;
+    put_text(out, name);
+    out.push(match kind {
+        Kind::Fixed => 0,
+        Kind::Revolute => 1,
+        Kind::Continuous => 2,
+        Kind::Prismatic => 3,
+        Kind::Planar => 4,
+        Kind::Floating => 5,
+    });
+    put_count(out, *parent);
+    put_count(out, *child);
+    put_origin(out, origin);
+    axis.iter().for_each(|number| put_number(out, *number));
+}
+
+fn put_origin(out: &mut Vec<u8>, Origin { xyz_m, rpy_rad }: &Origin) {
+    xyz_m.iter().chain(rpy_rad).for_each(|number| put_number(out, *number));
+}
+
+fn put_part(out: &mut Vec<u8>, part: &SolidPart) {
+    let SolidPart { link, origin, shape, mesh } = part;
+    put_count(out, *link);
+    put_origin(out, origin);
+    let (kind, numbers): (u8, Vec<f64>) = match (shape, mesh) {
+        (Shape::Sphere { radius_m }, _) => (0, vec![*radius_m]),
+        (Shape::Box { size_m }, _) => (1, size_m.to_vec()),
+        (Shape::Cylinder { radius_m, length_m }, _) => (2, vec![*radius_m, *length_m]),
+        (Shape::Capsule { radius_m, length_m }, _) => (3, vec![*radius_m, *length_m]),
+        (Shape::Mesh { .. } | Shape::Hull { .. }, Some((_, scale))) => (4, scale.to_vec()),
+        // Shapes of triangles come from files only.
+        (Shape::Mesh { .. } | Shape::Hull { .. }, None) => (4, Vec::new()),
+    };
+    out.push(kind);
+    out.extend(mesh.iter().flat_map(|(digest, _)| digest));
+    numbers.iter().for_each(|number| put_number(out, *number));
+}

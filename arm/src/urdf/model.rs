@@ -1,0 +1,346 @@
+//! What a URDF file says: links with their solid parts, and joints between them. Nothing is derived here.
+use super::xml::{Context, Element};
+use crate::document::shown;
+use crate::reader::Bounds;
+use crate::scene::Shape;
+use std::collections::BTreeSet;
+
+/// Where something stands in the frame before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Origin {
+    pub(crate) xyz_m: [f64; 3],
+    /// Fixed axes, roll first.
+    pub(crate) rpy_rad: [f64; 3],
+}
+
+impl Origin {
+    pub(crate) const NONE: Self = Self { xyz_m: [0.0; 3], rpy_rad: [0.0; 3] };
+}
+
+/// What a solid part is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Solid {
+    /// A shape that the file states itself.
+    Primitive(Shape),
+    /// A mesh file, as the file names it.
+    Mesh { named: String, scale: [f64; 3] },
+}
+
+/// A `<collision>`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Part {
+    /// How faults and notices call it.
+    pub(crate) path: String,
+    pub(crate) line: Option<usize>,
+    pub(crate) origin: Origin,
+    pub(crate) solid: Solid,
+}
+
+/// A `<link>`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Link {
+    pub(crate) name: String,
+    pub(crate) parts: Vec<Part>,
+    /// It can be seen: without parts it is solid in the world, but not here.
+    pub(crate) is_visible: bool,
+    pub(crate) inertial: Option<Inertial>,
+}
+
+/// The mass of a link and where its centre is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Inertial {
+    pub(crate) mass_kg: f64,
+    pub(crate) origin: Origin,
+}
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Fixed,
+    Revolute,
+    Continuous,
+    Prismatic,
+    Planar,
+    Floating,
+}
+
+impl Kind {
+    const ALL: [(&'static str, Self); 6] = [
+        ("fixed", Self::Fixed),
+        ("revolute", Self::Revolute),
+        ("continuous", Self::Continuous),
+        ("prismatic", Self::Prismatic),
+        ("planar", Self::Planar),
+        ("floating", Self::Floating),
+    ];
+    pub(crate) fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(word, _)| word)
+    }
+}
+
+/// A `<joint>`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Joint {
+    pub(crate) name: String,
+    pub(crate) line: Option<usize>,
+    pub(crate) kind: Kind,
+    /// Index of the link before it.
+    pub(crate) parent: usize,
+    /// Index of the link behind it.
+    pub(crate) child: usize,
+    pub(crate) origin: Origin,
+    /// As written, not of unit length; never zero.
+    pub(crate) axis: [f64; 3],
+    /// Lowest and highest position (rad or m), inside the soft limits where the file states such.
+    pub(crate) position: Option<[f64; 2]>,
+    /// Above 0.
+    pub(crate) velocity: Option<f64>,
+    pub(crate) mimic: Option<Mimic>,
+}
+
+/// Another joint decides where this one is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Mimic {
+    pub(crate) joint: String,
+    pub(crate) offset: f64,
+}
+
+/// A URDF file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Model {
+    pub(crate) name: String,
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<Joint>,
+}
+
+/// Most links; a humanoid with hands has a hundred.
+const LINKS_MAX: usize = 1000;
+/// Most solid parts: every pair of them is looked at.
+const PARTS_MAX: usize = 500;
+const LENGTH_M: Bounds = Bounds::within(-100.0, 100.0, "m");
+const ANGLE_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
+const SIZE_M: Bounds = Bounds::above(0.0, 100.0, "m");
+const SCALE: Bounds = Bounds::within(-1e4, 1e4, "");
+const AXIS: Bounds = Bounds::within(-1e6, 1e6, "");
+const POSITION: Bounds = Bounds::within(-1e9, 1e9, "rad or m");
+const VELOCITY: Bounds = Bounds::within(0.0, 1e9, "rad/s or m/s");
+const MASS_KG: Bounds = Bounds::within(0.0, 1e5, "kg");
+
+impl Model {
+    /// Reads the whole file; complete only when no fault was noted.
+    pub(crate) fn read(context: &Context<'_>, robot: &Element<'_, '_, '_>) -> Option<Self> {
+        let name = robot.name("name");
+        let (link_elements, joint_elements) = (robot.children("link"), robot.children("joint"));
+        if link_elements.is_empty() || link_elements.len() > LINKS_MAX || joint_elements.len() > LINKS_MAX {
+            let value = format!("{} links and {} joints", link_elements.len(), joint_elements.len());
+            robot.fault("", &value, &format!("1 to {LINKS_MAX} links, and at most as many joints"));
+            return None;
+        }
+        let parts = link_elements.iter().map(|l| l.children("collision").len()).sum::<usize>();
+        if parts > PARTS_MAX {
+            let expected = format!("at most {PARTS_MAX} parts in the whole file; simplify the geometry");
+            robot.fault("", &format!("{parts} <collision> elements"), &expected);
+            return None;
+        }
+        let mut names = BTreeSet::new();
+        let links: Vec<Link> =
+            link_elements.iter().filter_map(|element| read_link(element, &mut names)).collect();
+        let mut names = BTreeSet::new();
+        let joints =
+            joint_elements.iter().filter_map(|element| read_joint(element, &links, &mut names)).collect();
+        context.book.is_clean().then_some(Self { name: name?, links, joints })
+    }
+    pub(crate) fn link(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| link.name == name)
+    }
+}
+
+/// A name that no other element of its kind has.
+fn own_name(element: &Element<'_, '_, '_>, names: &mut BTreeSet<String>) -> Option<String> {
+    let name = element.name("name")?;
+    if !names.insert(name.clone()) {
+        element.fault("name", &shown(&name), "each name once among links, and once among joints");
+    }
+    Some(name)
+}
+
+fn read_link(element: &Element<'_, '_, '_>, names: &mut BTreeSet<String>) -> Option<Link> {
+    let name = own_name(element, names);
+    let parts: Vec<Option<Part>> = element.children("collision").iter().map(read_part).collect();
+    let inertial = element.child("inertial").map(|inertial| read_inertial(&inertial));
+    let is_visible = !element.children("visual").is_empty();
+    Some(Link {
+        name: name?,
+        parts: parts.into_iter().flatten().collect(),
+        is_visible,
+        inertial: match inertial {
+            Some(read) => Some(read?),
+            None => None,
+        },
+    })
+}
+
+fn read_origin(element: &Element<'_, '_, '_>) -> Option<Origin> {
+    let Some(origin) = element.child("origin") else { return Some(Origin::NONE) };
+    let xyz_m = origin.vector_or("xyz", [0.0; 3], &LENGTH_M);
+    let rpy_rad = origin.vector_or("rpy", [0.0; 3], &ANGLE_RAD);
+    Some(Origin { xyz_m: xyz_m?, rpy_rad: rpy_rad? })
+}
+
+fn read_inertial(element: &Element<'_, '_, '_>) -> Option<Inertial> {
+    let origin = read_origin(element);
+    let mass = element.need("mass", "<mass value=\"kg\"/>").and_then(|mass| mass.number("value", &MASS_KG));
+    Some(Inertial { mass_kg: mass?, origin: origin? })
+}
+
+fn read_part(element: &Element<'_, '_, '_>) -> Option<Part> {
+    const SHAPES: &str = "one of <sphere>, <box>, <cylinder>, <capsule>, <mesh> in <geometry>";
+    let origin = read_origin(element);
+    let geometry = element.need("geometry", SHAPES)?;
+    let shape = match geometry.tags().as_slice() {
+        [tag @ ("sphere" | "box" | "cylinder" | "capsule" | "mesh")] => Some(*tag),
+        other => {
+            geometry.fault("", &shown(&other.join(", ")), SHAPES);
+            None
+        }
+    };
+    let solid = match shape? {
+        "sphere" => {
+            Solid::Primitive(Shape::Sphere { radius_m: geometry.child("sphere")?.number("radius", &SIZE_M)? })
+        }
+        "box" => Solid::Primitive(Shape::Box { size_m: geometry.child("box")?.vector("size", &SIZE_M)? }),
+        "cylinder" => {
+            let (radius_m, length_m) = round(&geometry.child("cylinder")?)?;
+            Solid::Primitive(Shape::Cylinder { radius_m, length_m })
+        }
+        "capsule" => {
+            let (radius_m, length_m) = round(&geometry.child("capsule")?)?;
+            Solid::Primitive(Shape::Capsule { radius_m, length_m })
+        }
+        _ => read_mesh(&geometry.child("mesh")?)?,
+    };
+    Some(Part { path: element.path().to_owned(), line: element.line(), origin: origin?, solid })
+}
+
+fn round(element: &Element<'_, '_, '_>) -> Option<(f64, f64)> {
+    let (radius_m, length_m) = (element.number("radius", &SIZE_M), element.number("length", &SIZE_M));
+    Some((radius_m?, length_m?))
+}
+
+fn read_mesh(element: &Element<'_, '_, '_>) -> Option<Solid> {
+    let named =
+        element.text("filename", "the path of a mesh file: package://, file:// or relative to this file");
+    // A negative factor mirrors, which some files use for left and right; zero flattens.
+    let scale = element.vector_or("scale", [1.0; 3], &SCALE);
+    if let Some(scale) = scale
+        && scale.iter().any(|s| s.abs() < 1e-9)
+    {
+        element.fault("scale", &format!("{scale:?}"), "three factors that are not 0");
+        return None;
+    }
+    Some(Solid::Mesh { named: named?, scale: scale? })
+}
+
+fn read_joint(element: &Element<'_, '_, '_>, links: &[Link], names: &mut BTreeSet<String>) -> Option<Joint> {
+    let name = own_name(element, names);
+    let kind = read_kind(element);
+    let parent = read_end(element, "parent", links);
+    let child = read_end(element, "child", links);
+    let origin = read_origin(element);
+    let axis = read_axis(element, kind);
+    let position = read_position(element);
+    let velocity = read_velocity(element);
+    let mimic = element.child("mimic").map(|mimic| {
+        let joint = mimic.name("joint");
+        let offset = mimic.number_or("offset", 0.0, &POSITION);
+        Some(Mimic { joint: joint?, offset: offset? })
+    });
+    Some(Joint {
+        name: name?,
+        line: element.line(),
+        kind: kind?,
+        parent: parent?,
+        child: child?,
+        origin: origin?,
+        axis: axis?,
+        position: position?,
+        velocity: velocity?,
+        mimic: match mimic {
+            Some(read) => Some(read?),
+            None => None,
+        },
+    })
+}
+
+fn read_kind(element: &Element<'_, '_, '_>) -> Option<Kind> {
+    const EXPECTED: &str = "fixed, revolute, continuous, prismatic, planar or floating";
+    let word = element.text("type", EXPECTED)?;
+    let kind = Kind::ALL.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
+    if kind.is_none() {
+        element.fault("type", &shown(&word), EXPECTED);
+    }
+    kind
+}
+
+fn read_end(element: &Element<'_, '_, '_>, which: &'static str, links: &[Link]) -> Option<usize> {
+    let end = element.need(which, "the name of a link, as <parent link=\"..\"/> and <child link=\"..\"/>")?;
+    let name = end.name("link")?;
+    let found = links.iter().position(|link| link.name == name);
+    if found.is_none() {
+        end.fault("link", &shown(&name), "the name of a <link> of this file");
+    }
+    found
+}
+
+/// Fixed joints often carry an axis of zeros; it means nothing there.
+fn read_axis(element: &Element<'_, '_, '_>, kind: Option<Kind>) -> Option<[f64; 3]> {
+    const X: [f64; 3] = [1.0, 0.0, 0.0];
+    let Some(axis) = element.child("axis") else { return Some(X) };
+    let xyz = axis.vector_or("xyz", X, &AXIS)?;
+    let length = xyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if length > 1e-6 {
+        return Some(xyz);
+    }
+    if matches!(kind, Some(Kind::Fixed | Kind::Floating)) {
+        return Some(X);
+    }
+    axis.fault("xyz", &format!("{xyz:?}"), "a direction: three numbers that are not all 0");
+    None
+}
+
+/// `None` after a fault, `Some(None)` where the file states no range.
+#[expect(clippy::option_option, reason = "a missing range and a faulty one are told apart")]
+fn read_position(element: &Element<'_, '_, '_>) -> Option<Option<[f64; 2]>> {
+    let Some(limit) = element.child("limit") else { return Some(None) };
+    if !limit.has("lower") && !limit.has("upper") {
+        return Some(None);
+    }
+    let (lower, upper) = (limit.number_or("lower", 0.0, &POSITION), limit.number_or("upper", 0.0, &POSITION));
+    let [mut lower, mut upper] = [lower?, upper?];
+    if let Some(safety) = element.child("safety_controller") {
+        let soft = [
+            safety.number_or("soft_lower_limit", lower, &POSITION),
+            safety.number_or("soft_upper_limit", upper, &POSITION),
+        ];
+        // Both 0 is what generators write when they have none.
+        if let [Some(low), Some(high)] = soft
+            && low < high
+        {
+            (lower, upper) = (lower.max(low), upper.min(high));
+        }
+    }
+    if lower > upper {
+        limit.fault("lower", &format!("{lower:?}"), &format!("at most the upper limit, {upper:?}"));
+        return None;
+    }
+    // No range at all, which is what generators write when they know none.
+    Some((lower < upper).then_some([lower, upper]))
+}
+
+/// As [`read_position`]; a velocity of 0 is what generators write when they know none.
+#[expect(clippy::option_option, reason = "a missing velocity and a faulty one are told apart")]
+fn read_velocity(element: &Element<'_, '_, '_>) -> Option<Option<f64>> {
+    let Some(limit) = element.child("limit").filter(|limit| limit.has("velocity")) else { return Some(None) };
+    let velocity = limit.number("velocity", &VELOCITY)?;
+    Some((velocity > 0.0).then_some(velocity))
+}

@@ -1,0 +1,75 @@
+//! Which links may touch by an SRDF file. Nothing else of it is used.
+use super::model::Model;
+use super::xml::{self, Context, Element};
+use crate::document::shown;
+use crate::reader::Book;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Pairs of links that may touch, lower index first, in rising order; faults go into the book.
+pub(crate) fn read(book: &Book, model: &Model) -> Vec<(usize, usize)> {
+    let pairs = (|| {
+        let text = xml::read(book.file(), WHAT).map_err(|faults| book.take_over(faults)).ok()?;
+        let document = xml::parse(book.file(), &text).map_err(|faults| book.take_over(faults)).ok()?;
+        let context = Context::new(book, &text);
+        let robot = Element::robot(&context, &document)?;
+        Some(pairs(&robot, model))
+    })();
+    pairs.unwrap_or_default().into_iter().collect()
+}
+
+const WHAT: &str = "an SRDF file";
+
+fn pairs(robot: &Element<'_, '_, '_>, model: &Model) -> BTreeSet<(usize, usize)> {
+    let mut pairs = BTreeSet::new();
+    // Everything off for a link first, then single pairs on again, then single pairs off: the order of MoveIt.
+    for element in robot.children("disable_default_collisions") {
+        let link = link_of(&element, "link", model);
+        pairs
+            .extend(link.into_iter().flat_map(|a| (0..model.links.len()).filter_map(move |b| ordered(a, b))));
+    }
+    for element in robot.children("enable_collisions") {
+        if let Some(pair) = pair_of(&element, model) {
+            pairs.remove(&pair);
+        }
+    }
+    pairs.extend(robot.children("disable_collisions").iter().filter_map(|element| pair_of(element, model)));
+    pairs
+}
+
+fn pair_of(element: &Element<'_, '_, '_>, model: &Model) -> Option<(usize, usize)> {
+    let (first, second) = (link_of(element, "link1", model), link_of(element, "link2", model));
+    ordered(first?, second?)
+}
+
+/// A link may always touch itself.
+fn ordered(a: usize, b: usize) -> Option<(usize, usize)> {
+    (a != b).then_some((a.min(b), a.max(b)))
+}
+
+/// A link that does not exist is a misspelt one: the pair that was meant would go on being refused, or worse.
+fn link_of(element: &Element<'_, '_, '_>, attribute: &str, model: &Model) -> Option<usize> {
+    let name = element.name(attribute)?;
+    let link = model.link(&name);
+    if link.is_none() {
+        element.fault(
+            attribute,
+            &shown(&name),
+            &format!("the name of a link of robot {}", shown(&model.name)),
+        );
+    }
+    link
+}
+
+/// Reads the pairs of a file into the faults of the one that names it.
+pub(crate) fn load(book: &Book, file: &Path, model: &Model) -> Vec<(usize, usize)> {
+    let own = Book::new(file);
+    let pairs = read(&own, model);
+    match own.close(Some(pairs)) {
+        Ok(pairs) => pairs,
+        Err(faults) => {
+            book.take_over(faults);
+            Vec::new()
+        }
+    }
+}
