@@ -285,4 +285,85 @@ mod tests {
             );
         }
     }
+
+    /// A hull of random corners, as meshes of robots become.
+    fn hull(draw: &mut Draw) -> Shape {
+        let mut point =
+            || nalgebra::Point3::new(draw.within(-0.2, 0.2), draw.within(-0.3, 0.3), draw.within(-0.1, 0.1));
+        let points: Vec<_> = (0..30).map(|_| point()).collect();
+        let hull = crate::hull::of(&points).expect("not flat");
+        Shape::Hull { vertices_m: hull.vertices_m, triangles: hull.triangles, rounding_m: hull.rounding_m }
+    }
+
+    /// Least distance of a point from the polyhedron of a hull, by its faces one by one; 0 inside.
+    fn to_hull_m(shape: &Shape, point: Vector) -> f64 {
+        let Shape::Hull { vertices_m, triangles, .. } = shape else { panic!("a hull") };
+        let corner = |i: u32| {
+            let p = vertices_m[usize::try_from(i).unwrap()];
+            Vector::new(p.x, p.y, p.z)
+        };
+        let faces: Vec<[Vector; 3]> = triangles.iter().map(|t| t.map(corner)).collect();
+        if faces.iter().all(|[a, b, c]| (point - *a).dot((*b - *a).cross(*c - *a)) <= 0.0) {
+            return 0.0;
+        }
+        let distance_m = |[a, b, c]: &[Vector; 3]| {
+            use parry3d_f64::query::PointQuery;
+            parry3d_f64::shape::Triangle::new(*a, *b, *c).distance_to_local_point(point, true)
+        };
+        faces.iter().map(distance_m).fold(f64::INFINITY, f64::min)
+    }
+
+    fn random_pose(draw: &mut Draw) -> Pose {
+        let mut v = || Vector::new(draw.within(-0.6, 0.6), draw.within(-0.6, 0.6), draw.within(-0.6, 0.6));
+        Pose::from_parts(v(), Rot3::from_scaled_axis(v() * 5.0))
+    }
+
+    /// Goal: the distance of a hull to anything is a lower bound, and next to the truth.
+    /// Method: face by face, without the iteration: along a capsule's axis by ternary search, which the distance's
+    /// convexity allows; to another hull by dense points of its edges and faces, which are never nearer than the truth.
+    #[test]
+    fn distance_of_a_hull_is_a_tight_lower_bound() {
+        let id = chain::Pose::identity();
+        let (mut apart, mut worst_m) = (0, 0.0_f64);
+        for seed in 0..1_500 {
+            let mut draw = Draw::new(seed, 22);
+            let (one, two) = (hull(&mut draw), hull(&mut draw));
+            let (a, b) = (Body::new(&one, &id).unwrap(), Body::new(&two, &id).unwrap());
+            let at = random_pose(&mut draw);
+            let here = a.placed(&Pose::identity());
+
+            let half_m = draw.within(0.0, 0.3);
+            let capsule = Body::capsule(half_m, 0.02, Pose::identity());
+            let along = |t: f64| at.transform_point(Vector::new(0.0, 0.0, half_m * t));
+            let (mut low, mut high) = (-1.0, 1.0);
+            for _ in 0..90 {
+                let (x, y) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                if to_hull_m(&one, along(x)) < to_hull_m(&one, along(y)) { high = y } else { low = x }
+            }
+            let truth_m = to_hull_m(&one, along(0.5 * (low + high))) - 0.02 - a.radius_m();
+            let found_m = capsule.distance_m(&capsule.placed(&at), &a, &here);
+            assert!(found_m <= truth_m + 1e-9, "seed {seed}: capsule {found_m} above {truth_m}");
+            if truth_m > 0.0 {
+                worst_m = worst_m.max(truth_m - found_m);
+                apart += 1;
+            }
+
+            let found_m = a.distance_m(&here, &b, &b.placed(&at));
+            let Shape::Hull { vertices_m, triangles, .. } = &two else { panic!("a hull") };
+            let corner = |i: u32| {
+                let p = vertices_m[usize::try_from(i).unwrap()];
+                at.transform_point(Vector::new(p.x, p.y, p.z))
+            };
+            for [p, q, r] in triangles.iter().map(|t| t.map(corner)) {
+                for (u, v) in
+                    (0..=6).flat_map(|u| (0..=6 - u).map(move |v| (f64::from(u) / 6.0, f64::from(v) / 6.0)))
+                {
+                    let sampled_m =
+                        to_hull_m(&one, p + (q - p) * u + (r - p) * v) - a.radius_m() - b.radius_m();
+                    assert!(found_m <= sampled_m + 1e-9, "seed {seed}: hulls {found_m} above {sampled_m}");
+                }
+            }
+        }
+        assert!(apart > 500 && worst_m < 1e-6, "{apart} apart, at worst {worst_m:e} m too low");
+    }
 }

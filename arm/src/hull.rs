@@ -215,7 +215,7 @@ mod tests {
     /// Points of one of many kinds: dense and sparse, round and edged, doubled, nearly flat, on a grid.
     fn points(seed: u64) -> Vec<Point3<f64>> {
         let mut draw = Draw::new(seed, 20);
-        let count = if seed % 7 == 0 { 3 + draw.index(6) } else { 20 + draw.index(400) };
+        let count = if seed.is_multiple_of(7) { 3 + draw.index(6) } else { 20 + draw.index(400) };
         let size = Point3::new(draw.within(0.01, 0.5), draw.within(0.01, 0.5), draw.within(0.01, 0.5));
         let flat = if seed % 5 == 1 { draw.within(0.0, 1e-3) } else { 1.0 };
         let kind = draw.index(5);
@@ -235,10 +235,10 @@ mod tests {
             .collect();
         let askew =
             nalgebra::UnitQuaternion::from_euler_angles(draw.within(0.0, 3.0), draw.within(0.0, 3.0), 0.0);
-        if seed % 2 == 0 {
+        if seed.is_multiple_of(2) {
             made = made.iter().map(|p| askew * p).collect();
         }
-        if seed % 3 == 0 {
+        if seed.is_multiple_of(3) {
             made.extend(made.clone());
         }
         made

@@ -15,11 +15,8 @@ pub mod digest;
 mod document;
 pub mod draw;
 pub mod fault;
-<<<<<<< HEAD
-mod identifiers;
-=======
 mod hull;
->>>>>>> c55633e (Read robots from URDF and SRDF files: chain, solid parts, hulls of meshes, pairs that may touch)
+mod identifiers;
 pub mod lookup;
 mod mesh;
 pub mod protocol;
@@ -30,11 +27,8 @@ pub mod runtime;
 pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
-<<<<<<< HEAD
 pub mod trust;
-=======
 mod urdf;
->>>>>>> c55633e (Read robots from URDF and SRDF files: chain, solid parts, hulls of meshes, pairs that may touch)
 
 pub use bus_load::BusLoad;
 pub use fault::{Fault, Faults};

@@ -4,7 +4,7 @@
 //! another. Everything here moves metal or says how it falls: no key has a default.
 use crate::document::shown;
 use crate::reader::{Bounds, Table};
-use crate::robot::RobotJoint;
+use crate::robot::{Robot, RobotJoint};
 use crate::trust::Reaction;
 use std::f64::consts::TAU;
 
@@ -104,6 +104,9 @@ impl Protocol {
 
 const EXPECTED: &str = "\"cia402\" (CANopen CiA 402, cyclic synchronous position) or \"damiao\" (Damiao motors, MIT or POS_VEL mode)";
 
+/// Protocols that are planned for.
+const LATER: [&str; 5] = ["piper", "robstride", "myactuator", "cubemars", "odrive"];
+
 const CIA402_KEYS: [&str; 2] = ["gear_ratio", "counts_per_rev"];
 const DAMIAO_KEYS: [&str; 9] = [
     "feedback_id",
@@ -135,15 +138,33 @@ const DAMPING: Bounds = Bounds::above(0.0, 5.0, "Nm s/rad");
 const WATCHDOG_MS: [i64; 2] = [1, 10_000];
 const GAIN_RAMP_MS: [i64; 2] = [1, 10_000];
 
-/// Reads node id and protocol of a servo.
-pub(crate) fn read(table: &mut Table<'_>) -> (Option<u8>, Option<Protocol>) {
+/// What is known by name and not spoken yet: not a slip of the pen, so it is not called unknown.
+fn later_words(name: &str, robot: Option<&Robot>) -> String {
+    let sound = robot.map_or_else(String::new, |robot| {
+        let (joints, shapes) = (robot.joints.len(), robot.shapes.len());
+        format!(
+            "; the robot itself is sound ({}: {joints} joints, {shapes} collision shapes), so it can be planned for with --robot",
+            robot.name
+        )
+    });
+    format!("{name} is known and comes in a later version{sound}")
+}
+
+/// Reads node id and protocol of a servo; the robot only lends words to a refusal.
+pub(crate) fn read(table: &mut Table<'_>, robot: Option<&Robot>) -> (Option<u8>, Option<Protocol>) {
     let name = table.text("protocol", EXPECTED);
     match name.as_deref() {
         Some("cia402") => (read_id(table, CIA402_NODE_ID), read_cia402(table).map(Protocol::Cia402)),
         Some("damiao") => (read_id(table, DAMIAO_ID), read_damiao(table).map(Protocol::Damiao)),
         other => {
             if let Some(other) = other {
-                table.fault("protocol", &shown(other), EXPECTED);
+                let later = LATER.contains(&other);
+                let words = if later {
+                    format!("{EXPECTED}; {}", later_words(other, robot))
+                } else {
+                    EXPECTED.to_owned()
+                };
+                table.fault("protocol", &shown(other), &words);
             }
             // Whose keys they are cannot be told, so none of them is called unknown.
             for key in CIA402_KEYS.into_iter().chain(DAMIAO_KEYS) {

@@ -92,6 +92,15 @@ impl Robot {
     /// Every fault at once.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
         let book = Book::new(file);
+        if text.trim_start().starts_with('<') {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let expected = format!(
+                "a robot file in TOML, which names it: urdf = {name:?}, tip_link = \"..\", and one [[joint]] a joint with its \
+                 limits, because a URDF has no accelerations and jerks"
+            );
+            book.add(Some(1), "", "an XML file", &expected);
+            return book.close(None);
+        }
         let description = Description::read(&book, document::parse_toml(file, text)?);
         let robot = description.and_then(|description| Self::build(&book, &description));
         book.close(robot)

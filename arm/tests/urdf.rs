@@ -148,9 +148,9 @@ fn contacts_come_from_file_srdf_and_rule_each_in_its_own_list() {
 #[test]
 fn mesh_becomes_a_hull_that_holds_its_corners_and_is_scaled_and_mirrored() {
     let robot = load("nasty.toml");
-    let hull = robot.shapes.iter().find_map(|shape| match &shape.shape {
-        Shape::Hull { vertices_m, rounding_m, .. } => Some((vertices_m.clone(), *rounding_m)),
-        _ => None,
+    let hull = robot.shapes.iter().find_map(|shape| {
+        let Shape::Hull { vertices_m, rounding_m, .. } = &shape.shape else { return None };
+        Some((vertices_m.clone(), *rounding_m))
     });
     let (vertices_m, rounding_m) = hull.expect("a mesh");
     // Mirrored in z: from the wide ring at 0 down to the narrow one at -90 mm.

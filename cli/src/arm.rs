@@ -163,9 +163,13 @@ fn kind_of(path: &Path) -> AnyFile {
     if path.extension().is_some_and(|e| e == "json") {
         return AnyFile::Trajectory(owned);
     }
+    // Named directly, it is refused by the reader that knows how a robot file names it.
+    if path.extension().is_some_and(|e| e == "urdf" || e == "srdf" || e == "xacro") {
+        return AnyFile::Robot(owned);
+    }
     let table = fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     match table {
-        Some(t) if t.contains_key("joint") => AnyFile::Robot(owned),
+        Some(t) if t.contains_key("joint") || t.contains_key("urdf") => AnyFile::Robot(owned),
         Some(t) if ["robot", "bus", "servo", "cycle"].iter().any(|k| t.contains_key(*k)) => {
             AnyFile::Settings(owned)
         }

@@ -11,3 +11,5 @@ mod good_path;
 mod manual;
 #[path = "cli/watch.rs"]
 mod watch;
+#[path = "cli/urdf.rs"]
+mod urdf;

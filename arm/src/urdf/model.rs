@@ -143,11 +143,13 @@ impl Model {
             return None;
         }
         let mut names = BTreeSet::new();
-        let links: Vec<Link> =
-            link_elements.iter().filter_map(|element| read_link(element, &mut names)).collect();
+        let link_names: Vec<Option<String>> = link_elements.iter().map(|e| own_name(e, &mut names)).collect();
+        let links =
+            link_elements.iter().zip(&link_names).filter_map(|(e, name)| read_link(e, name.as_deref()));
+        let links = links.collect();
         let mut names = BTreeSet::new();
-        let joints =
-            joint_elements.iter().filter_map(|element| read_joint(element, &links, &mut names)).collect();
+        // Held against all names, so that a faulty link is not also called missing.
+        let joints = joint_elements.iter().filter_map(|e| read_joint(e, &link_names, &mut names)).collect();
         context.book.is_clean().then_some(Self { name: name?, links, joints })
     }
     pub(crate) fn link(&self, name: &str) -> Option<usize> {
@@ -164,13 +166,12 @@ fn own_name(element: &Element<'_, '_, '_>, names: &mut BTreeSet<String>) -> Opti
     Some(name)
 }
 
-fn read_link(element: &Element<'_, '_, '_>, names: &mut BTreeSet<String>) -> Option<Link> {
-    let name = own_name(element, names);
+fn read_link(element: &Element<'_, '_, '_>, name: Option<&str>) -> Option<Link> {
     let parts: Vec<Option<Part>> = element.children("collision").iter().map(read_part).collect();
     let inertial = element.child("inertial").map(|inertial| read_inertial(&inertial));
     let is_visible = !element.children("visual").is_empty();
     Some(Link {
-        name: name?,
+        name: name?.to_owned(),
         parts: parts.into_iter().flatten().collect(),
         is_visible,
         inertial: match inertial {
@@ -241,7 +242,11 @@ fn read_mesh(element: &Element<'_, '_, '_>) -> Option<Solid> {
     Some(Solid::Mesh { named: named?, scale: scale? })
 }
 
-fn read_joint(element: &Element<'_, '_, '_>, links: &[Link], names: &mut BTreeSet<String>) -> Option<Joint> {
+fn read_joint(
+    element: &Element<'_, '_, '_>,
+    links: &[Option<String>],
+    names: &mut BTreeSet<String>,
+) -> Option<Joint> {
     let name = own_name(element, names);
     let kind = read_kind(element);
     let parent = read_end(element, "parent", links);
@@ -282,10 +287,10 @@ fn read_kind(element: &Element<'_, '_, '_>) -> Option<Kind> {
     kind
 }
 
-fn read_end(element: &Element<'_, '_, '_>, which: &'static str, links: &[Link]) -> Option<usize> {
+fn read_end(element: &Element<'_, '_, '_>, which: &'static str, links: &[Option<String>]) -> Option<usize> {
     let end = element.need(which, "the name of a link, as <parent link=\"..\"/> and <child link=\"..\"/>")?;
     let name = end.name("link")?;
-    let found = links.iter().position(|link| link.name == name);
+    let found = links.iter().position(|link| link.as_ref() == Some(&name));
     if found.is_none() {
         end.fault("link", &shown(&name), "the name of a <link> of this file");
     }

@@ -1,5 +1,6 @@
 //! `taustream check`: is a configuration sound, and what does it mean?
 use super::bus_table::BusTable;
+use super::checked_robot::CheckedRobot;
 use super::protocol_line::ProtocolLine;
 use crate::args::CheckArgs;
 use crate::arm;
@@ -9,7 +10,6 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 use taustream_arm::{Robot, Scene, Servo, Settings, TrajectoryFile};
-use taustream_motion::time_scale::ramp_duration_s;
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
@@ -28,114 +28,6 @@ fn check_settings(form: Form, path: &Path) -> Result<(), Failure> {
     form.print(&CheckedSettings::of(&Settings::load_overloaded(path)?))?;
     Settings::load(path)?;
     Ok(())
-}
-
-/// One joint's limits.
-#[derive(Debug, Serialize)]
-struct JointLine {
-    name: String,
-    position_rad: [f64; 2],
-    velocity_rad_s: f64,
-    acceleration_rad_s2: f64,
-    jerk_rad_s3: f64,
-    stop_acceleration_rad_s2: f64,
-    stop_jerk_rad_s3: f64,
-}
-
-/// A robot that is sound.
-#[derive(Debug, Serialize)]
-struct CheckedRobot {
-    kind: &'static str,
-    name: String,
-    file: String,
-    digest: String,
-    joints: Vec<JointLine>,
-    shapes: usize,
-    may_touch_by_rule: Vec<[String; 2]>,
-    may_touch_by_file: Vec<[String; 2]>,
-    /// How long a pause or stop from full speed takes.
-    pause_s: f64,
-}
-
-impl CheckedRobot {
-    fn of(robot: &Robot) -> Self {
-        let link = |i: usize| robot.links.get(i).cloned().unwrap_or_else(|| format!("link{i}"));
-        let names = |pairs: &[(usize, usize)]| pairs.iter().map(|(a, b)| [link(*a), link(*b)]).collect();
-        let joints = robot.joints.iter().map(|joint| {
-            let (motion, stop) = (joint.limits.motion, joint.limits.stop);
-            JointLine {
-                name: joint.name.clone(),
-                position_rad: joint.limits.position_rad,
-                velocity_rad_s: motion.velocity_rad_s,
-                acceleration_rad_s2: motion.acceleration_rad_s2,
-                jerk_rad_s3: motion.jerk_rad_s3,
-                stop_acceleration_rad_s2: stop.acceleration_rad_s2,
-                stop_jerk_rad_s3: stop.jerk_rad_s3,
-            }
-        });
-        Self {
-            kind: "robot",
-            name: robot.name.clone(),
-            file: robot.file.display().to_string(),
-            digest: robot.digest_hex(),
-            joints: joints.collect(),
-            shapes: robot.shapes.len(),
-            may_touch_by_rule: names(&robot.allowed_by_rule),
-            may_touch_by_file: names(&robot.allowed_by_file),
-            pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
-        }
-    }
-}
-
-impl fmt::Display for CheckedRobot {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "robot {} ({}): {} joints, {} collision shapes",
-            self.name,
-            self.file,
-            self.joints.len(),
-            self.shapes
-        )?;
-        writeln!(f, "  digest {}", self.digest)?;
-        writeln!(
-            f,
-            "  joint               position (rad)         velocity   acceleration  jerk; stop: acceleration, jerk"
-        )?;
-        for j in &self.joints {
-            let [low, high] = j.position_rad;
-            writeln!(
-                f,
-                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8} rad/s {:>8} rad/s2 {:>8} rad/s3; {}, {}",
-                j.name,
-                j.velocity_rad_s,
-                j.acceleration_rad_s2,
-                j.jerk_rad_s3,
-                j.stop_acceleration_rad_s2,
-                j.stop_jerk_rad_s3
-            )?;
-        }
-        contacts(
-            f,
-            "links that MAY TOUCH by the contact rule (neighbours, and pairs that touch in every pose)",
-            &self.may_touch_by_rule,
-        )?;
-        contacts(f, "links that MAY TOUCH because the file says so", &self.may_touch_by_file)?;
-        write!(
-            f,
-            "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
-            self.pause_s
-        )
-    }
-}
-
-/// Contacts that nothing will warn about: said aloud.
-fn contacts(f: &mut fmt::Formatter<'_>, title: &str, pairs: &[[String; 2]]) -> fmt::Result {
-    if pairs.is_empty() {
-        return Ok(());
-    }
-    let list: Vec<String> = pairs.iter().map(|[a, b]| format!("{a}-{b}")).collect();
-    writeln!(f, "  {title}: {}", list.join(", "))
 }
 
 /// A scene that is sound.

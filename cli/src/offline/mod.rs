@@ -2,6 +2,7 @@
 pub(crate) mod bench;
 mod bus_table;
 pub(crate) mod check;
+mod checked_robot;
 pub(crate) mod cost;
 pub(crate) mod plan;
 mod protocol_line;

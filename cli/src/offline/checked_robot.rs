@@ -1,0 +1,212 @@
+//! A robot as `taustream check` shows it: joints, solid links, and everything that is let through.
+use serde::Serialize;
+use std::fmt;
+use taustream_arm::{Robot, Shape};
+use taustream_motion::time_scale::ramp_duration_s;
+
+/// One joint's limits.
+#[derive(Debug, Serialize)]
+struct JointLine {
+    name: String,
+    position_rad: [f64; 2],
+    velocity_rad_s: f64,
+    acceleration_rad_s2: f64,
+    jerk_rad_s3: f64,
+    stop_acceleration_rad_s2: f64,
+    stop_jerk_rad_s3: f64,
+}
+
+/// One link that has shapes.
+#[derive(Debug, Serialize)]
+struct LinkLine {
+    name: String,
+    /// The joint that moves it; null for what stands still.
+    moved_by: Option<String>,
+    /// How many of each kind: "2 spheres, 1 hull".
+    shapes: String,
+}
+
+impl LinkLine {
+    fn all(robot: &Robot) -> Vec<Self> {
+        let mut lines = Vec::new();
+        for (link, name) in robot.links.iter().enumerate() {
+            let shapes = || robot.shapes.iter().filter(|shape| shape.link == link);
+            let Some(first) = shapes().next() else { continue };
+            let before = first.frame.checked_sub(1).and_then(|joint| robot.joints.get(joint));
+            let counted = KINDS.iter().filter_map(|kind| {
+                let count = shapes().filter(|shape| kind_of(&shape.shape) == *kind).count();
+                let plural = if count == 1 {
+                    ""
+                } else if kind.ends_with('x') || kind.ends_with('h') {
+                    "es"
+                } else {
+                    "s"
+                };
+                (count > 0).then(|| format!("{count} {kind}{plural}"))
+            });
+            lines.push(Self {
+                name: name.clone(),
+                moved_by: before.map(|joint| joint.name.clone()),
+                shapes: counted.collect::<Vec<_>>().join(", "),
+            });
+        }
+        lines
+    }
+}
+
+const KINDS: [&str; 6] = ["sphere", "box", "cylinder", "capsule", "mesh", "hull"];
+
+fn kind_of(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere { .. } => "sphere",
+        Shape::Box { .. } => "box",
+        Shape::Cylinder { .. } => "cylinder",
+        Shape::Capsule { .. } => "capsule",
+        Shape::Mesh { .. } => "mesh",
+        Shape::Hull { .. } => "hull",
+    }
+}
+
+/// A robot that is sound.
+#[derive(Debug, Serialize)]
+pub(super) struct CheckedRobot {
+    kind: &'static str,
+    name: String,
+    file: String,
+    digest: String,
+    joints: Vec<JointLine>,
+    /// Links whose frames are base and tip; null for Denavit-Hartenberg rows.
+    base_and_tip: Option<[String; 2]>,
+    shapes: usize,
+    links: Vec<LinkLine>,
+    /// Nothing keeps these from being hit.
+    links_without_shape: Vec<String>,
+    /// What was left out of a URDF, or deserves a look.
+    notices: Vec<String>,
+    /// Of the links that state a mass; null when none does.
+    mass_kg: Option<f64>,
+    may_touch_by_rule: Vec<[String; 2]>,
+    may_touch_by_file: Vec<[String; 2]>,
+    may_touch_by_srdf: Vec<[String; 2]>,
+    /// How long a pause or stop from full speed takes.
+    pause_s: f64,
+}
+
+impl CheckedRobot {
+    pub(super) fn of(robot: &Robot) -> Self {
+        let link = |i: usize| robot.links.get(i).cloned().unwrap_or_else(|| format!("link{i}"));
+        let names = |pairs: &[(usize, usize)]| pairs.iter().map(|(a, b)| [link(*a), link(*b)]).collect();
+        let joints = robot.joints.iter().map(|joint| {
+            let (motion, stop) = (joint.limits.motion, joint.limits.stop);
+            JointLine {
+                name: joint.name.clone(),
+                position_rad: joint.limits.position_rad,
+                velocity_rad_s: motion.velocity_rad_s,
+                acceleration_rad_s2: motion.acceleration_rad_s2,
+                jerk_rad_s3: motion.jerk_rad_s3,
+                stop_acceleration_rad_s2: stop.acceleration_rad_s2,
+                stop_jerk_rad_s3: stop.jerk_rad_s3,
+            }
+        });
+        Self {
+            kind: "robot",
+            name: robot.name.clone(),
+            file: robot.file.display().to_string(),
+            digest: robot.digest_hex(),
+            joints: joints.collect(),
+            base_and_tip: robot.ends.clone(),
+            shapes: robot.shapes.len(),
+            links: LinkLine::all(robot),
+            links_without_shape: robot.bare_links.clone(),
+            notices: robot.notices.clone(),
+            mass_kg: (!robot.masses.is_empty()).then(|| robot.masses.iter().map(|mass| mass.mass_kg).sum()),
+            may_touch_by_rule: names(&robot.allowed_by_rule),
+            may_touch_by_file: names(&robot.allowed_by_file),
+            may_touch_by_srdf: names(&robot.allowed_by_srdf),
+            pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
+        }
+    }
+}
+
+impl fmt::Display for CheckedRobot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "robot {} ({}): {} joints, {} collision shapes",
+            self.name,
+            self.file,
+            self.joints.len(),
+            self.shapes
+        )?;
+        writeln!(f, "  digest {}", self.digest)?;
+        writeln!(
+            f,
+            "  joint               position (rad)         velocity   acceleration  jerk; stop: acceleration, jerk"
+        )?;
+        for j in &self.joints {
+            let [low, high] = j.position_rad;
+            writeln!(
+                f,
+                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8} rad/s {:>8} rad/s2 {:>8} rad/s3; {}, {}",
+                j.name,
+                j.velocity_rad_s,
+                j.acceleration_rad_s2,
+                j.jerk_rad_s3,
+                j.stop_acceleration_rad_s2,
+                j.stop_jerk_rad_s3
+            )?;
+        }
+        self.geometry(f)?;
+        contacts(
+            f,
+            "links that MAY TOUCH by the contact rule (neighbours, and pairs that touch in every pose)",
+            &self.may_touch_by_rule,
+        )?;
+        contacts(f, "links that MAY TOUCH because the robot file says so", &self.may_touch_by_file)?;
+        contacts(f, "links that MAY TOUCH because the SRDF says so", &self.may_touch_by_srdf)?;
+        write!(
+            f,
+            "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
+            self.pause_s
+        )
+    }
+}
+
+impl CheckedRobot {
+    /// What is solid, and what is not.
+    fn geometry(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some([base, tip]) = &self.base_and_tip {
+            writeln!(f, "  base link {base}, tip link {tip}")?;
+        }
+        if let Some(mass_kg) = self.mass_kg {
+            writeln!(f, "  {mass_kg:.3} kg by the links that state a mass (not used yet)")?;
+        }
+        for link in &self.links {
+            match &link.moved_by {
+                Some(joint) => writeln!(f, "  {:<26} moves with {joint}: {}", link.name, link.shapes)?,
+                // Planning could not change whether it meets an obstacle, so it is not held against any.
+                None => writeln!(
+                    f,
+                    "  {:<26} stands still: {} (kept clear of the arm, not of obstacles)",
+                    link.name, link.shapes
+                )?,
+            }
+        }
+        if !self.links_without_shape.is_empty() {
+            writeln!(f, "  links WITHOUT collision geometry: {}", self.links_without_shape.join(", "))?;
+        }
+        for notice in &self.notices {
+            writeln!(f, "  note: {notice}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Contacts that nothing will warn about: said aloud.
+fn contacts(f: &mut fmt::Formatter<'_>, title: &str, pairs: &[[String; 2]]) -> fmt::Result {
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    let list: Vec<String> = pairs.iter().map(|[a, b]| format!("{a}-{b}")).collect();
+    writeln!(f, "  {title}: {}", list.join(", "))
+}

@@ -1,0 +1,228 @@
+//! Links of every shape on chains of every kind: how far their points move, and what a sweep proves about them.
+//!
+//! The verification rests on one bound: no point of a link moves further than the sum over the joints of turn times lever.
+//! It must hold for a URDF's links (boxes, cylinders, hulls of meshes, beside their joint) as for capsules along rows.
+mod common;
+use common::config;
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use std::path::PathBuf;
+use taustream_arm::scene::Shape;
+use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
+use taustream_motion::chain::{Chain, ChainJoint, Pose};
+use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::collide::{StraightEdge, SweepRules, sweep};
+use taustream_planner::draw::Draw;
+use taustream_planner::work::Work;
+use taustream_planner::world::{Snapshot, World};
+
+const KINDS: usize = 6;
+
+fn vector(draw: &mut Draw, span: f64) -> Vector3<f64> {
+    Vector3::new(draw.within(-span, span), draw.within(-span, span), draw.within(-span, span))
+}
+
+fn pose(draw: &mut Draw, span_m: f64) -> Pose {
+    let turn = UnitQuaternion::from_scaled_axis(vector(draw, 3.0));
+    Isometry3::from_parts(Translation3::from(vector(draw, span_m)), turn)
+}
+
+/// A tetrahedron askew: corners and faces, outwards.
+fn tetrahedron(draw: &mut Draw) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    let size = || [1.0, 1.0, 1.0];
+    let [x, y, z] = size().map(|_| draw.within(0.03, 0.2));
+    let at = Point3::from(vector(draw, 0.1));
+    let corner = |x, y, z| at + Vector3::new(x, y, z);
+    let corners = vec![at, corner(x, 0.0, 0.0), corner(0.0, y, 0.0), corner(0.02, 0.02, z)];
+    (corners, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+}
+
+fn shape(draw: &mut Draw, kind: usize) -> Shape {
+    let (radius_m, length_m) = (draw.within(0.01, 0.1), draw.within(0.02, 0.3));
+    match kind {
+        0 => Shape::Sphere { radius_m },
+        1 => Shape::Capsule { radius_m, length_m },
+        2 => Shape::Cylinder { radius_m, length_m },
+        3 => Shape::Box { size_m: [radius_m, length_m, draw.within(0.02, 0.3)] },
+        kind => {
+            let (vertices_m, triangles) = tetrahedron(draw);
+            if kind == 4 {
+                Shape::Mesh { vertices_m, triangles }
+            } else {
+                Shape::Hull { vertices_m, triangles, rounding_m: draw.within(0.0, 0.02) }
+            }
+        }
+    }
+}
+
+/// Points of a shape, its outermost ones among them.
+fn points(draw: &mut Draw, shape: &Shape) -> Vec<Point3<f64>> {
+    let mut direction = || vector(draw, 1.0).normalize();
+    let balls = |centres: &[Point3<f64>], radius_m: f64, direction: &mut dyn FnMut() -> Vector3<f64>| {
+        let around = centres.iter().flat_map(|c| (0..8).map(move |_| *c));
+        around.map(|c| c + direction() * radius_m).collect()
+    };
+    match shape {
+        Shape::Sphere { radius_m } => balls(&[Point3::origin()], *radius_m, &mut direction),
+        Shape::Capsule { radius_m, length_m } => {
+            let ends = [-0.5, 0.5].map(|s| Point3::new(0.0, 0.0, s * length_m));
+            balls(&ends, *radius_m, &mut direction)
+        }
+        Shape::Cylinder { radius_m, length_m } => (0..24)
+            .map(|i| {
+                let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+                Point3::new(radius_m * cos, radius_m * sin, if i % 2 == 0 { 0.5 } else { -0.5 } * length_m)
+            })
+            .collect(),
+        Shape::Box { size_m: [x, y, z] } => (0..8)
+            .map(|i| {
+                let side = |bit: i32, size: f64| if i & (1 << bit) == 0 { -0.5 * size } else { 0.5 * size };
+                Point3::new(side(0, *x), side(1, *y), side(2, *z))
+            })
+            .collect(),
+        Shape::Mesh { vertices_m, .. } => vertices_m.clone(),
+        Shape::Hull { vertices_m, rounding_m, .. } => balls(vertices_m, *rounding_m, &mut direction),
+    }
+}
+
+/// A robot of one to eight joints with origins and axes anywhere, and two shapes a link.
+fn robot(seed: u64) -> Robot {
+    let mut draw = Draw::new(seed, 30);
+    let count = 1 + draw.index(MAX_JOINTS);
+    let joints: Vec<ChainJoint> = (0..count)
+        .map(|i| ChainJoint {
+            pre: pose(&mut draw, 0.2),
+            axis: Unit::new_normalize(vector(&mut draw, 1.0)),
+            offset_rad: draw.within(-3.0, 3.0),
+            // A URDF has something behind the last joint only; the bound holds wherever it is.
+            post: if i + 1 == count || draw.unit() < 0.3 { pose(&mut draw, 0.2) } else { Pose::identity() },
+        })
+        .collect();
+    let mut shapes = Vec::new();
+    for frame in 0..=count {
+        for _ in 0..2 {
+            let kind = draw.index(KINDS);
+            let shape = shape(&mut draw, kind);
+            shapes.push(LinkShape { link: frame, frame, pose: pose(&mut draw, 0.1), shape });
+        }
+    }
+    let template = Robot::load(&config("robots/ur5.toml")).expect("shipped");
+    let joint = template.joints[0].clone();
+    Robot {
+        joints: vec![joint; count],
+        chain: Chain::new(&joints).expect("one to eight"),
+        links: (0..=count).map(|i| format!("l{i}")).collect(),
+        shapes,
+        allowed_by_rule: Vec::new(),
+        ..template
+    }
+}
+
+fn kind(shape: &Shape) -> usize {
+    match shape {
+        Shape::Sphere { .. } => 0,
+        Shape::Capsule { .. } => 1,
+        Shape::Cylinder { .. } => 2,
+        Shape::Box { .. } => 3,
+        Shape::Mesh { .. } => 4,
+        Shape::Hull { .. } => 5,
+    }
+}
+
+fn empty() -> Scene {
+    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() }
+}
+
+/// Goal: no point of any shape moves further than `moves_m` says, seen from the base and from any link before it, nor is it
+/// further from an axis than `reach_m`.
+/// Method: random robots, poses and turns; points by plain kinematics. Of each kind of shape some points must come near the
+/// bound, or it would be too weak to show anything.
+#[test]
+fn no_point_of_any_shape_moves_further_than_its_bound() {
+    let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
+    let mut nearest = [0.0_f64; KINDS];
+    for seed in 0..3_000 {
+        let robot = robot(seed);
+        let scene = empty();
+        let world = World::new(&robot, &scene).expect("builds");
+        let mut draw = Draw::new(seed, 31);
+        let (mut q, mut turn, mut there): (JointArray, JointArray, JointArray) = Default::default();
+        for j in 0..robot.joints.len() {
+            q[j] = draw.within(-3.0, 3.0);
+            // Often one joint alone, by a little: there the bound is nearly exact.
+            turn[j] = if draw.unit() < 0.6 { 0.0 } else { draw.within(0.0, 0.3) };
+            there[j] = q[j] + turn[j] * if draw.unit() < 0.5 { 1.0 } else { draw.within(-1.0, 1.0) };
+        }
+        world.place(&q, &mut snapshot);
+        world.moves_m(&snapshot, &turn, &mut moves_m);
+        let (before, after) = (robot.chain.frames(&q), robot.chain.frames(&there));
+        for (body, shape) in robot.shapes.iter().enumerate() {
+            for point in points(&mut draw, &shape.shape) {
+                let at = |frames: &[Pose]| frames[shape.frame] * shape.pose * point;
+                for from in 0..shape.frame {
+                    let seen = |frames: &[Pose]| frames[from].inverse() * at(frames);
+                    let (moved_m, bound_m) = ((seen(&after) - seen(&before)).norm(), moves_m[body][from]);
+                    let name = format!("seed {seed}, shape {body} ({:?}) seen from {from}", shape.shape);
+                    assert!(moved_m <= bound_m + 1e-12, "{name}: {moved_m} above {bound_m}");
+                    let closest = &mut nearest[kind(&shape.shape)];
+                    if bound_m > 1e-3 {
+                        *closest = closest.max(moved_m / bound_m);
+                    }
+                }
+                for joint in 0..shape.frame {
+                    let axis = robot.chain.joint(joint).expect("a joint");
+                    let base = before[joint] * axis.pre;
+                    let lever_m = (base.inverse() * at(&before)).coords.cross(&axis.axis).norm();
+                    assert!(lever_m <= world.reach_m()[joint] + 1e-12, "seed {seed}: reach of joint {joint}");
+                }
+            }
+        }
+    }
+    for (kind, share) in nearest.iter().enumerate() {
+        assert!(*share > 0.9, "kind {kind}: no point came nearer than {share} to its bound");
+    }
+}
+
+/// Goal: what a sweep proves about a whole motion holds at every instant of it, for all shapes against all.
+/// Method: dense poses of random edges among random obstacles, each shape's distance as the world measures it there.
+#[test]
+fn clearance_that_a_sweep_proves_holds_at_every_pose_between() {
+    let mut proven = 0;
+    for seed in 0..1_500 {
+        let mut robot = robot(seed);
+        // Its own links overlap in nearly every pose; here the obstacles count.
+        robot.allowed_by_file =
+            (0..robot.links.len()).flat_map(|a| (a..robot.links.len()).map(move |b| (a, b))).collect();
+        let mut draw = Draw::new(seed, 32);
+        let obstacle = |i: usize, draw: &mut Draw| {
+            let kind = draw.index(KINDS);
+            Obstacle { name: format!("o{i}"), pose: pose(draw, 1.0), shape: shape(draw, kind) }
+        };
+        let obstacles = (0..3).map(|i| obstacle(i, &mut draw)).collect();
+        let scene = Scene { obstacles, ..empty() };
+        let world = World::new(&robot, &scene).expect("builds");
+        let mut ends: [JointArray; 2] = Default::default();
+        for end in &mut ends {
+            (0..robot.joints.len()).for_each(|j| end[j] = draw.within(-1.0, 1.0));
+        }
+        let edge = StraightEdge { from_rad: &ends[0], to_rad: &ends[1] };
+        let Ok(clearance) = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Work::unbounded()) else {
+            continue;
+        };
+        proven += 1;
+        let mut snapshot = Snapshot::default();
+        for step in 0..=200 {
+            let t = f64::from(step) / 200.0;
+            let q: JointArray = std::array::from_fn(|j| ends[0][j] + (ends[1][j] - ends[0][j]) * t);
+            world.place(&q, &mut snapshot);
+            for pair in world.pairs() {
+                let distance_m = world.distance_m(pair, &snapshot);
+                let least_m = clearance.proven_m;
+                assert!(
+                    distance_m >= least_m - 1e-9,
+                    "seed {seed}, t {t}: {distance_m} below the proven {least_m}"
+                );
+            }
+        }
+    }
+    assert!(proven > 200, "only {proven} motions were free");
+}
