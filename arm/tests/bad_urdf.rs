@@ -1,4 +1,5 @@
 //! URDF, SRDF and mesh files that are wrong: each is refused with file, element and value, and none makes a reader panic.
+#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use proptest::prelude::{any, prop, proptest};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
