@@ -9,7 +9,7 @@ mod doctor;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
-#[path = "cli/watch.rs"]
-mod watch;
 #[path = "cli/urdf.rs"]
 mod urdf;
+#[path = "cli/watch.rs"]
+mod watch;
