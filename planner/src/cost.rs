@@ -4,7 +4,8 @@
 //! over the links. This is a yardstick to compare with the paper; what may move is decided by [`crate::verify()`].
 //!
 //! Source: seed paper 000, eq. 3.5 to 3.10 in the corrected reading (its eq. 3.9 sums the distances over the links,
-//! so that its penalty never acts).
+//! so that its penalty never acts). [`Reading::Printed`] selects that sum.
+use crate::optimize::Reading;
 use taustream_arm::scene::Shape;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::chain::Pose;
@@ -19,12 +20,19 @@ pub struct CostModel {
     pub expansion_m: f64,
     /// Weights of path length (1/m), joint travel (1/rad) and penalty.
     pub weights: [f64; 3],
+    /// Printed: an obstacle's distance is the sum of its distances to all links; corrected: the least of them.
+    pub reading: Reading,
 }
 
 impl Default for CostModel {
     /// The paper's numbers.
     fn default() -> Self {
-        Self { waypoints_per_segment: 120, expansion_m: 0.1, weights: [7.0, 300.0, 1.2e7] }
+        Self {
+            waypoints_per_segment: 120,
+            expansion_m: 0.1,
+            weights: [7.0, 300.0, 1.2e7],
+            reading: Reading::Corrected,
+        }
     }
 }
 
@@ -189,11 +197,14 @@ impl Sum<'_> {
         self.last = Some((*position_rad, tip));
         self.cost.poses += 1;
         for (centre, radius_m) in self.spheres {
-            let distance_m = frames
+            let distances_m = frames
                 .windows(2)
                 .filter_map(|pair| if let [a, b] = pair { Some((origin(a), origin(b))) } else { None })
-                .map(|(a, b)| distance_to_segment_m(centre, &a, &b))
-                .fold(f64::INFINITY, f64::min);
+                .map(|(a, b)| distance_to_segment_m(centre, &a, &b));
+            let distance_m = match self.model.reading {
+                Reading::Corrected => distances_m.fold(f64::INFINITY, f64::min),
+                Reading::Printed => distances_m.sum(),
+            };
             let reach_m = radius_m + self.model.expansion_m;
             if distance_m < reach_m {
                 self.cost.collision = true;

@@ -5,6 +5,7 @@ use common::{pose, sphere, ur5};
 use std::path::PathBuf;
 use taustream_arm::{Scene, Shape};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_planner::optimize::Reading;
 use taustream_planner::{CostError, CostModel, PaperCost, paper_cost};
 
 const FREE: [[f64; 6]; 5] = [
@@ -69,6 +70,16 @@ fn cost_of_two_motions_agrees_with_the_python_program() {
             close(name, ours, theirs);
         }
     }
+}
+
+/// Goal: papers.md's erratum E3: the sum of the distances to all links is never small, so that a motion straight through
+/// a sphere is free.
+#[test]
+fn cost_as_printed_does_not_see_the_collision() {
+    let printed = CostModel { reading: Reading::Printed, ..CostModel::default() };
+    let hit = paper_cost(&ur5(), &spheres(), &paper_motion(&HIT, 6.0), &printed).expect("fits");
+    assert!(!hit.collision && hit.penalty.abs() <= 0.0, "{hit:?}");
+    close("cost", hit.cost, 7.0 * 2.293_349_720_613_12 + 300.0 * 8.2);
 }
 
 #[test]

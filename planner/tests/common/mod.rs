@@ -61,7 +61,7 @@ const UR5: [[f64; 3]; 6] = [
     [0.0, -std::f64::consts::FRAC_PI_2, 0.094_65],
     [0.0, 0.0, 0.082_3],
 ];
-const UR5_RADIUS_M: f64 = 0.06;
+pub(crate) const UR5_RADIUS_M: f64 = 0.06;
 
 type Matrix = [[f64; 4]; 4];
 
