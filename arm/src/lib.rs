@@ -28,6 +28,7 @@ pub mod scene;
 pub mod settings;
 pub mod trajectory_file;
 pub mod trust;
+pub mod turn;
 mod urdf;
 
 pub use bus_load::BusLoad;

@@ -40,6 +40,9 @@ pub enum DriveWish {
     Disabled,
     /// Energised, following the commands.
     Enabled,
+    /// What holds goes on holding, what is off stays off: nothing is energised, de-energised or moved. Drives that were
+    /// found holding ([`DriveState::Adopted`]) are taken into the cycle.
+    Keep,
     /// De-energised at once, whatever the state: the emergency wish.
     TorqueOff,
 }
@@ -51,8 +54,12 @@ pub enum DriveState {
     Absent,
     /// Being configured.
     Configuring,
-    /// It was found energised before anything was sent to it; nothing was changed, and nothing will be.
+    /// It was found energised before anything was sent to it, and not as this master would have left it; nothing was
+    /// changed, and nothing will be. [`ServoStatus::error_code`] and [`ServoStatus::refused_object`] say what differs.
     EnergisedUnowned,
+    /// Found energised exactly as this master leaves its drives; it holds [`ServoStatus::held_rad`] until the wish
+    /// changes from `Keep`.
+    Adopted,
     /// Configured, communicating, not energised.
     Disabled,
     /// On its way to energised.
@@ -76,6 +83,8 @@ pub struct ServoStatus {
     pub position_rad: f64,
     /// Measured link velocity; NaN when the drive does not send it.
     pub velocity_rad_s: f64,
+    /// Link angle that an adopted drive holds; NaN in every other state.
+    pub held_rad: f64,
     /// When the newest feedback arrived; `None` before the first.
     pub received: Option<Nanos>,
     /// The protocol's status word.
@@ -94,6 +103,7 @@ impl ServoStatus {
         state: DriveState::Absent,
         position_rad: f64::NAN,
         velocity_rad_s: f64::NAN,
+        held_rad: f64::NAN,
         received: None,
         status_word: 0,
         error_code: 0,

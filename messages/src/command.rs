@@ -26,6 +26,13 @@ pub enum Command {
     },
     /// Forget a fault whose cause is gone.
     ClearFault,
+    /// The operator says where a joint stands; only while nothing is energised.
+    Reference {
+        /// Zero-based joint.
+        joint: u32,
+        /// Its true angle.
+        at_rad: f64,
+    },
 }
 
 /// A command on the wire.
@@ -34,6 +41,8 @@ pub enum Command {
 pub struct CommandRequest {
     layout_version: u32,
     code: u32,
+    joint: u32,
+    reserved: u32,
     value: f64,
 }
 
@@ -69,22 +78,29 @@ pub enum CommandError {
         /// The value in the message.
         percent: f64,
     },
+    /// The angle of a reference is not a finite number.
+    #[error("reference at {at_rad} rad; it must be a finite number")]
+    Angle {
+        /// The value in the message.
+        at_rad: f64,
+    },
 }
 
 impl From<Command> for CommandRequest {
     fn from(command: Command) -> Self {
-        let (code, value) = match command {
-            Command::Enable => (1, 0.0),
-            Command::Disable => (2, 0.0),
-            Command::Pause => (3, 0.0),
-            Command::Resume => (4, 0.0),
-            Command::Stop => (5, 0.0),
-            Command::FastStop => (6, 0.0),
-            Command::TorqueOff => (7, 0.0),
-            Command::Speed { percent } => (8, percent),
-            Command::ClearFault => (9, 0.0),
+        let (code, joint, value) = match command {
+            Command::Enable => (1, 0, 0.0),
+            Command::Disable => (2, 0, 0.0),
+            Command::Pause => (3, 0, 0.0),
+            Command::Resume => (4, 0, 0.0),
+            Command::Stop => (5, 0, 0.0),
+            Command::FastStop => (6, 0, 0.0),
+            Command::TorqueOff => (7, 0, 0.0),
+            Command::Speed { percent } => (8, 0, percent),
+            Command::ClearFault => (9, 0, 0.0),
+            Command::Reference { joint, at_rad } => (10, joint, at_rad),
         };
-        Self { layout_version: LAYOUT_VERSION, code, value }
+        Self { layout_version: LAYOUT_VERSION, code, joint, reserved: 0, value }
     }
 }
 
@@ -106,6 +122,8 @@ impl TryFrom<&CommandRequest> for Command {
             8 if (0.0..=100.0).contains(&r.value) => Self::Speed { percent: r.value },
             8 => return Err(CommandError::Percent { percent: r.value }),
             9 => Self::ClearFault,
+            10 if r.value.is_finite() => Self::Reference { joint: r.joint, at_rad: r.value },
+            10 => return Err(CommandError::Angle { at_rad: r.value }),
             got => return Err(CommandError::Unknown { got }),
         })
     }
@@ -148,5 +166,5 @@ impl CommandReply {
     }
 }
 
-const _: () = assert!(size_of::<CommandRequest>() == 16);
+const _: () = assert!(size_of::<CommandRequest>() == 24);
 const _: () = assert!(size_of::<CommandReply>() == 264);

@@ -24,8 +24,9 @@ pub enum FaultReason {
     BringUp = 8,
     /// A drive left its operating state without being told; code = statusword.
     DriveDropped = 9,
-    /// Drives are not at rest, or energised by somebody else; value = rad/s.
-    NotTrusted = 10,
+    /// A drive was found energised, and not as this arm's settings would have left it; code = its error code,
+    /// object = what differs.
+    EnergisedUnowned = 10,
     /// The operator asked for torque off.
     TorqueOff = 11,
     /// The operator asked for a fast stop.
@@ -48,7 +49,7 @@ impl FaultReason {
         Self::Stall,
         Self::BringUp,
         Self::DriveDropped,
-        Self::NotTrusted,
+        Self::EnergisedUnowned,
         Self::TorqueOff,
         Self::Operator,
         Self::ConfigurationRefused,
@@ -78,7 +79,7 @@ impl FaultReason {
             Self::Stall => "loop stalled (s)",
             Self::BringUp => "drive not ready in time (s)",
             Self::DriveDropped => "drive left operation by itself (statusword)",
-            Self::NotTrusted => "arm not at rest (rad/s), or energised by somebody else",
+            Self::EnergisedUnowned => "energised, unowned",
             Self::TorqueOff => "torque switched off by the operator",
             Self::Operator => "fast stop by the operator",
             Self::ConfigurationRefused => "drive refused its configuration",
@@ -248,7 +249,9 @@ impl Cause {
         match self.reason {
             FaultReason::TorqueOff | FaultReason::Operator => Evidence::None,
             FaultReason::DriveFault => Evidence::DriveError(self.code),
-            FaultReason::ConfigurationRefused => Evidence::Refusal { code: self.code, object: self.object },
+            FaultReason::ConfigurationRefused | FaultReason::EnergisedUnowned => {
+                Evidence::Refusal { code: self.code, object: self.object }
+            }
             FaultReason::DriveDropped | FaultReason::DriveWarning => Evidence::Statusword(self.code),
             FaultReason::BusFault => Evidence::Bus(BusTrouble::from_code(self.code)),
             FaultReason::FeedbackLate
@@ -256,8 +259,7 @@ impl Cause {
             | FaultReason::PositionJump
             | FaultReason::Guard
             | FaultReason::Stall
-            | FaultReason::BringUp
-            | FaultReason::NotTrusted => {
+            | FaultReason::BringUp => {
                 if self.limit > 0.0 {
                     Evidence::Amount { value: self.value, limit: self.limit }
                 } else {

@@ -13,6 +13,7 @@ pub mod plan;
 pub mod receipt;
 pub mod report;
 pub mod service;
+pub mod standing;
 pub mod text;
 pub mod trajectory;
 
@@ -23,6 +24,7 @@ pub use phase::Phase;
 pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
 pub use report::Report;
+pub use standing::Standing;
 pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 

@@ -6,8 +6,8 @@ use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::trajectory::{Doctored, MessageError};
 use taustream_messages::{
-    CheckedTrajectory, Command, CommandReply, CommandRequest, Outcome, Phase, PlanReply, PlanRequest,
-    Receipt, Rejection, Replaces, Report, Text, TrajectoryMessage,
+    CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome, Phase, PlanReply,
+    PlanRequest, Receipt, Rejection, Replaces, Report, Text, TrajectoryMessage,
 };
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
@@ -95,7 +95,7 @@ fn trajectory_written_and_read_is_the_same() {
 #[test]
 fn trajectory_doctored_in_one_field_is_refused_for_that_field() {
     let cases: [(Doctored, &str); 10] = [
-        (Doctored::Layout(2), "layout version 2"),
+        (Doctored::Layout(LAYOUT_VERSION + 1), "layout version 3"),
         (Doctored::Joints(0), "0 joints"),
         (Doctored::Joints(9), "joint_count is 9"),
         (Doctored::StrokeCount(600), "stroke_count is 600; at most 512"),

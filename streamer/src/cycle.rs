@@ -11,6 +11,7 @@ use crate::report::Reporter;
 use crate::supervise::{Orders, Supervisor};
 use crate::tick::Tick;
 use crate::track::Track;
+use crate::turns::Memory;
 use taustream_arm::Settings;
 use taustream_drivers::{CanLink, DriveWish};
 
@@ -110,6 +111,11 @@ impl Core {
         }
     }
 
+    /// Takes the last pose that is known, before the first cycle.
+    pub fn recall(&mut self, memory: &Memory) {
+        self.supervisor.turns_mut().recall(memory);
+    }
+
     /// The reading ends of the cycle's queues.
     #[must_use]
     pub fn readers(&self) -> crate::report::Readers {
@@ -185,13 +191,15 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     let command = core.guard.limit(&wanted, &mut facts); // The last gate before metal.
     probe.ended(Stage::Guard);
 
-    core.buses.encode(tick.woke, wish, command.joints());
+    let told = core.supervisor.turns().tell(command.joints());
+    core.buses.encode(tick.woke, wish, &told);
     probe.ended(Stage::Encode);
     core.buses.send(&mut facts);
     core.track.commit(&command.setpoint().position_rad, &mut facts);
     core.guard.commit(&facts);
     probe.ended(Stage::Send);
     core.buses.receive(tick.woke, &mut facts);
+    core.supervisor.turns_mut().read(&mut facts);
     probe.ended(Stage::Receive);
 
     let mut answers: Answers = [None; _];

@@ -29,5 +29,6 @@ pub mod service;
 pub mod supervise;
 pub mod tick;
 pub mod track;
+pub mod turns;
 pub mod watch;
 pub mod words;

@@ -34,6 +34,7 @@ impl Supervisor {
             }
             Command::Speed { percent } => self.set_speed(percent, facts, orders),
             Command::ClearFault => self.clear_fault(facts, orders),
+            Command::Reference { joint, at_rad } => self.reference(joint, at_rad, facts),
         };
         let (accepted, why) = match result {
             Ok(why) => (true, why),
@@ -63,6 +64,13 @@ impl Supervisor {
 
     fn enable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
         match self.phase {
+            Phase::Locked if self.adopted => {
+                let pose_rad = self.trusted_pose(facts)?;
+                self.watch.restart(&pose_rad);
+                orders.pose_rad = Some(pose_rad);
+                self.step(Event::TakeOverAsked, facts, orders);
+                Ok(Why::TakingOver)
+            }
             Phase::Locked => {
                 self.step(Event::EnableAsked, facts, orders);
                 Ok(Why::Unlocked)
@@ -89,7 +97,8 @@ impl Supervisor {
         }
     }
 
-    /// The measured pose, if every joint answers, rests, and stands inside its range.
+    /// The pose to energise at: where each joint stands, or what its drive holds from before. Only if every joint answers,
+    /// is referenced, rests, and stands inside its range.
     fn trusted_pose(&self, facts: &Facts) -> Result<JointArray, Why> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(facts) {
@@ -100,8 +109,19 @@ impl Supervisor {
             if servo.warning {
                 return Err(Why::Warns { joint, status_word: servo.status_word });
             }
+            let resolved = self.turns.resolved(joint);
+            if !resolved.standing.is_referenced() {
+                let (standing, by_rad) = (resolved.standing, resolved.by_rad);
+                return Err(Why::NotReferenced { joint, standing, by_rad });
+            }
             let range_rad = self.limits[joint].position_rad;
-            let position_rad = servo.position_rad;
+            let holds = servo.state == DriveState::Adopted;
+            let position_rad = if holds { servo.held_rad } else { servo.position_rad };
+            let (error_rad, limit_rad) =
+                ((position_rad - servo.position_rad).abs(), self.rules.tracking_error_rad_max);
+            if error_rad.is_nan() || error_rad > limit_rad {
+                return Err(Why::Tracking { joint, error_rad, limit_rad });
+            }
             if !(range_rad[0]..=range_rad[1]).contains(&position_rad) {
                 return Err(Why::OutOfRange { joint, position_rad, range_rad });
             }
@@ -117,7 +137,7 @@ impl Supervisor {
     fn disable(&mut self, facts: &Facts, orders: &mut Orders) -> Result<Why, Why> {
         match self.phase {
             Phase::Fault if self.holds => {
-                self.holds = false;
+                (self.holds, self.adopted) = (false, false);
                 // Nothing is said on a failed bus: its drives are where their own watchdogs have left them.
                 match facts.failed_bus() {
                     Some((bus, _)) if self.held_in_reach(facts).is_none() => Err(Why::OutOfReach { bus }),
@@ -198,6 +218,7 @@ impl Supervisor {
             orders.speed = Some(ScaleOrder::Wish((percent / 100.0).clamp(0.0, 1.0)));
         }
         self.speed = (percent / 100.0).clamp(0.0, 1.0);
+        self.speed_chosen = true;
         Ok(Why::SpeedSet { percent, moving })
     }
 
@@ -220,12 +241,20 @@ impl Supervisor {
         }
         if self.holds {
             self.may_hold_on(facts)?;
+            // What the last try to take them over has found.
+            orders.clear_faults = self.adopted;
             self.clear(Event::ClearedHolding, facts, orders);
             return Ok(Why::ClearedHolding);
         }
-        if let Some((joint, state)) = self.energised(facts) {
-            let unowned = state == DriveState::EnergisedUnowned;
-            return Err(if unowned { Why::Unowned { joint } } else { Why::StillEnergised { joint } });
+        let foreign = self.servos(facts).find(|(_, s)| s.state == DriveState::EnergisedUnowned);
+        if let Some((joint, _)) = foreign {
+            return Err(Why::Unowned { joint });
+        }
+        // Drives that hold from before go on holding; they are adopted once all drives are known.
+        if let Some((joint, state)) = self.energised(facts)
+            && state != DriveState::Adopted
+        {
+            return Err(Why::StillEnergised { joint });
         }
         orders.clear_faults = true;
         let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
@@ -240,6 +269,10 @@ impl Supervisor {
     /// A fault is forgotten while drives hold only if every one of them does, and nothing is left to complain about.
     fn may_hold_on(&self, facts: &Facts) -> Result<(), Why> {
         for (joint, servo) in self.servos(facts) {
+            let kept = self.adopted && matches!(servo.state, DriveState::Adopted | DriveState::Disabled);
+            if kept {
+                continue;
+            }
             if servo.state != DriveState::Enabled {
                 return Err(Why::PartlyEnergised { joint, state: servo.state });
             }
@@ -255,5 +288,26 @@ impl Supervisor {
             }
         }
         Ok(())
+    }
+
+    /// The operator's word about where a joint stands: taken only while nothing is energised and the arm rests.
+    fn reference(&mut self, joint: u32, at_rad: f64, facts: &Facts) -> Result<Why, Why> {
+        let joint = usize::try_from(joint).unwrap_or(usize::MAX);
+        let Some(servo) = facts.servos.get(joint).filter(|_| joint < self.joints) else {
+            return Err(Why::NoSuchJoint { joint });
+        };
+        if let Some((energised, state)) = self.energised(facts) {
+            return Err(Why::Energised { joint: energised, state });
+        }
+        let age_s = self.watch.age_s(facts, joint);
+        if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
+            return Err(Why::NoFeedback { joint, age_s });
+        }
+        let (moving, speed_rad_s) = self.watch.fastest().ok_or(Why::SpeedUnknown)?;
+        if speed_rad_s > REST_RAD_S {
+            return Err(Why::NotAtRest { joint: moving, speed_rad_s, limit_rad_s: REST_RAD_S });
+        }
+        let at_rad = self.turns.refer(joint, servo.position_rad, at_rad)?;
+        Ok(Why::Referenced { joint, at_rad })
     }
 }

@@ -11,8 +11,12 @@ pub enum Event {
     DrivesReady,
     /// A drive that was ready is not any more, without a fault.
     DrivesLost,
+    /// Drives were found holding from before this start, and are ours.
+    HoldAdopted,
     /// The operator asked for energised drives.
     EnableAsked,
+    /// The operator asked for adopted drives to be taken over.
+    TakeOverAsked,
     /// Every drive is energised and follows.
     DrivesEnabled,
     /// A trajectory was accepted.
@@ -47,10 +51,12 @@ pub enum Event {
 
 impl Event {
     /// Every event.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::DrivesReady,
         Self::DrivesLost,
+        Self::HoldAdopted,
         Self::EnableAsked,
+        Self::TakeOverAsked,
         Self::DrivesEnabled,
         Self::Accepted,
         Self::EndReached,
@@ -74,7 +80,9 @@ impl Event {
         match self {
             Self::DrivesReady => "drives ready",
             Self::DrivesLost => "a drive is not ready any more",
+            Self::HoldAdopted => "drives found holding are adopted",
             Self::EnableAsked => "enable asked",
+            Self::TakeOverAsked => "take-over asked",
             Self::DrivesEnabled => "drives energised",
             Self::Accepted => "trajectory accepted",
             Self::EndReached => "end of trajectory",
@@ -110,7 +118,7 @@ pub fn next(phase: Phase, event: Event) -> Option<Phase> {
             P::Disabled
         }
         (P::Disabled, E::DrivesLost) => P::Configuring,
-        (P::Disabled, E::EnableAsked) => P::Enabling,
+        (P::Disabled, E::EnableAsked) | (P::Locked, E::TakeOverAsked) => P::Enabling,
         (P::Enabling, E::DrivesEnabled) | (P::Locked, E::EnableAsked) => P::Holding,
 
         (P::Holding, E::Accepted) | (P::Pausing | P::Paused, E::ResumeAsked) => P::Moving,
@@ -128,7 +136,7 @@ pub fn next(phase: Phase, event: Event) -> Option<Phase> {
         | (P::FastStopping, E::AtRest | E::EndReached)
         | (P::Braking, E::AtRest) => P::Fault,
 
-        (P::Fault, E::ClearedHolding) => P::Locked,
+        (P::Fault, E::ClearedHolding) | (P::Configuring | P::Disabled, E::HoldAdopted) => P::Locked,
         (P::Holding | P::Paused | P::Locked | P::Enabling, E::DisableAsked) => P::Disabling,
         _ => return None,
     })
@@ -140,8 +148,8 @@ mod tests {
 
     /// The table as the documentation draws it, one line a phase, written independently of the match above.
     const TABLE: &str = "
-        configuring: DrivesReady>disabled HardFault>fault
-        disabled: DrivesLost>configuring EnableAsked>enabling HardFault>fault
+        configuring: DrivesReady>disabled HoldAdopted>locked HardFault>fault
+        disabled: DrivesLost>configuring HoldAdopted>locked EnableAsked>enabling HardFault>fault
         enabling: DrivesEnabled>holding DisableAsked>disabling StopFault>fault HardFault>fault
         holding: Accepted>moving DisableAsked>disabling StopFault>fault HardFault>fault
         moving: EndReached>holding PauseAsked>pausing StopAsked>stopping StalledLong>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
@@ -151,7 +159,7 @@ mod tests {
         fast-stopping: EndReached>fault AtRest>fault GuardTrip>braking HardFault>fault
         braking: AtRest>fault HardFault>fault
         fault: ClearedHolding>locked ClearedOff>disabled
-        locked: EnableAsked>holding DisableAsked>disabling StopFault>fault HardFault>fault
+        locked: EnableAsked>holding TakeOverAsked>enabling DisableAsked>disabling StopFault>fault HardFault>fault
         disabling: DrivesDisabled>disabled HardFault>fault";
 
     fn drawn(phase: Phase, event: Event) -> Option<&'static str> {

@@ -376,6 +376,10 @@ impl Reporter {
         r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
         r.command_jerk_rad_s3 = setpoint.jerk_rad_s3;
         (r.tracking_error_rad, r.tracking_error_rad_max) = (tracking_error_rad, tracking_error_rad_max);
+        (r.first_speed, r.adopted) =
+            (u32::from(supervisor.is_first_speed()), u32::from(supervisor.has_adopted()));
+        r.turn_offset_rad = supervisor.turns().offsets_rad();
+        r.standing = std::array::from_fn(|joint| supervisor.turns().resolved(joint).standing.code());
         for (joint, servo) in facts.servos.iter().enumerate().take(joints) {
             r.measured_rad[joint] = servo.position_rad;
             r.measured_velocity_rad_s[joint] = servo.velocity_rad_s;

@@ -7,6 +7,7 @@ use crate::facts::{Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition}
 use crate::intake::{Answers, Leave};
 use crate::phases::{self, Event};
 use crate::track::ScaleOrder;
+use crate::turns::Turns;
 use crate::watch::Watch;
 use crate::words::{Answer, Why};
 use taustream_arm::Settings;
@@ -55,8 +56,13 @@ pub struct Supervisor {
     cause: Option<Cause>,
     /// In fault: the drives hold instead of being off.
     pub(crate) holds: bool,
+    /// Drives are kept that were found holding at start.
+    pub(crate) adopted: bool,
+    pub(crate) turns: Turns,
     pub(crate) torque_off: bool,
     pub(crate) speed: f64,
+    /// Somebody has chosen the speed since the start.
+    pub(crate) speed_chosen: bool,
     /// A stall froze the motion; it goes on when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
     pub(crate) resetting_since: Option<Nanos>,
@@ -84,7 +90,10 @@ impl Supervisor {
             since: Nanos(0),
             cause: None,
             holds: false,
+            adopted: false,
+            turns: Turns::new(settings),
             torque_off: false,
+            speed_chosen: false,
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
             resetting_since: None,
@@ -94,6 +103,24 @@ impl Supervisor {
         }
     }
 
+    /// The turns of the joints.
+    #[must_use]
+    pub fn turns(&self) -> &Turns {
+        &self.turns
+    }
+    pub(crate) fn turns_mut(&mut self) -> &mut Turns {
+        &mut self.turns
+    }
+    /// Drives are kept that were found holding at start.
+    #[must_use]
+    pub fn has_adopted(&self) -> bool {
+        self.adopted
+    }
+    /// The speed override is still that of the start, and reduced.
+    #[must_use]
+    pub fn is_first_speed(&self) -> bool {
+        !self.speed_chosen && self.speed < 1.0
+    }
     /// The phase.
     #[must_use]
     pub fn phase(&self) -> Phase {
@@ -124,6 +151,7 @@ impl Supervisor {
         match self.phase {
             Phase::Configuring | Phase::Disabled | Phase::Disabling => DriveWish::Disabled,
             Phase::Fault if !self.holds => DriveWish::Disabled,
+            Phase::Fault | Phase::Locked if self.adopted => DriveWish::Keep,
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -165,6 +193,8 @@ impl Supervisor {
             *slot = Some(transition);
         }
         (self.phase, self.since) = (to, facts.tick.woke);
+        // Drives that follow commands, or are let go, are kept no more.
+        self.adopted &= !matches!(to, Phase::Holding | Phase::Disabling | Phase::Disabled);
         match to {
             Phase::Holding | Phase::Fault | Phase::Disabling | Phase::Locked => {
                 orders.drop_trajectory = true;
@@ -185,13 +215,15 @@ impl Supervisor {
 
     pub(crate) fn raise(&mut self, event: Event, cause: Cause, facts: &Facts, orders: &mut Orders) {
         // Drives that were on their way to energised go back; drives that carry the arm hold.
-        let holds = self.wish() == DriveWish::Enabled && self.phase != Phase::Enabling;
+        let wanted = matches!(self.wish(), DriveWish::Enabled | DriveWish::Keep);
+        let holds = wanted && (self.phase != Phase::Enabling || self.adopted);
         let before = self.cause.replace(cause);
         if phases::next(self.phase, event).is_none() {
             self.cause = before;
             return;
         }
         self.holds = holds && event != Event::HardFault;
+        self.adopted &= self.holds;
         self.step(event, facts, orders);
     }
 
@@ -276,6 +308,7 @@ impl Supervisor {
                 }
             }
             Phase::Fault => self.judge_fault(facts, orders),
+            Phase::Locked if self.adopted => self.judge_adopted(facts, orders),
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -302,11 +335,12 @@ impl Supervisor {
         let bad = self.servos(facts).find_map(|(joint, servo)| {
             let reason = match servo.state {
                 DriveState::Refused => FaultReason::ConfigurationRefused,
-                DriveState::EnergisedUnowned => FaultReason::NotTrusted,
+                DriveState::EnergisedUnowned => FaultReason::EnergisedUnowned,
                 DriveState::Fault => FaultReason::DriveFault,
                 DriveState::Absent
                 | DriveState::Configuring
                 | DriveState::Disabled
+                | DriveState::Adopted
                 | DriveState::Enabling
                 | DriveState::Enabled
                 | DriveState::Disabling => return None,
@@ -316,6 +350,11 @@ impl Supervisor {
         });
         if let Some(cause) = bad {
             self.raise(Event::HardFault, cause, facts, orders);
+        } else if self.all(facts, |s| matches!(s.state, DriveState::Disabled | DriveState::Adopted))
+            && self.servos(facts).any(|(_, s)| s.state == DriveState::Adopted)
+        {
+            self.adopted = true;
+            self.step(Event::HoldAdopted, facts, orders);
         } else if self.all(facts, |s| s.state == DriveState::Disabled) && self.watch.fastest().is_some() {
             // Ready to be energised includes that rest can be told from motion: the first `enable` is not refused for it.
             self.step(Event::DrivesReady, facts, orders);
@@ -324,10 +363,42 @@ impl Supervisor {
         }
     }
 
+    /// Drives that hold from before: each is either kept or off, and those that are kept answer and stay.
+    fn judge_adopted(&mut self, facts: &Facts, orders: &mut Orders) {
+        let rules = self.rules;
+        let unheard = |this: &Self, joint| this.watch.age_s(facts, joint).is_infinite();
+        let lost = self.servos(facts).find_map(|(joint, servo)| match servo.state {
+            DriveState::Disabled => None,
+            // Its process data is only being begun.
+            DriveState::Adopted if unheard(self, joint) => None,
+            DriveState::Adopted => {
+                let sag_rad = (servo.position_rad - servo.held_rad).abs();
+                let limit = rules.tracking_error_rad_max;
+                let far = Cause::new(FaultReason::TrackingError).at_joint(joint).amount(sag_rad, limit);
+                let late = self.watch.late_cause(facts, joint);
+                late.or_else(|| (sag_rad.is_nan() || sag_rad > limit).then_some(far))
+            }
+            DriveState::Absent
+            | DriveState::Configuring
+            | DriveState::EnergisedUnowned
+            | DriveState::Enabling
+            | DriveState::Enabled
+            | DriveState::Disabling
+            | DriveState::Fault
+            | DriveState::Refused => self.watch.drive_cause(facts, joint),
+        });
+        let begun = |s: &ServoStatus| s.state != DriveState::Adopted || s.received.is_some();
+        let overdue = || self.overdue(facts, begun).filter(|_| !self.all(facts, begun));
+        let cause = self.watch.bus_cause(facts).or(lost).or_else(overdue);
+        if let Some(cause) = cause {
+            self.raise(Event::StopFault, cause, facts, orders);
+        }
+    }
+
     fn judge_fault(&mut self, facts: &Facts, orders: &mut Orders) {
         // Drives that have all dropped out do not come back by themselves.
         if self.holds && self.energised(facts).is_none() {
-            self.holds = false;
+            (self.holds, self.adopted) = (false, false);
         }
         let Some(since) = self.resetting_since else { return };
         let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
@@ -353,8 +424,10 @@ impl Supervisor {
         }
         let mut pose_rad = facts.commanded_rad;
         for (joint, servo) in self.servos(facts) {
-            if servo.position_rad.is_finite() {
-                pose_rad[joint] = servo.position_rad;
+            // What holds keeps its own target: following a sag would creep.
+            let at_rad = if servo.held_rad.is_finite() { servo.held_rad } else { servo.position_rad };
+            if at_rad.is_finite() {
+                pose_rad[joint] = at_rad;
             }
         }
         orders.pose_rad = Some(pose_rad);
@@ -381,7 +454,7 @@ impl Supervisor {
                     Phase::Holding | Phase::Locked | Phase::Enabling => {
                         self.step(Event::DisableAsked, facts, orders);
                     }
-                    Phase::Fault => self.holds = false,
+                    Phase::Fault => (self.holds, self.adopted) = (false, false),
                     Phase::Configuring
                     | Phase::Disabled
                     | Phase::Stopping
@@ -401,7 +474,7 @@ impl Supervisor {
 
     pub(crate) fn switch_off(&mut self, facts: &Facts, orders: &mut Orders) {
         self.torque_off = true;
-        self.holds = false;
+        (self.holds, self.adopted) = (false, false);
         self.resetting_since = None;
         let asked = Cause::new(FaultReason::TorqueOff);
         // A fault that stopped the arm before stays the one to report.
@@ -444,6 +517,10 @@ impl Supervisor {
 pub(crate) fn is_energised(state: DriveState) -> bool {
     matches!(
         state,
-        DriveState::Enabled | DriveState::Enabling | DriveState::Disabling | DriveState::EnergisedUnowned
+        DriveState::Enabled
+            | DriveState::Enabling
+            | DriveState::Disabling
+            | DriveState::Adopted
+            | DriveState::EnergisedUnowned
     )
 }

@@ -181,6 +181,18 @@ impl Watch {
         found.map(|(reason, value, limit)| Cause::new(reason).at_joint(joint).amount(value, limit))
     }
 
+    /// Feedback of one joint that is late or jumps; for a drive that follows no commands of ours.
+    #[must_use]
+    pub(crate) fn late_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
+        self.feedback_cause(facts, joint).filter(|cause| cause.reason != FaultReason::TrackingError)
+    }
+
+    /// Why a drive is not where it should be.
+    #[must_use]
+    pub(crate) fn drive_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
+        drive_cause(facts, joint, false)
+    }
+
     /// Age of a joint's newest feedback, s; infinite before the first.
     #[must_use]
     pub fn age_s(&self, facts: &Facts, joint: usize) -> f64 {
@@ -239,6 +251,7 @@ fn transport_cycles(settings: &Settings) -> [usize; MAX_JOINTS] {
 fn reports(state: DriveState) -> bool {
     match state {
         DriveState::Disabled
+        | DriveState::Adopted
         | DriveState::Enabling
         | DriveState::Enabled
         | DriveState::Disabling
@@ -258,12 +271,15 @@ fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
     let warning = cause(FaultReason::DriveWarning, servo.status_word);
     match servo.state {
         DriveState::Fault => Some(fault),
+        // On its way to being taken over, until it says why not.
+        DriveState::Adopted if enabling => (servo.error_code != 0).then_some(fault),
         // A warning is the drive's last word before it drops out: the arm stops while it still can.
         DriveState::Enabled => servo.warning.then_some(warning),
         DriveState::Disabled | DriveState::Enabling => (!enabling).then_some(dropped),
         DriveState::Absent
         | DriveState::Configuring
         | DriveState::EnergisedUnowned
+        | DriveState::Adopted
         | DriveState::Disabling
         | DriveState::Refused => Some(dropped),
     }

@@ -1,7 +1,7 @@
 //! Why a command was taken over or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
 use taustream_drivers::DriveState;
-use taustream_messages::Phase;
+use taustream_messages::{Phase, Standing};
 
 /// The cycle's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Answer {
 pub enum Why {
     Enabling,
     Unlocked,
+    TakingOver,
+    Referenced { joint: usize, at_rad: f64 },
     Disabling,
     Pausing,
     Resuming,
@@ -54,6 +56,12 @@ pub enum Why {
     Unowned { joint: usize },
     PartlyEnergised { joint: usize, state: DriveState },
     StillEnergised { joint: usize },
+    NotReferenced { joint: usize, standing: Standing, by_rad: f64 },
+    ReferenceOutside { joint: usize, at_rad: f64, range_rad: [f64; 2] },
+    ReferenceFar { joint: usize, at_rad: f64, nearest_rad: f64, limit_rad: f64 },
+    ReferenceNotNeeded { joint: usize, reading_rad: f64, at_rad: f64 },
+    NoSuchJoint { joint: usize },
+    Energised { joint: usize, state: DriveState },
     Wait,
     Leaving,
 }
@@ -62,7 +70,7 @@ impl Why {
     /// The sentence for people.
     #[must_use]
     pub fn sentence(&self, names: &Names) -> String {
-        self.taken().unwrap_or_else(|| self.refused(names))
+        self.taken().or_else(|| self.of_turns(names)).unwrap_or_else(|| self.refused(names))
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
@@ -70,6 +78,7 @@ impl Why {
         let text = match self {
             Self::Enabling => "drives are being energised at the measured pose",
             Self::Unlocked => "the arm holds and takes trajectories",
+            Self::TakingOver => "the drives that hold from before are taken over where they hold",
             Self::Disabling => "drives are being de-energised",
             Self::Pausing => "slowing down on the path; `resume` goes on",
             Self::Resuming => "going on along the path",
@@ -91,6 +100,48 @@ impl Why {
             _ => return None,
         };
         Some(text.to_owned())
+    }
+
+    /// Answers that have to do with turns.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
+    fn of_turns(&self, names: &Names) -> Option<String> {
+        Some(match *self {
+            Self::Referenced { joint, at_rad } => {
+                format!("{} stands at {at_rad:.6} rad; it is kept on disk", names.joint(joint))
+            }
+            Self::NotReferenced { joint, standing, by_rad } => {
+                let by = match standing {
+                    Standing::RecordFar => format!(" (by {by_rad:.4} rad)"),
+                    _ => String::new(),
+                };
+                format!(
+                    "{} is not referenced: {}{by}; look where it stands, then `taustream reference --joint ..`",
+                    names.joint(joint),
+                    standing.word()
+                )
+            }
+            Self::ReferenceOutside { joint, at_rad, range_rad: [low, high] } => format!(
+                "{} cannot stand at {at_rad:.4} rad: its range is [{low:.4}, {high:.4}]; measure again",
+                names.joint(joint)
+            ),
+            Self::ReferenceFar { joint, at_rad, nearest_rad, limit_rad } => format!(
+                "{} cannot stand at {at_rad:.4} rad: the nearest turn of its feedback is {nearest_rad:.4} rad, {:.4} rad away (at most {limit_rad:.4}); measure again, or mend zero_offset_rad and sign",
+                names.joint(joint),
+                (nearest_rad - at_rad).abs()
+            ),
+            Self::ReferenceNotNeeded { joint, reading_rad, at_rad } => format!(
+                "{} needs no reference: its feedback tells every angle and says {reading_rad:.6} rad, {:.6} rad from {at_rad:.6}; if that is wrong, mend zero_offset_rad or sign in the settings",
+                names.joint(joint),
+                (reading_rad - at_rad).abs()
+            ),
+            Self::NoSuchJoint { joint } => format!("there is no joint {}", joint + 1),
+            Self::Energised { joint, state } => format!(
+                "{} may only be referenced while nothing is energised (its drive is {}); support the arm and `disable` first",
+                names.joint(joint),
+                state_word(state)
+            ),
+            _ => return None,
+        })
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
@@ -139,7 +190,7 @@ impl Why {
                 names.bus(bus)
             ),
             Self::Unowned { joint } => format!(
-                "the drive of {} was found energised by somebody else and is left alone; end that program, or `torque-off` (the arm may fall)",
+                "the drive of {} is energised, unowned, and left alone; end the program that uses it, or support the arm and `torque-off`",
                 name(joint)
             ),
             Self::PartlyEnergised { joint, state } => format!(
@@ -179,7 +230,8 @@ pub fn state_word(state: DriveState) -> &'static str {
     match state {
         DriveState::Absent => "not heard",
         DriveState::Configuring => "being configured",
-        DriveState::EnergisedUnowned => "energised by somebody else",
+        DriveState::EnergisedUnowned => "energised, unowned",
+        DriveState::Adopted => "holding from before this start",
         DriveState::Disabled => "de-energised",
         DriveState::Enabling => "being energised",
         DriveState::Enabled => "energised",

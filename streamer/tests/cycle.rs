@@ -16,6 +16,8 @@ mod motion;
 #[path = "cycle_suite/power.rs"]
 mod power;
 mod rig;
+#[path = "cycle_suite/trust.rs"]
+mod trust;
 
 use rig::Rig;
 use taustream_motion::Trajectory;

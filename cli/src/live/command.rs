@@ -40,6 +40,7 @@ pub(crate) fn word(command: Command) -> &'static str {
         Command::TorqueOff => "torque-off",
         Command::Speed { .. } => "speed",
         Command::ClearFault => "clear-fault",
+        Command::Reference { .. } => "reference",
     }
 }
 
@@ -55,7 +56,7 @@ fn is_reached(command: Command, phase: Phase) -> bool {
         Command::Stop => de_energised || matches!(phase, Phase::Holding | Phase::Locked | Phase::Fault),
         Command::FastStop => de_energised || phase == Phase::Fault,
         Command::ClearFault => matches!(phase, Phase::Locked | Phase::Disabled),
-        Command::Resume | Command::TorqueOff | Command::Speed { .. } => true,
+        Command::Resume | Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. } => true,
     }
 }
 
@@ -73,6 +74,7 @@ fn is_so_already(command: Command, phase: Phase) -> bool {
         | Command::FastStop
         | Command::TorqueOff
         | Command::Speed { .. }
+        | Command::Reference { .. }
         | Command::ClearFault => false,
     }
 }
@@ -159,7 +161,7 @@ fn wait_for(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Re
 mod tests {
     use super::*;
 
-    const ALL: [Command; 9] = [
+    const ALL: [Command; 10] = [
         Command::Enable,
         Command::Disable,
         Command::Pause,
@@ -169,6 +171,7 @@ mod tests {
         Command::TorqueOff,
         Command::Speed { percent: 50.0 },
         Command::ClearFault,
+        Command::Reference { joint: 0, at_rad: 0.5 },
     ];
 
     #[test]
@@ -176,7 +179,10 @@ mod tests {
         for command in ALL {
             assert!(Phase::ALL.iter().any(|p| is_reached(command, *p)), "{command:?}");
             for phase in Phase::ALL {
-                let at_once = matches!(command, Command::Resume | Command::TorqueOff | Command::Speed { .. });
+                let at_once = matches!(
+                    command,
+                    Command::Resume | Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. }
+                );
                 let both = is_reached(command, phase) && is_lost(command, phase);
                 assert!(at_once || !both, "{command:?} {phase:?}");
             }

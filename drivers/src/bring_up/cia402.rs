@@ -3,9 +3,10 @@
 //! First it only listens: a drive that is energised before this master has configured it is left as it is. Then the
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's patient
 //! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
+use crate::bring_up::adopt::Adoption;
 use crate::bring_up::pace::{Cycle, Patience};
 use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
-use crate::bring_up::power::{Heard, Power};
+use crate::bring_up::power::{Aim, Heard, Power};
 use crate::bring_up::trouble::Trouble;
 use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
 use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING};
@@ -18,9 +19,9 @@ use crate::servo::{DriveState, DriveWish, Nanos};
 /// How long a boot-up may take.
 const BOOT_UP_TIMEOUT: Nanos = Nanos(5_000_000_000);
 /// Pause between two looks at a drive that is waited for.
-const LOOK_AGAIN: Nanos = Nanos(100_000_000);
+pub(super) const LOOK_AGAIN: Nanos = Nanos(100_000_000);
 /// How long the bus is listened to before anything is reset: a foreign SYNC shows itself in this time.
-const LISTEN_LEAST: Nanos = Nanos(100_000_000);
+pub(super) const LISTEN_LEAST: Nanos = Nanos(100_000_000);
 /// How long "voltage off" is sent to a lost drive before its setpoints end.
 const FAREWELL: Nanos = Nanos(100_000_000);
 /// How long a node may take from NMT start to its first TPDO.
@@ -33,11 +34,17 @@ const DENIALS_MAX: u8 = 2;
 
 /// Where the bring-up stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+pub(super) enum Stage {
     /// Reading the statusword, changing nothing.
     Listen { since: Nanos, next: Nanos, trouble: Option<Trouble> },
-    /// Found energised; watched, left alone.
-    Unowned { next: Nanos },
+    /// Found energised; reading whether it is ours.
+    Verify,
+    /// Found energised and ours: it holds, and waits for the wish to keep it.
+    Held { next: Nanos },
+    /// To be kept: NMT start sent, which leaves the power stage alone; waiting for the first TPDO.
+    Rejoin { since: Nanos, tries: u8 },
+    /// Found energised and not ours, and why; watched, left alone.
+    Unowned { next: Nanos, trouble: Trouble, object: u32 },
     /// Waiting for boot-up.
     Reset { since: Nanos },
     /// At this step of the plan.
@@ -82,16 +89,18 @@ pub struct Target {
 /// The master's image of one node.
 #[derive(Clone, Debug)]
 pub struct Node {
-    plan: NodePlan,
+    pub(super) plan: NodePlan,
     steps: Vec<Step>,
     patience: Patience,
-    stage: Stage,
-    sdo: SdoClient,
-    nmt: Option<NmtCommand>,
+    pub(super) stage: Stage,
+    pub(super) sdo: SdoClient,
+    pub(super) adoption: Adoption,
+    pub(super) held: Option<i32>,
+    pub(super) nmt: Option<NmtCommand>,
     power: Power,
     wished: DriveWish,
-    heard: bool,
-    status: u16,
+    pub(super) heard: bool,
+    pub(super) status: u16,
     position: Option<i32>,
     told: Option<i32>,
     tpdo_at: Nanos,
@@ -111,6 +120,8 @@ impl Node {
             patience,
             stage: Stage::Listen { since: Nanos(0), next: Nanos(0), trouble: None },
             sdo: SdoClient::default(),
+            adoption: Adoption::new(&plan),
+            held: None,
             nmt: None,
             power: Power::new(patience.step, plan.feedback_every),
             wished: DriveWish::Disabled,
@@ -129,7 +140,13 @@ impl Node {
     /// True when the node needs SYNC to come up or to work.
     #[must_use]
     pub const fn needs_sync(&self) -> bool {
-        matches!(self.stage, Stage::Start { .. } | Stage::Operational { .. })
+        matches!(self.stage, Stage::Start { .. } | Stage::Rejoin { .. } | Stage::Operational { .. })
+    }
+
+    /// What an adopted drive holds, in counts.
+    #[must_use]
+    pub fn held(&self) -> Option<i32> {
+        self.held.filter(|_| self.state() == DriveState::Adopted)
     }
 
     /// Newest position in counts.
@@ -155,9 +172,12 @@ impl Node {
     pub fn state(&self) -> DriveState {
         match self.stage {
             Stage::Listen { .. } if !self.heard => DriveState::Absent,
-            Stage::Listen { .. } | Stage::Reset { .. } | Stage::Configure { .. } | Stage::Start { .. } => {
-                DriveState::Configuring
-            }
+            Stage::Listen { .. }
+            | Stage::Verify
+            | Stage::Reset { .. }
+            | Stage::Configure { .. }
+            | Stage::Start { .. } => DriveState::Configuring,
+            Stage::Held { .. } | Stage::Rejoin { .. } => DriveState::Adopted,
             Stage::Unowned { .. } => DriveState::EnergisedUnowned,
             Stage::Operational { .. } => self.power.state(self.status),
             Stage::Gone(_) => DriveState::Fault,
@@ -179,9 +199,13 @@ impl Node {
                 let drive_first = emcy != 0 && (self.in_fault() || trouble == 0);
                 (if drive_first { emcy } else { trouble }, 0)
             }
-            Stage::Unowned { .. } | Stage::Reset { .. } | Stage::Configure { .. } | Stage::Start { .. } => {
-                (emcy, 0)
-            }
+            Stage::Unowned { trouble, object, .. } => (trouble.code(), object),
+            Stage::Verify
+            | Stage::Held { .. }
+            | Stage::Rejoin { .. }
+            | Stage::Reset { .. }
+            | Stage::Configure { .. }
+            | Stage::Start { .. } => (emcy, 0),
         }
     }
 
@@ -205,15 +229,35 @@ impl Node {
             fresh: self.age(cycle.now, self.tpdo_at) <= self.patience.feedback.0,
             command_near: target.near,
         };
-        let control = if matches!(self.stage, Stage::Operational { .. }) {
-            self.power.control(cycle.now, cycle.wish, heard)
-        } else {
-            self.power.watch(cycle.wish);
-            CONTROL_OFF
+        let control = match self.stage {
+            Stage::Operational { .. } => self.power.control(cycle.now, cycle.wish, heard),
+            Stage::Rejoin { .. } if cycle.wish != DriveWish::TorqueOff => Power::keeping(self.status),
+            Stage::Listen { .. }
+            | Stage::Verify
+            | Stage::Held { .. }
+            | Stage::Rejoin { .. }
+            | Stage::Unowned { .. }
+            | Stage::Reset { .. }
+            | Stage::Configure { .. }
+            | Stage::Start { .. }
+            | Stage::Gone(_)
+            | Stage::Refused { .. } => {
+                self.power.watch(cycle.wish);
+                CONTROL_OFF
+            }
         };
+        let aim = if matches!(self.stage, Stage::Rejoin { .. }) { Aim::Held } else { self.power.aim() };
         // A command that is no number must never become one: the last good target stays.
-        let wanted = if self.power.follows_commands() { target.counts } else { self.position };
+        let wanted = match aim {
+            Aim::Measured => self.position,
+            Aim::Held => self.held,
+            Aim::Command => target.counts,
+        };
         self.told = wanted.or(self.told);
+        if aim == Aim::Command {
+            // What is kept, should the wish become to keep.
+            self.held = self.told;
+        }
         self.told.map(|target_counts| Setpoint { control, target_counts })
     }
 
@@ -224,7 +268,11 @@ impl Node {
         let torque_off = cycle.wish == DriveWish::TorqueOff && self.wished != DriveWish::TorqueOff;
         self.wished = cycle.wish;
         if torque_off && !self.needs_sync() {
-            // Without process data the emergency goes by SDO, before whatever was being asked.
+            // Without process data the emergency goes by SDO, before whatever was being asked; then the drive is looked
+            // at again from the start.
+            if matches!(self.stage, Stage::Verify | Stage::Held { .. }) {
+                self.listen(cycle.now, None);
+            }
             self.torque_off_by_sdo();
         }
         if let Some((job, outcome)) = self.sdo.take() {
@@ -246,8 +294,16 @@ impl Node {
                 self.heartbeat_at = now;
                 self.denials = 0;
             }
+            Stage::Rejoin { .. } => {
+                self.stage = Stage::Operational { farewell: None };
+                self.heartbeat_at = now;
+                self.denials = 0;
+                self.power.adopt();
+            }
             Stage::Operational { .. } => {}
             Stage::Listen { .. }
+            | Stage::Verify
+            | Stage::Held { .. }
             | Stage::Unowned { .. }
             | Stage::Reset { .. }
             | Stage::Configure { .. }
@@ -326,12 +382,12 @@ impl Node {
         matches!(DriveStep::from_status(self.status), Some(DriveStep::Fault | DriveStep::FaultReaction))
     }
 
-    fn age(&self, now: Nanos, then: Nanos) -> u64 {
+    pub(super) fn age(&self, now: Nanos, then: Nanos) -> u64 {
         now.0.saturating_sub(then.0)
     }
 
     /// Back to the start, where nothing is changed before the drive has been looked at.
-    fn listen(&mut self, now: Nanos, trouble: Option<Trouble>) {
+    pub(super) fn listen(&mut self, now: Nanos, trouble: Option<Trouble>) {
         self.sdo.cancel();
         self.power = Power::new(self.patience.step, self.plan.feedback_every);
         self.told = None;
@@ -349,11 +405,11 @@ impl Node {
         }
     }
 
-    fn torque_off_by_sdo(&mut self) {
+    pub(super) fn torque_off_by_sdo(&mut self) {
         self.sdo.begin(SdoJob::Write(object::CONTROLWORD, SdoBytes::from_u16(0)));
     }
 
-    fn refuse(&mut self, code: u32, job: SdoJob) {
+    pub(super) fn refuse(&mut self, code: u32, job: SdoJob) {
         self.stage = Stage::Refused { code, object: job.address().packed() };
     }
 
@@ -361,9 +417,29 @@ impl Node {
     fn advance(&mut self, cycle: Cycle) {
         let now = cycle.now;
         match self.stage {
-            Stage::Listen { next, .. } | Stage::Unowned { next } => {
+            Stage::Held { .. } if cycle.wish == DriveWish::Keep && !cycle.other_master => {
+                self.sdo.cancel();
+                self.rejoin(now, 1);
+            }
+            Stage::Listen { next, .. } | Stage::Unowned { next, .. } | Stage::Held { next } => {
                 if self.sdo.is_idle() && now >= next {
                     self.sdo.begin(SdoJob::Read(object::STATUSWORD));
+                }
+            }
+            Stage::Verify => {
+                if self.sdo.is_idle()
+                    && let Some(job) = self.adoption.job(now)
+                {
+                    self.sdo.begin(job);
+                }
+            }
+            Stage::Rejoin { since, tries } => {
+                if self.age(now, since) >= START_TIMEOUT.0 {
+                    if tries < START_TRIES {
+                        self.rejoin(now, tries + 1);
+                    } else {
+                        self.unowned(now, Trouble::NotOperational, 0);
+                    }
                 }
             }
             Stage::Reset { since } => {
@@ -408,7 +484,7 @@ impl Node {
         if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
             // A silent drive may still listen: it keeps its setpoints until the wish is disabled.
             self.power.note(Trouble::HeartbeatLost);
-            if cycle.wish == DriveWish::Disabled && !self.power.follows_commands() {
+            if cycle.wish == DriveWish::Disabled && self.power.aim() == Aim::Measured {
                 let since = farewell.unwrap_or(now);
                 self.stage = Stage::Operational { farewell: Some(since) };
                 if self.age(now, since) >= FAREWELL.0 {
@@ -422,7 +498,7 @@ impl Node {
     }
 
     /// Asks a drive in fault for its error code, once: its emergency message was lost, or came before we listened.
-    fn ask_error(&mut self) -> bool {
+    pub(super) fn ask_error(&mut self) -> bool {
         let due = self.in_fault() && self.emcy == 0 && !self.asked_error && self.sdo.is_idle();
         if due {
             self.asked_error = true;
@@ -447,55 +523,17 @@ impl Node {
             return;
         }
         match self.stage {
-            Stage::Listen { .. } | Stage::Unowned { .. } => self.settle_look(cycle, job, outcome),
+            Stage::Listen { .. } | Stage::Unowned { .. } | Stage::Held { .. } => {
+                self.settle_look(cycle, job, outcome);
+            }
+            Stage::Verify => self.settle_verify(cycle.now, job, outcome),
             Stage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
             Stage::Reset { .. }
             | Stage::Start { .. }
+            | Stage::Rejoin { .. }
             | Stage::Operational { .. }
             | Stage::Gone(_)
             | Stage::Refused { .. } => {}
-        }
-    }
-
-    fn settle_look(&mut self, cycle: Cycle, job: SdoJob, outcome: SdoOutcome) {
-        let now = cycle.now;
-        match outcome {
-            SdoOutcome::Value(value) => match value.as_unsigned(2).map(u16::try_from) {
-                Some(Ok(status)) => self.looked(cycle, status),
-                _ => self.refuse(Trouble::WrongWidth.code(), job),
-            },
-            SdoOutcome::Aborted(code) => self.refuse(code, job),
-            SdoOutcome::TimedOut => {
-                self.heard = false;
-                self.listen(now, Some(Trouble::NoAnswer));
-            }
-            SdoOutcome::Written => {}
-        }
-    }
-
-    fn looked(&mut self, cycle: Cycle, status: u16) {
-        let Cycle { now, wish, other_master } = cycle;
-        self.status = status;
-        let next = Nanos(now.0.saturating_add(LOOK_AGAIN.0));
-        if status & STATUS_ENERGISED != 0 {
-            self.stage = Stage::Unowned { next };
-            if wish == DriveWish::TorqueOff {
-                self.torque_off_by_sdo();
-            }
-            return;
-        }
-        if self.ask_error() {
-            // Found in fault: its code is read before anything is reset, and stands by when the fault is reported.
-            return;
-        }
-        let since = if let Stage::Listen { since, .. } = self.stage { since } else { now };
-        let listened = self.age(now, since) >= LISTEN_LEAST.0;
-        if wish == DriveWish::Disabled && listened && !other_master {
-            self.nmt = Some(NmtCommand::ResetCommunication);
-            self.stage = Stage::Reset { since: now };
-        } else {
-            let trouble = other_master.then_some(Trouble::OtherMaster);
-            self.stage = Stage::Listen { since, next, trouble };
         }
     }
 
@@ -535,7 +573,7 @@ impl Node {
                 if self.status & STATUS_ENERGISED == 0 {
                     return Ok(true);
                 }
-                self.stage = Stage::Unowned { next: now };
+                self.stage = Stage::Unowned { next: now, trouble: Trouble::Foreign, object: 0 };
                 Ok(false)
             }
             Check::BecomesCsp if number == u32::from(object::MODE_CSP.cast_unsigned()) => Ok(true),
@@ -544,6 +582,13 @@ impl Node {
             Check::Position => {
                 self.position = Some(number.cast_signed());
                 Ok(true)
+            }
+            Check::Equals { value, mask } => {
+                if number & mask == value & mask {
+                    Ok(true)
+                } else {
+                    Err(Trouble::Foreign)
+                }
             }
         }
     }

@@ -8,6 +8,7 @@
 use crate::bring_up::damiao_plan::{CONFIGURE, Job, Judged, MotorPlan, VERIFY};
 use crate::bring_up::damiao_trouble::{DamiaoTrouble, differs, register_object, status_code};
 use crate::bring_up::pace::{Cycle, Patience};
+use crate::bring_up::trouble::Trouble;
 use crate::codec::damiao_frames::{Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, Special};
 use crate::codec::mit::{MitCommand, MitState};
 use crate::servo::{DriveState, DriveWish, Nanos};
@@ -160,6 +161,8 @@ impl Motor {
     pub fn error(&self) -> (u32, u32) {
         match (self.stage, self.trouble) {
             (Stage::Refused { code, object }, _) => (code, object),
+            // Its target and gains came in frames: no register tells what it holds, so no hold can be adopted.
+            (Stage::Unowned, _) => (Trouble::Foreign.code(), 0),
             _ if self.heard && self.in_error() => (status_code(self.feedback.status), 0),
             (_, Some(trouble)) => (trouble.code(), 0),
             (_, None) => (0, 0),
@@ -242,7 +245,8 @@ impl Motor {
         if cycle.wish == DriveWish::TorqueOff && before != DriveWish::TorqueOff {
             return self.torque_off(cycle.now);
         }
-        let rises = cycle.wish == DriveWish::Enabled && before == DriveWish::Disabled;
+        let rises =
+            cycle.wish == DriveWish::Enabled && matches!(before, DriveWish::Disabled | DriveWish::Keep);
         let looked = std::mem::take(&mut self.looked);
         let status = looked.then_some(self.feedback.status);
         match self.stage {
@@ -428,7 +432,7 @@ impl Motor {
         target: Option<MotorTarget>,
     ) -> Option<Request> {
         let now = cycle.now;
-        if cycle.wish != DriveWish::Enabled {
+        if matches!(cycle.wish, DriveWish::Disabled | DriveWish::TorqueOff) {
             return self.disable(now);
         }
         match status {

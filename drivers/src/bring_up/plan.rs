@@ -39,6 +39,13 @@ pub enum Check {
     BecomesCsp,
     /// It is the position.
     Position,
+    /// The bits of the mask are those of the value.
+    Equals {
+        /// What this master would have written.
+        value: u32,
+        /// The bits that count.
+        mask: u32,
+    },
 }
 
 /// One step: a transfer and what its answer means.
@@ -125,6 +132,37 @@ impl NodePlan {
                 2
             }
         }
+    }
+
+    /// All reads that tell whether an energised drive has the configuration of this plan: every object that
+    /// [`Self::steps`] writes must hold what is written last, and the drive must be in its mode.
+    #[must_use]
+    pub fn verification(&self) -> Vec<Step> {
+        let mut reads: Vec<Step> = Vec::with_capacity(64);
+        for step in self.steps() {
+            let read = match (step.job, step.check) {
+                (SdoJob::Write(address, bytes), _) => Step {
+                    job: SdoJob::Read(address),
+                    check: Check::Equals {
+                        value: bytes.as_u32(),
+                        mask: significant(address, bytes.as_u32()),
+                    },
+                    width: bytes.as_slice().len(),
+                    optional: step.optional,
+                },
+                (SdoJob::Read(_), Check::BecomesCsp) => {
+                    let value = u32::from(object::MODE_CSP.cast_unsigned());
+                    Step { check: Check::Equals { value, mask: u32::MAX }, ..step }
+                }
+                (SdoJob::Read(_), Check::Profile402) => step,
+                (SdoJob::Read(_), _) => continue,
+            };
+            match reads.iter_mut().find(|other| other.job == read.job) {
+                Some(earlier) => *earlier = read,
+                None => reads.push(read),
+            }
+        }
+        reads
     }
 
     fn identify(&self, steps: &mut Steps) {
@@ -217,6 +255,20 @@ impl Steps {
         let cob_id = cob_id(communication, base + number * COB_PDO_STEP, node);
         let record = Address::new(communication + number, object::PDO_COB_ID);
         self.write_optional(record, SdoBytes::from_u32(cob_id | PDO_DISABLED));
+    }
+}
+
+/// Bits of an object that a drive gives back as they were written: of an identifier's parameter not the remote request
+/// bit, which some drop, and nothing but "off" of a PDO that is off.
+fn significant(address: Address, value: u32) -> u32 {
+    let communication = (object::RPDO_COMMUNICATION..object::RPDO_MAPPING).contains(&address.index)
+        || (object::TPDO_COMMUNICATION..object::TPDO_MAPPING).contains(&address.index);
+    if !communication || address.sub != object::PDO_COB_ID {
+        u32::MAX
+    } else if value & PDO_DISABLED != 0 {
+        PDO_DISABLED
+    } else {
+        !PDO_NO_RTR
     }
 }
 

@@ -36,6 +36,21 @@ enum Phase {
     On,
     /// Stepping down; since when at this rung.
     Disabling { since: Nanos, rung: u8 },
+    /// Holding since before this master; kept as it is.
+    Kept,
+    /// From that hold to following; since when.
+    TakingOver { since: Nanos },
+}
+
+/// Which target goes out beside the controlword.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aim {
+    /// Where the drive stands.
+    Measured,
+    /// What it has held since before this master.
+    Held,
+    /// The command.
+    Command,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +87,11 @@ fn rung(step: Option<DriveStep>) -> u8 {
     }
 }
 
+/// States in which a drive holds its load.
+fn holds(step: Option<DriveStep>) -> bool {
+    matches!(step, Some(DriveStep::OperationEnabled | DriveStep::QuickStopActive))
+}
+
 impl Power {
     /// De-energised; `step_timeout` bounds each confirmation, and an answer comes every `answer_every` cycles.
     #[must_use]
@@ -93,10 +113,31 @@ impl Power {
         self.trouble
     }
 
-    /// True while targets are the commands, and not the measured position.
+    /// Which target goes out.
     #[must_use]
-    pub fn follows_commands(&self) -> bool {
-        self.phase != Phase::Off
+    pub fn aim(&self) -> Aim {
+        match self.phase {
+            Phase::Off => Aim::Measured,
+            Phase::Kept => Aim::Held,
+            Phase::Enabling { .. } | Phase::On | Phase::Disabling { .. } | Phase::TakingOver { .. } => {
+                Aim::Command
+            }
+        }
+    }
+
+    /// Keeps a drive that was found holding.
+    pub fn adopt(&mut self) {
+        (self.phase, self.wished) = (Phase::Kept, DriveWish::Keep);
+    }
+
+    /// The controlword that changes nothing about a drive that holds.
+    #[must_use]
+    pub fn keeping(status: u16) -> u16 {
+        match DriveStep::from_status(status) {
+            Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,
+            Some(DriveStep::QuickStopActive) => CONTROL_QUICK_STOP,
+            _ => CONTROL_OFF,
+        }
     }
 
     /// Keeps up with the wish while the drive is not operational, so that an old change does not energise it later.
@@ -132,14 +173,24 @@ impl Power {
                 return CONTROL_OFF;
             }
         }
-        if wish == DriveWish::Enabled && before == DriveWish::Disabled {
-            self.try_enable(now, step);
+        match (before, wish, self.phase) {
+            (DriveWish::Keep, DriveWish::Enabled, Phase::Kept) => {
+                self.phase = Phase::TakingOver { since: now };
+            }
+            (DriveWish::Disabled | DriveWish::Keep, DriveWish::Enabled, _) => self.try_enable(now, step),
+            (_, DriveWish::Keep, Phase::On | Phase::TakingOver { .. }) => self.phase = Phase::Kept,
+            (_, DriveWish::Keep, Phase::Enabling { .. }) => {
+                self.phase = Phase::Disabling { since: now, rung: rung(step) };
+            }
+            _ => {}
         }
         self.advance(now, wish, step, heard);
         match self.phase {
             Phase::Off => self.control_off(now, wish, step),
             Phase::Enabling { .. } | Phase::On => Self::control_up(step, heard),
             Phase::Disabling { .. } => Self::control_down(step),
+            Phase::Kept => Self::keeping(heard.status),
+            Phase::TakingOver { .. } => CONTROL_ENABLE,
         }
     }
 
@@ -150,8 +201,11 @@ impl Power {
         let faulty = matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction));
         let trouble = self.trouble.is_some_and(|trouble| trouble != Trouble::DroppedOut);
         match self.phase {
-            _ if faulty || trouble => DriveState::Fault,
-            Phase::Enabling { .. } => DriveState::Enabling,
+            _ if faulty => DriveState::Fault,
+            // It holds, whatever the last try to take it over has found.
+            Phase::Kept => DriveState::Adopted,
+            _ if trouble => DriveState::Fault,
+            Phase::Enabling { .. } | Phase::TakingOver { .. } => DriveState::Enabling,
             Phase::On => DriveState::Enabled,
             Phase::Disabling { .. } => DriveState::Disabling,
             // A quick stop that holds is energised, though nobody asked for it.
@@ -175,13 +229,15 @@ impl Power {
     }
 
     fn advance(&mut self, now: Nanos, wish: DriveWish, step: Option<DriveStep>, heard: Heard) {
-        if wish == DriveWish::Disabled && matches!(self.phase, Phase::Enabling { .. } | Phase::On) {
+        if wish == DriveWish::Disabled && !matches!(self.phase, Phase::Off | Phase::Disabling { .. }) {
             self.phase = Phase::Disabling { since: now, rung: rung(step) };
         }
         match self.phase {
             Phase::Off => {}
             Phase::Enabling { since, rung: reached } => self.advance_up(now, step, heard, (since, reached)),
             Phase::On => self.advance_on(step, heard),
+            Phase::Kept => self.advance_kept(step),
+            Phase::TakingOver { since } => self.advance_taking_over(now, step, heard, since),
             Phase::Disabling { since, rung: reached } => {
                 let at = rung(step);
                 if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
@@ -223,6 +279,27 @@ impl Power {
                 // It stays energised: letting go of a drive that still holds would be worse.
                 self.note(Trouble::NotFollowing);
             }
+        }
+    }
+
+    fn advance_kept(&mut self, step: Option<DriveStep>) {
+        if !holds(step) {
+            self.drop_out(step);
+        }
+    }
+
+    /// Whatever fails here, the drive goes on holding as it did.
+    fn advance_taking_over(&mut self, now: Nanos, step: Option<DriveStep>, heard: Heard, since: Nanos) {
+        if !holds(step) {
+            self.drop_out(step);
+        } else if !heard.command_near {
+            self.note(Trouble::CommandFar);
+            self.phase = Phase::Kept;
+        } else if step == Some(DriveStep::OperationEnabled) && heard.status & STATUS_FOLLOWS != 0 {
+            self.phase = Phase::On;
+        } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
+            self.note(Trouble::EnableTimeout);
+            self.phase = Phase::Kept;
         }
     }
 

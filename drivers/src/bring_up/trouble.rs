@@ -41,11 +41,13 @@ pub enum Trouble {
     WrongWidth = 0x0001_000F,
     /// Another master sends SYNC on the bus.
     OtherMaster = 0x0001_0010,
+    /// It is energised with a configuration that is not this master's.
+    Foreign = 0x0001_0011,
 }
 
 impl Trouble {
     /// Every finding.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -62,6 +64,7 @@ impl Trouble {
         Self::NotFollowing,
         Self::WrongWidth,
         Self::OtherMaster,
+        Self::Foreign,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -95,6 +98,10 @@ impl Trouble {
             Self::NotFollowing => "the drive is energised but does not follow the target (statusword bit 12)",
             Self::WrongWidth => "the drive sent a value of another width than the object has",
             Self::OtherMaster => "another master sends SYNC on this bus; end it first",
+            Self::Foreign => {
+                "the drive is energised, and not as this arm's settings would have left it; end the program that uses \
+                 it, or support the arm and `torque-off`"
+            }
         }
     }
 }

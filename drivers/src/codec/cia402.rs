@@ -103,6 +103,8 @@ pub struct Cia402Driver {
     near_rad: f64,
     clock: PatientClock,
     heartbeat_at: Option<Nanos>,
+    /// The cycle before sent SYNC.
+    syncs: bool,
 }
 
 impl Cia402Driver {
@@ -139,6 +141,7 @@ impl Cia402Driver {
             near_rad,
             clock: PatientClock::new(period_us),
             heartbeat_at: None,
+            syncs: false,
         };
         // Bounded where settings are read; a drive that was told 240 would be silent for as many cycles.
         let feedback_every = u8::try_from(traffic.feedback_every).unwrap_or(u8::MAX).clamp(1, 240);
@@ -216,6 +219,31 @@ impl Cia402Driver {
         }
     }
 
+    /// What each drive that is held and not in the cycle yet does already.
+    fn push_kept(&self, out: &mut FrameBatch) {
+        let kept =
+            |at: usize| self.drives.get(at).and_then(|drive| Some((drive.node_id, drive.node.keeping()?)));
+        for group in &self.groups {
+            match *group {
+                Group::One(at) => {
+                    if let Some((node, Setpoint { control, target_counts })) = kept(at) {
+                        out.push(encode_rpdo(node, control, target_counts));
+                    }
+                }
+                // A target for both is known only where both are held.
+                Group::Pair([first, second]) => {
+                    let pair = (kept(first), kept(second));
+                    for (node, setpoint) in [pair.0, pair.1].into_iter().flatten() {
+                        out.push(encode_control(node, setpoint.control));
+                    }
+                    if let (Some((node, a)), Some((_, b))) = pair {
+                        out.push(encode_pair(node, [a.target_counts, b.target_counts]));
+                    }
+                }
+            }
+        }
+    }
+
     /// Drives watch for this (object 0x1016) and stop by themselves when it ends.
     fn push_heartbeat(&mut self, now: Nanos, out: &mut FrameBatch) {
         let due = self
@@ -252,7 +280,13 @@ impl ServoDriver for Cia402Driver {
         out: &mut FrameBatch,
     ) {
         let cycle = self.clock.tick(now, wish);
-        if self.drives.iter().any(|drive| drive.node.needs_sync()) {
+        let syncs = self.drives.iter().any(|drive| drive.node.needs_sync());
+        if syncs && !self.syncs {
+            // A drive that holds may still have latched the last setpoint of the master before: it must not act now.
+            self.push_kept(out);
+        }
+        self.syncs = syncs;
+        if syncs {
             out.push(sync());
         }
         self.push_setpoints(cycle, commands, out);
@@ -312,6 +346,7 @@ impl ServoDriver for Cia402Driver {
             // The position read while configuring is no feedback yet: nothing would tell its age.
             position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
             velocity_rad_s: f64::NAN,
+            held_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
             status_word: u32::from(node.status()),
             error_code,

@@ -206,6 +206,7 @@ impl ServoDriver for DamiaoDriver {
             state: joint.motor.state(),
             position_rad: joint.side.link_rad(measured.position_rad),
             velocity_rad_s: measured.velocity_rad_s * joint.side.sign,
+            held_rad: f64::NAN,
             received: joint.received,
             status_word: joint.motor.status_word(),
             error_code,

@@ -96,6 +96,8 @@ objects! {
     MODE = 0x6060:0;
     /// Mode of operation display, i8.
     MODE_DISPLAY = 0x6061:0;
+    /// Position demand value, i32, counts: the reference that the drive steers to.
+    POSITION_DEMAND = 0x6062:0;
     /// Position actual value, i32, counts.
     POSITION_ACTUAL = 0x6064:0;
     /// Following error window, u32, counts.

@@ -12,19 +12,29 @@ const PERIOD_NS: u64 = 1_000_000;
 const START_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 
 /// The shipped arm, its drives and its master.
-struct Arm {
-    settings: Settings,
-    rig: Rig,
-    driver: Cia402Driver,
-    now: Nanos,
-    commands: [JointCommand; 8],
+pub(super) struct Arm {
+    pub(super) settings: Settings,
+    pub(super) rig: Rig,
+    pub(super) driver: Cia402Driver,
+    pub(super) now: Nanos,
+    pub(super) commands: [JointCommand; 8],
     out: Vec<Vec<CanFrame>>,
+    /// What the master sent in the newest cycle.
+    pub(super) sent: Vec<CanFrame>,
+}
+
+/// The shipped settings.
+pub(super) fn shipped() -> Settings {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
+    Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 impl Arm {
     fn new() -> Self {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
-        let settings = Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"));
+        Self::with(shipped())
+    }
+
+    pub(super) fn with(settings: Settings) -> Self {
         let setups = drives(&settings, Some(&START_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         let rig = Rig::new(setups, 1, 1);
         let driver = Cia402Driver::new(&settings, 0).unwrap();
@@ -33,11 +43,20 @@ impl Arm {
         for (command, start_rad) in commands.iter_mut().zip(START_RAD) {
             command.position_rad = start_rad;
         }
-        Self { settings, rig, driver, now: Nanos(1_000_000_000), commands, out }
+        Self { settings, rig, driver, now: Nanos(1_000_000_000), commands, out, sent: Vec::new() }
+    }
+
+    /// The master is gone for this long.
+    pub(super) fn alone(&mut self, ms: u64) {
+        for _ in 0..ms {
+            self.now.0 += PERIOD_NS;
+            self.rig.advance(self.now, &mut self.out);
+            self.out[0].clear();
+        }
     }
 
     /// One cycle: the answers of the last one are taken, then SYNC and setpoints go out and are answered.
-    fn cycle(&mut self, wish: DriveWish) {
+    pub(super) fn cycle(&mut self, wish: DriveWish) {
         self.now.0 += PERIOD_NS;
         self.rig.advance(self.now, &mut self.out);
         for frame in self.out[0].drain(..) {
@@ -46,18 +65,19 @@ impl Arm {
         let mut batch = FrameBatch::new();
         self.driver.encode(self.now, wish, &self.commands, &mut batch);
         self.rig.receive(self.now, 0, batch.frames(), &mut self.out);
+        self.sent = batch.frames().to_vec();
     }
 
-    fn status(&self, joint: usize) -> ServoStatus {
+    pub(super) fn status(&self, joint: usize) -> ServoStatus {
         self.driver.status(joint)
     }
 
-    fn states(&self) -> [DriveState; 6] {
+    pub(super) fn states(&self) -> [DriveState; 6] {
         std::array::from_fn(|joint| self.status(joint).state)
     }
 
     /// Cycles until every drive is in a state.
-    fn reach(&mut self, wish: DriveWish, state: DriveState) {
+    pub(super) fn reach(&mut self, wish: DriveWish, state: DriveState) {
         for _ in 0..10_000 {
             self.cycle(wish);
             if self.states() == [state; 6] {
@@ -67,7 +87,7 @@ impl Arm {
         panic!("not all {state:?} within 10 s: {:?}", self.states());
     }
 
-    fn enable(&mut self) {
+    pub(super) fn enable(&mut self) {
         self.reach(DriveWish::Disabled, DriveState::Disabled);
         for joint in 0..6 {
             self.commands[joint].position_rad = self.status(joint).position_rad;
@@ -76,7 +96,7 @@ impl Arm {
     }
 
     /// The worst |measured - commanded two cycles ago| while moving all joints along a raised cosine.
-    fn move_and_measure(&mut self, seconds: f64) -> [f64; 6] {
+    pub(super) fn move_and_measure(&mut self, seconds: f64) -> [f64; 6] {
         let base_rad: [f64; 6] = std::array::from_fn(|joint| self.commands[joint].position_rad);
         let mut worst_rad = [0.0_f64; 6];
         let mut due_rad = [base_rad; 3];

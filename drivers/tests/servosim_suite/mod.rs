@@ -1,4 +1,5 @@
 //! The parts of the suite.
+mod adopt;
 mod arm;
 mod bench;
 mod hostile;

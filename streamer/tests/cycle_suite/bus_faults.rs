@@ -197,5 +197,8 @@ fn drive_found_energised_after_a_bus_fault_is_reported_and_left_alone() {
     assert!(rig.step_to_answer().accepted);
     rig.run(5);
     let cause = rig.cause().unwrap();
-    assert_eq!((rig.phase(), cause.reason, cause.joint), (Phase::Fault, FaultReason::NotTrusted, Some(4)));
+    assert_eq!(
+        (rig.phase(), cause.reason, cause.joint),
+        (Phase::Fault, FaultReason::EnergisedUnowned, Some(4))
+    );
 }

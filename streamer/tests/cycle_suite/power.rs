@@ -104,7 +104,7 @@ fn drive_found_energised_is_reported_and_left_alone() {
     let mut rig = Rig::new();
     rig.script(|w| w.forced[2] = Some(DriveState::EnergisedUnowned));
     rig.run_until(Phase::Fault, 20);
-    assert_eq!(rig.cause().unwrap().reason, FaultReason::NotTrusted);
+    assert_eq!(rig.cause().unwrap().reason, FaultReason::EnergisedUnowned);
     rig.run(3);
     assert_eq!(rig.world.lock().unwrap().wish, Some(DriveWish::Disabled));
     assert_eq!(rig.ask(Command::ClearFault).why, Why::Unowned { joint: 2 });

@@ -34,6 +34,10 @@ pub struct World {
     pub refused_object: u32,
     pub warning: Option<usize>,
     pub silent: Option<usize>,
+    /// What adopted drives hold.
+    pub held_rad: JointArray,
+    /// Taken off what the drives read of the joints, as a feedback does that counts from elsewhere.
+    pub turn_rad: JointArray,
     /// Added to the measured position of a joint.
     pub offset_rad: JointArray,
     pub link_fault: Option<LinkFault>,
@@ -100,7 +104,8 @@ impl ServoDriver for FakeDriver {
     ) {
         let mut world = self.world.lock().unwrap();
         world.advance(wish);
-        world.pending = commands.map(|c| c.position_rad);
+        let turn_rad = world.turn_rad;
+        world.pending = std::array::from_fn(|joint| commands[joint].position_rad + turn_rad[joint]);
         out.push(CanFrame::classic(CanId::standard(0x080), &[]));
         for joint in 0..JOINTS {
             out.push(CanFrame::classic(CanId::standard(0x201 + u16::try_from(joint).unwrap()), &[0; 6]));
@@ -111,7 +116,8 @@ impl ServoDriver for FakeDriver {
         for joint in 0..JOINTS {
             if world.silent != Some(joint) {
                 self.received[joint] = Some(now);
-                self.position_rad[joint] = world.pipeline[2][joint] + world.offset_rad[joint];
+                self.position_rad[joint] =
+                    world.pipeline[2][joint] + world.offset_rad[joint] - world.turn_rad[joint];
             }
         }
     }
@@ -124,6 +130,11 @@ impl ServoDriver for FakeDriver {
             state: world.states[joint],
             position_rad: self.received[joint].map_or(f64::NAN, |_| self.position_rad[joint]),
             velocity_rad_s: f64::NAN,
+            held_rad: if world.states[joint] == DriveState::Adopted {
+                world.held_rad[joint] - world.turn_rad[joint]
+            } else {
+                f64::NAN
+            },
             received: self.received[joint],
             status_word: 0x1237,
             error_code: world.error_code,
@@ -241,6 +252,8 @@ impl Rig {
             refused_object: 0,
             warning: None,
             silent: None,
+            held_rad: [f64::NAN; MAX_JOINTS],
+            turn_rad: [0.0; MAX_JOINTS],
             offset_rad: [0.0; MAX_JOINTS],
             link_fault: None,
             link_takes: 0,

@@ -1,0 +1,61 @@
+//! Which turn a reading belongs to, when the feedback repeats itself.
+//!
+//! A feedback that wraps states an angle but for whole periods. A wrong turn looks valid and sends the joint the wrong way
+//! round, so a turn is only taken where nothing else can be meant, with a margin; else an operator has to say it.
+use crate::Servo;
+use crate::trust::Feedback;
+
+/// Largest part of a period by which a remembered or stated angle may miss the turn that it chooses. Half would be the
+/// point where two turns are equally near; the rest is margin for what moved meanwhile, and for eyes.
+pub const TURN_PART_MAX: f64 = 0.4;
+
+/// What is to be added to `reading_rad`, a whole number of periods, to come nearest to `near_rad`.
+///
+/// Real time: arithmetic only.
+#[must_use]
+pub fn nearest_turn_rad(reading_rad: f64, period_rad: f64, near_rad: f64) -> f64 {
+    ((near_rad - reading_rad) / period_rad).round() * period_rad
+}
+
+/// The turn when the joint's range leaves only one: its range, with the margin on both sides, must fit in one period.
+///
+/// Real time: arithmetic only.
+///
+/// # Errors
+/// When several turns could be meant, or none.
+pub fn only_turn_rad(reading_rad: f64, period_rad: f64, range_rad: [f64; 2]) -> Result<f64, Turns> {
+    let [low_rad, high_rad] = range_rad;
+    if high_rad - low_rad > 2.0 * TURN_PART_MAX * period_rad {
+        return Err(Turns::Several);
+    }
+    let margin_rad = (period_rad - (high_rad - low_rad)) / 2.0;
+    let turn_rad = nearest_turn_rad(reading_rad, period_rad, low_rad.midpoint(high_rad));
+    let inside = (low_rad - margin_rad..=high_rad + margin_rad).contains(&(reading_rad + turn_rad));
+    if inside { Ok(turn_rad) } else { Err(Turns::None) }
+}
+
+/// Why there is not one turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turns {
+    /// None puts the joint inside its range.
+    None,
+    /// More than one does, or nearly does.
+    Several,
+}
+
+/// The angles inside the joint's range that a reading can mean, lowest first; at most `most` of them.
+#[must_use]
+pub fn possible_rad(servo: &Servo, reading_rad: f64, range_rad: [f64; 2], most: usize) -> Vec<f64> {
+    let [low_rad, high_rad] = range_rad;
+    match servo.feedback {
+        Feedback::MultiTurn => vec![reading_rad],
+        Feedback::Incremental => Vec::new(),
+        Feedback::Wraps => {
+            let period_rad = servo.feedback_period_rad();
+            let first = ((low_rad - reading_rad) / period_rad).ceil();
+            let turns = std::iter::successors(Some(first), |turn| Some(turn + 1.0));
+            let angles = turns.map(|turn| reading_rad + turn * period_rad);
+            angles.take_while(|angle_rad| *angle_rad <= high_rad).take(most).collect()
+        }
+    }
+}

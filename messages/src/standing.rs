@@ -1,0 +1,78 @@
+//! Whether it is known on which turn a joint stands, and whence.
+
+/// What is known of a joint's turn. Only a joint whose turn is known may be energised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Standing {
+    /// Its drive was not heard yet.
+    #[default]
+    Unheard = 0,
+    /// The feedback tells every angle of the joint.
+    Encoder = 1,
+    /// The turn nearest the last pose on disk.
+    Record = 2,
+    /// Its drive was never without power since this arm was last known.
+    Adoption = 3,
+    /// The operator said where it stands.
+    Operator = 4,
+    /// The feedback repeats itself, and there is no last pose to tell the turn.
+    NoRecord = 5,
+    /// The last pose was written while the arm moved.
+    RecordMoving = 6,
+    /// The last pose is too far from every turn of the reading.
+    RecordFar = 7,
+    /// No turn of the reading lies inside the joint's range.
+    OutOfRange = 8,
+    /// The feedback knows nothing after power-up.
+    Incremental = 9,
+}
+
+impl Standing {
+    /// Every standing.
+    pub const ALL: [Self; 10] = [
+        Self::Unheard,
+        Self::Encoder,
+        Self::Record,
+        Self::Adoption,
+        Self::Operator,
+        Self::NoRecord,
+        Self::RecordMoving,
+        Self::RecordFar,
+        Self::OutOfRange,
+        Self::Incremental,
+    ];
+
+    /// The code that stands in messages.
+    #[must_use]
+    pub fn code(self) -> u32 {
+        self as u32
+    }
+    /// The standing of a code; an unknown one counts as nothing known.
+    #[must_use]
+    pub fn from_code(code: u32) -> Self {
+        Self::ALL.into_iter().find(|standing| standing.code() == code).unwrap_or_default()
+    }
+    /// True when the joint's turn is known.
+    #[must_use]
+    pub fn is_referenced(self) -> bool {
+        matches!(self, Self::Encoder | Self::Record | Self::Adoption | Self::Operator)
+    }
+    /// What is known, for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Unheard => "its drive was not heard yet",
+            Self::Encoder => "its feedback tells every angle",
+            Self::Record => "by the last pose on disk",
+            Self::Adoption => "its drive was never off since it was known",
+            Self::Operator => "the operator said where it stands",
+            Self::NoRecord => "its feedback repeats itself, and there is no last pose to tell the turn",
+            Self::RecordMoving => "its feedback repeats itself, and the last pose was written in motion",
+            Self::RecordFar => {
+                "its feedback repeats itself, and the last pose is too far away to tell the turn"
+            }
+            Self::OutOfRange => "no turn of its feedback lies inside its range",
+            Self::Incremental => "its feedback knows nothing after power-up",
+        }
+    }
+}
