@@ -6,6 +6,11 @@ use std::time::{Duration, Instant};
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
 use taustream_planner::draw::Draw;
+use taustream_planner::optimize::{METHODS, Problem, Setup, by_name};
+use taustream_planner::refine::{PathProblem, refine};
+use taustream_planner::tree::Space;
+use taustream_planner::work::Work;
+use taustream_planner::world::World;
 use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan, verify};
 
 fn options(seed: u64, deadline_ms: u64, planner: PlannerKind) -> PlanOptions {
@@ -203,4 +208,30 @@ fn planner_names_are_read_as_they_are_written() {
         assert_eq!(PlannerKind::from_name(kind.name()), Some(kind));
     }
     assert_eq!(PlannerKind::from_name("teleport"), None);
+}
+
+/// Goal: whichever method is chosen by name, refinement proposes a path between the same ends that is no dearer than
+/// the one it was given.
+#[test]
+fn refinement_takes_every_optimiser_by_name() {
+    let mut draw = Draw::new(3, 100);
+    let (robot, scene) = (ur5(), random_spheres(&mut draw));
+    let world = World::new(&robot, &scene).expect("builds");
+    let work = Work::unbounded();
+    let space = Space::new(&world, &work);
+    let line = [free_pose(&robot, &scene, &mut draw), free_pose(&robot, &scene, &mut draw)];
+    let problem = PathProblem::new(&space, line[0], line[1]);
+    for method in METHODS {
+        let optimizer =
+            by_name(method.name, Setup { evaluations: Some(150), ..Setup::default() }).expect("named");
+        let (corners, found) = refine(&space, &line, optimizer.as_ref(), 150, 1)
+            .expect("sane")
+            .expect("something was evaluated");
+        assert_eq!((corners.len(), [corners[0], corners[4]]), (5, line), "{}", method.name);
+        let straight: Vec<f64> = (1..4)
+            .flat_map(|i| (0..6).map(move |j| line[0][j] + (line[1][j] - line[0][j]) * f64::from(i) / 4.0))
+            .collect();
+        assert!(found.cost <= problem.cost(&straight) + 1e-6, "{}: {}", method.name, found.cost);
+        assert!(found.progress.evaluations <= 150, "{}", method.name);
+    }
 }

@@ -1,7 +1,7 @@
 //! What is minimised, and what is refused before the first evaluation.
 
-/// Most coordinates; a bound against absurd arguments.
-const DIMENSIONS_MAX: usize = 100_000;
+/// Most coordinates; a bound against absurd arguments (times the largest population: 800 MB).
+const DIMENSIONS_MAX: usize = 10_000;
 
 /// A cost over a box.
 pub trait Problem {

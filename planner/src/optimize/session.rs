@@ -68,7 +68,7 @@ pub struct Agent {
 }
 
 /// Largest population; a bound against absurd arguments.
-const POPULATION_MAX: usize = 100_000;
+const POPULATION_MAX: usize = 10_000;
 
 /// How many points, and for how long: methods fit their decays to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ impl Schedule {
 /// Refuses populations that would only fill the memory.
 pub(super) fn check_population(method: &'static str, population: usize) -> Result<(), Refusal> {
     let bounds = [1.0, POPULATION_MAX as f64];
-    Refusal::check_number(method, "the population", population as f64, bounds, "from 1 to 100000 is possible")
+    Refusal::check_number(method, "the population", population as f64, bounds, "from 1 to 10000 is possible")
 }
 
 /// One run: the problem behind a meter, and the stream of random choices.
