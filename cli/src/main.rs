@@ -43,6 +43,7 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
     match &cli.action {
         Action::Plan(args) => offline::plan::run(form, args),
         Action::Sample(args) => offline::sample::run(form, args),
+        Action::Plot(args) => offline::plot::run(form, args),
         Action::Cost(args) => offline::cost::run(form, args),
         Action::Verify(args) => offline::verify::run(form, args),
         Action::Check(args) => offline::check::run(form, args),

@@ -9,6 +9,8 @@ mod doctor;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
+#[path = "cli/plot.rs"]
+mod plot;
 #[path = "cli/urdf.rs"]
 mod urdf;
 #[path = "cli/watch.rs"]

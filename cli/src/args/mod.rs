@@ -4,7 +4,8 @@ mod offline;
 
 pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs};
 pub(crate) use offline::{
-    BenchArgs, BenchName, CheckArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs, SampleArgs,
+    BenchArgs, BenchName, CheckArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs, PlotArgs,
+    SampleArgs,
 };
 
 use clap::{Parser, Subcommand};
@@ -17,8 +18,11 @@ Examples:
       --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
   taustream verify --robot ur5 --scene pillars --trajectory move.json
   taustream sample move.json --rate-hz 1000 > move.csv
+  taustream plot move.json --robot ur5 --scene pillars    joint curves and three views, to move.svg
+  taustream doctor                                        is this computer fit to drive an arm?
   taustream enable && taustream run move.json --wait      with streamer and planner running
   taustream replan --goal \"0,-1.57,1.57,-1.57,-1.57,0\" --wait
+  taustream watch                                         live, until you leave it
   taustream status --json | jq .phase
 
 Units: angles are rad, times s, lengths m. Robots, scenes and settings are given by path, or by the name of a
@@ -50,7 +54,7 @@ pub(crate) struct Cli {
     /// Settings of the arm to talk to: a path, or the name of shipped settings.
     ///
     /// Without it: `$TAUSTREAM_SETTINGS`, else /etc/taustream/settings.toml if that exists, else the shipped
-    /// `vcan6`. `plan`, `sample`, `cost`, `verify` and `check` do not use it.
+    /// `vcan6`. `plan`, `sample`, `plot`, `cost`, `verify` and `check` do not use it.
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) settings: Option<PathBuf>,
 
@@ -66,6 +70,8 @@ pub(crate) enum Action {
     Plan(PlanArgs),
     /// Print a trajectory file as a table of positions, velocities, accelerations and jerks.
     Sample(SampleArgs),
+    /// Draw a trajectory as SVG: joint curves with limits, arm, obstacles and path in three views.
+    Plot(PlotArgs),
     /// Rate a trajectory by the cost of the IBFOA paper, in its own model.
     Cost(CostArgs),
     /// Prove that a trajectory keeps limits and clearance, or name the first violation.

@@ -78,6 +78,33 @@ pub(crate) struct SampleArgs {
     pub(crate) at: Option<Times>,
 }
 
+const PLOT_HELP: &str = "\
+Examples:
+  taustream plot move.json                                          joint curves, written to move.svg
+  taustream plot move.json --robot ur5 --scene pillars -o move.svg  limits, and the arm among its obstacles, too
+  taustream plot move.json --robot ur5 -o - | display svg:-
+
+The arm is drawn at nine times from light (start) to dark (end), with its collision shapes; metres are the same in all
+views and directions. Meshes of scenes are drawn as their hulls.";
+
+/// `taustream plot`
+#[derive(Args, Debug)]
+#[command(after_help = PLOT_HELP)]
+pub(crate) struct PlotArgs {
+    /// Trajectory file.
+    #[arg(value_name = "FILE")]
+    pub(crate) trajectory: PathBuf,
+    /// Robot, for limits and views: a path, or the name of a shipped robot.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: Option<PathBuf>,
+    /// Scene, for the obstacles in the views: a path, or the name of a shipped scene.
+    #[arg(long, value_name = "FILE", requires = "robot")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Picture to write; `-` is stdout. Without it: beside the trajectory file, with the ending svg.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
+
 const COST_HELP: &str = "\
 Examples:
   taustream cost --robot ur5 --scene spheres.toml --trajectory move.json

@@ -10,7 +10,7 @@ use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Form;
-use crate::plot;
+use crate::plot::recording;
 use file::DemoFile;
 use processes::Processes;
 use session::Session;
@@ -36,7 +36,7 @@ fn perform(form: Form, args: &DemoArgs) -> Result<Summary, Failure> {
     let mut summary = moved?;
     ended?;
 
-    summary.plots = plot::write_all(&args.output, &arm.joints, &summary.samples)?;
+    summary.plots = recording::write_all(&args.output, &arm.joints, &summary.samples)?;
     summary.add_cycle_log(&processes.cycle_log());
     Ok(summary)
 }

@@ -10,7 +10,7 @@ use crate::live::command::obey;
 use crate::live::follow::follow;
 use crate::live::replan::ask_while;
 use crate::output::{Form, note};
-use crate::plot::Sample;
+use crate::plot::recording::Sample;
 use crate::view::Scale;
 use crate::words::fault_sentence;
 use std::cell::RefCell;

@@ -1,7 +1,7 @@
 //! What the demo says at its end.
 use crate::live::follow::Executed;
 use crate::live::replan::Planned;
-use crate::plot::Sample;
+use crate::plot::recording::Sample;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::HashMap;

@@ -5,6 +5,7 @@ pub(crate) mod check;
 mod checked_robot;
 pub(crate) mod cost;
 pub(crate) mod plan;
+pub(crate) mod plot;
 mod protocol_line;
 pub(crate) mod sample;
 pub(crate) mod verify;

@@ -3,15 +3,12 @@
 //! Commanded derivatives are the streamer's own. Drives send positions only, so measured derivatives are those of a
 //! cubic fitted to the measured positions around each instant (Savitzky and Golay, Analytical Chemistry 36, 1964, for
 //! uneven times); the pictures say so. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
+use super::panel::{Area, Curve, Drawn, JOINT_COLOURS, PANELS, Point, draw_panels, thinned, undrawable};
 use crate::failure::Failure;
-use plotters::coord::Shift;
-use plotters::prelude::{
-    ChartBuilder, Color, DrawingArea, IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor,
-    SVGBackend, SeriesLabelPosition, ShapeStyle, WHITE,
-};
-use std::ops::Range;
+use crate::output::write_whole;
+use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::{Path, PathBuf};
-use taustream_motion::{JointArray, MAX_JOINTS, Setpoint};
+use taustream_motion::{JointArray, Setpoint};
 
 /// One instant of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,41 +23,11 @@ pub(crate) struct Sample {
     pub(crate) measured_age_s: JointArray,
 }
 
-/// Most points of one curve; more cannot be seen and make the file heavy.
-const POINTS_MAX: usize = 1200;
 /// Half the width of the fit, in samples.
 const FIT_HALF_WIDTH: usize = 5;
 const SIZE_PX: (u32, u32) = (1100, 1180);
-/// Share of the time axis that is left to the legend.
-const LEGEND_SHARE: f64 = 0.16;
 const COMMANDED: RGBColor = RGBColor(31, 119, 180);
 const MEASURED: RGBColor = RGBColor(255, 127, 14);
-/// One colour a joint, told apart by colour-blind eyes too (Okabe and Ito).
-const JOINT_COLOURS: [RGBColor; MAX_JOINTS] = [
-    RGBColor(0, 114, 178),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(213, 94, 0),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(150, 150, 0),
-    RGBColor(0, 0, 0),
-];
-/// Title of each panel, and its quantity's order of derivation.
-const PANELS: [&str; 4] = ["position (rad)", "velocity (rad/s)", "acceleration (rad/s^2)", "jerk (rad/s^3)"];
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Point = (f64, f64);
-
-/// A curve of one panel.
-struct Curve {
-    label: String,
-    colour: RGBColor,
-    width_px: u32,
-    opacity: f64,
-    points: Vec<Point>,
-}
-
 /// Writes `motion.svg` with all joints and one picture a joint into `directory`; the files that were written.
 pub(crate) fn write_all(
     directory: &Path,
@@ -141,18 +108,6 @@ fn measured_points(samples: &[Sample], measured: &[[f64; 4]], order: usize) -> V
     thinned(samples.iter().zip(measured).map(|(s, m)| (s.t_s, value(m))).collect())
 }
 
-/// Finite points, evenly thinned; the last one stays.
-fn thinned(points: Vec<Point>) -> Vec<Point> {
-    let points: Vec<Point> = points.into_iter().filter(|(t, y)| t.is_finite() && y.is_finite()).collect();
-    let step = points.len().div_ceil(POINTS_MAX).max(1);
-    let last = points.last().copied();
-    let mut kept: Vec<Point> = points.into_iter().step_by(step).collect();
-    if kept.last().copied() != last {
-        kept.extend(last);
-    }
-    kept
-}
-
 /// Position, velocity, acceleration and jerk of one joint at every sample, from its measured positions.
 fn measured_derivatives(samples: &[Sample], joint: usize) -> Vec<[f64; 4]> {
     let at = |array: &JointArray| array.get(joint).copied().unwrap_or(f64::NAN);
@@ -216,79 +171,26 @@ fn solve(mut m: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     Some(x)
 }
 
+fn draw_on(root: &Area<'_>, title: &str, panels: &[Vec<Curve>; 4]) -> Drawn {
+    root.fill(&WHITE)?;
+    let body = root.titled(title, ("sans-serif", 24).into_font())?;
+    draw_panels(&body, panels, &Default::default())?;
+    Ok(root.present()?)
+}
+
 fn draw(file: &Path, title: &str, panels: &[Vec<Curve>; 4]) -> Result<(), Failure> {
-    let fail =
-        |e: &dyn std::fmt::Display| Failure::Failed(format!("{} cannot be drawn: {e}", file.display()));
-    let root = SVGBackend::new(file, SIZE_PX).into_drawing_area();
-    root.fill(&WHITE).map_err(|e| fail(&e))?;
-    let body = root.titled(title, ("sans-serif", 24).into_font()).map_err(|e| fail(&e))?;
-    for ((area, curves), name) in body.split_evenly((4, 1)).iter().zip(panels).zip(PANELS) {
-        draw_panel(area, name, curves).map_err(|e| fail(&e))?;
-    }
-    root.present().map_err(|e| fail(&e))
-}
-
-fn draw_panel(area: &Area<'_>, name: &str, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
-    let (times, values) = ranges(curves);
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(14)
-        .margin_right(16)
-        .x_label_area_size(34)
-        .y_label_area_size(74)
-        .build_cartesian_2d(times, values)?;
-    chart
-        .configure_mesh()
-        .x_desc("time (s)")
-        .y_desc(name)
-        .x_labels(12)
-        .y_labels(6)
-        .label_style(("sans-serif", 14))
-        .light_line_style(RGBColor(245, 245, 245))
-        .draw()?;
-    for curve in curves {
-        let style: ShapeStyle = curve.colour.mix(curve.opacity).stroke_width(curve.width_px);
-        let series = chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
-        if !curve.label.is_empty() {
-            series
-                .label(curve.label.clone())
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style.stroke_width(2)));
-        }
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .label_font(("sans-serif", 13))
-        .draw()?;
-    Ok(())
-}
-
-/// The axes: all points, with a little room above and below.
-fn ranges(curves: &[Curve]) -> (Range<f64>, Range<f64>) {
-    let points = || curves.iter().flat_map(|c| &c.points);
-    let times = span(points().map(|p| p.0));
-    let values = span(points().map(|p| p.1));
-    let room = 0.06 * (values.end - values.start);
-    // The legend stands right of the curves, where it hides none.
-    let times = times.start..times.end + LEGEND_SHARE * (times.end - times.start);
-    (times, values.start - room..values.end + room)
-}
-
-/// Least and largest value; never empty, so that an axis can be drawn.
-fn span(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    if low < high {
-        low..high
-    } else if low.is_finite() {
-        low - 0.5..low + 0.5
-    } else {
-        0.0..1.0
-    }
+    let mut svg = String::new();
+    let root = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
+    let drawn = draw_on(&root, title, panels);
+    drop(root);
+    drawn.map_err(|e| undrawable(file, e.as_ref()))?;
+    write_whole(file, &svg)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taustream_motion::MAX_JOINTS;
 
     fn recording(samples: usize, measured_rad: impl Fn(f64) -> f64) -> Vec<Sample> {
         let sample = |i: usize| {

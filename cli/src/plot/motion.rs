@@ -1,0 +1,185 @@
+//! A trajectory: position, velocity, acceleration and jerk of every joint, beside its limits where the robot is known,
+//! and the arm in three views.
+use super::panel::{Area, Curve, Drawn, JOINT_COLOURS, LimitLine, draw_panels, thinned, undrawable};
+use super::views::Stage;
+use crate::failure::Failure;
+use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
+use std::path::Path;
+use taustream_arm::{Robot, RobotJoint, Scene, TrajectoryFile};
+use taustream_motion::trajectory::Cursor;
+
+/// Samples of each curve.
+const SAMPLES: u32 = 900;
+const WIDTH_PX: u32 = 1500;
+const VIEWS_PX: u32 = 520;
+const CURVES_PX: u32 = 920;
+const TITLE_PX: u32 = 44;
+/// A limit that all joints share.
+const SHARED: RGBColor = RGBColor(90, 90, 90);
+
+/// Draws the trajectory of a file as SVG; with a robot, its limits and the arm too.
+pub(crate) fn svg(
+    path: &Path,
+    file: &TrajectoryFile,
+    arm: Option<(&Robot, &Scene)>,
+) -> Result<String, Failure> {
+    let height_px = TITLE_PX + CURVES_PX + if arm.is_some() { VIEWS_PX } else { 0 };
+    let mut svg = String::new();
+    let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
+    let drawn = draw(&root, path, file, arm);
+    drop(root);
+    drawn.map_err(|e| undrawable(path, e.as_ref()))?;
+    Ok(svg)
+}
+
+fn draw(root: &Area<'_>, path: &Path, file: &TrajectoryFile, arm: Option<(&Robot, &Scene)>) -> Drawn {
+    root.fill(&WHITE)?;
+    let trajectory = &file.trajectory;
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let views = if arm.is_some() {
+        "; the arm from light (start) to dark (end), its tip's path in orange"
+    } else {
+        ""
+    };
+    let title = format!(
+        "{name}: {}, {:.3} s, {} strokes{views}",
+        file.robot,
+        trajectory.duration_s(),
+        trajectory.strokes().len()
+    );
+    let body = root.titled(&title, ("sans-serif", 22).into_font())?;
+    let curves_area = match arm {
+        None => body,
+        Some((robot, scene)) => {
+            let (views, curves) = body.split_vertically(VIEWS_PX);
+            Stage::of(robot, scene, trajectory).draw(&views)?;
+            curves
+        }
+    };
+    let robot = arm.map(|(robot, _)| robot);
+    draw_panels(&curves_area, &curves(file, robot), &limits(robot))?;
+    Ok(root.present()?)
+}
+
+fn curves(file: &TrajectoryFile, robot: Option<&Robot>) -> [Vec<Curve>; 4] {
+    let trajectory = &file.trajectory;
+    let mut cursor = Cursor::at_start(trajectory);
+    let times = (0..=SAMPLES).map(|k| trajectory.duration_s() * f64::from(k) / f64::from(SAMPLES));
+    let samples: Vec<_> = times.map(|t_s| (t_s, cursor.sample(trajectory, t_s))).collect();
+    let mut order = 0;
+    [(); 4].map(|()| {
+        let curve = |(j, colour): (usize, RGBColor)| {
+            let points = samples.iter().map(|(t_s, s)| {
+                let blocks = [&s.position_rad, &s.velocity_rad_s, &s.acceleration_rad_s2, &s.jerk_rad_s3];
+                let value = blocks.get(order).and_then(|b| b.get(j)).copied().unwrap_or(f64::NAN);
+                (*t_s, value)
+            });
+            let name = robot.and_then(|r| r.joints.get(j)).map(|joint| joint.name.clone());
+            Curve {
+                label: name.unwrap_or_else(|| format!("joint {}", j + 1)),
+                colour,
+                width_px: 2,
+                opacity: 1.0,
+                points: thinned(points.collect()),
+            }
+        };
+        let panel = (0..trajectory.joints()).zip(JOINT_COLOURS).map(curve).collect();
+        order += 1;
+        panel
+    })
+}
+
+/// The motion limits of every panel: one pair of lines where all joints have the same, else one pair a joint.
+fn limits(robot: Option<&Robot>) -> [Vec<LimitLine>; 4] {
+    let Some(robot) = robot else { return Default::default() };
+    let of: [fn(&RobotJoint) -> [f64; 2]; 4] = [
+        |joint| joint.limits.position_rad,
+        |joint| [-joint.limits.motion.velocity_rad_s, joint.limits.motion.velocity_rad_s],
+        |joint| [-joint.limits.motion.acceleration_rad_s2, joint.limits.motion.acceleration_rad_s2],
+        |joint| [-joint.limits.motion.jerk_rad_s3, joint.limits.motion.jerk_rad_s3],
+    ];
+    of.map(|limit| {
+        let mut pairs: Vec<([f64; 2], RGBColor)> =
+            robot.joints.iter().map(limit).zip(JOINT_COLOURS).collect();
+        let is_shared = pairs
+            .windows(2)
+            .all(|two| matches!(two, [a, b] if a.0.map(f64::to_bits) == b.0.map(f64::to_bits)));
+        if is_shared {
+            pairs.truncate(1);
+            pairs.iter_mut().for_each(|(_, colour)| *colour = SHARED);
+        }
+        let mut label = if is_shared { "limit of all joints" } else { "limits (dashed)" }.to_owned();
+        let lines = pairs.into_iter().flat_map(|(pair, colour)| pair.map(|value| (value, colour)));
+        lines.map(|(value, colour)| LimitLine { value, colour, label: std::mem::take(&mut label) }).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+    use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+
+    fn shipped() -> (Robot, Scene) {
+        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+        let robot = Robot::load(&config.join("robots/ur5.toml")).unwrap();
+        (robot, Scene::load(&config.join("scenes/pillars.toml")).unwrap())
+    }
+
+    fn file(strokes: &[Stroke]) -> TrajectoryFile {
+        let mut base_rad = [0.0; MAX_JOINTS];
+        (base_rad[1], base_rad[2]) = (-1.57, 1.57);
+        TrajectoryFile {
+            robot: "ur5".into(),
+            digest: None,
+            trajectory: Trajectory::new(6, base_rad, strokes).unwrap(),
+        }
+    }
+
+    fn stroke() -> Stroke {
+        let mut delta_rad = [0.0; MAX_JOINTS];
+        delta_rad[0] = 1.0;
+        Stroke { start_s: 0.0, duration_s: 4.0, n: 10, delta_rad }
+    }
+
+    #[test]
+    fn picture_with_a_robot_has_views_limits_and_obstacles_and_without_only_curves() {
+        let (robot, scene) = shipped();
+        let whole = svg(Path::new("move.json"), &file(&[stroke()]), Some((&robot, &scene))).unwrap();
+        for word in [
+            "top",
+            "front",
+            "side",
+            "shoulder_pan",
+            "limit of all joints",
+            "jerk (rad/s^3)",
+            "x (m)",
+            "z (m)",
+            "<polygon",
+        ] {
+            assert!(whole.contains(word), "no `{word}`");
+        }
+        for obstacle in &scene.obstacles {
+            assert!(whole.contains(&obstacle.name), "no `{}`", obstacle.name);
+        }
+        let curves = svg(Path::new("move.json"), &file(&[stroke()]), None).unwrap();
+        assert!(curves.contains("joint 6") && !curves.contains("<polygon"));
+        assert!(whole.len() < 2_000_000, "{} bytes", whole.len());
+    }
+
+    #[test]
+    fn arm_that_never_moves_in_an_empty_world_is_drawn() {
+        let (robot, _) = shipped();
+        let empty = Scene { file: PathBuf::new(), ..Scene::default() };
+        assert!(svg(Path::new("rest.json"), &file(&[]), Some((&robot, &empty))).unwrap().contains("</svg>"));
+    }
+
+    #[test]
+    fn limits_that_differ_are_drawn_for_each_joint() {
+        let (mut robot, _) = shipped();
+        assert_eq!(limits(Some(&robot))[1].len(), 2);
+        robot.joints[3].limits.motion.velocity_rad_s = 1.0;
+        assert_eq!(limits(Some(&robot))[1].len(), 12);
+        assert_eq!(limits(Some(&robot))[2].len(), 2);
+    }
+}

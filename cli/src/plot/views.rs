@@ -1,0 +1,195 @@
+//! The arm among its obstacles, from above, from the front and from the side, all at one scale.
+use super::outline::{View, clipped, outline};
+use super::panel::{Area, Drawn, Point, span};
+use nalgebra::Point3;
+use plotters::prelude::{ChartBuilder, Circle, Color, IntoFont, LineSeries, Polygon, RGBColor, Text};
+use std::ops::Range;
+use taustream_arm::{Robot, Scene};
+use taustream_motion::{JointArray, Trajectory};
+
+/// Poses of the arm from start to end; more run together.
+const POSES: u32 = 9;
+/// Points of the path of the tip.
+const PATH_POINTS: u32 = 400;
+/// Obstacles far away count this much of the arm's own extent, so that a floor does not make the arm a dot.
+const AROUND: f64 = 0.35;
+/// Room for the axes' words, px.
+const LABELS_PX: (u32, u32) = (64, 42);
+const MARGIN_PX: u32 = 12;
+const TITLE_PX: u32 = 30;
+/// The arm at the start and at the end; poses between are between.
+const FIRST: RGBColor = RGBColor(150, 200, 232);
+const LAST: RGBColor = RGBColor(8, 48, 107);
+const PATH: RGBColor = RGBColor(213, 94, 0);
+const OBSTACLE: RGBColor = RGBColor(110, 110, 110);
+
+/// What is drawn, in the base frame.
+pub(super) struct Stage<'a> {
+    robot: &'a Robot,
+    scene: &'a Scene,
+    poses_rad: Vec<JointArray>,
+    tip_m: Vec<Point3<f64>>,
+}
+
+/// One view's outlines.
+struct Seen {
+    view: View,
+    /// One entry a pose, one outline a link.
+    arm: Vec<Vec<Vec<Point>>>,
+    /// Origins of the frames, one line a pose.
+    sticks: Vec<Vec<Point>>,
+    obstacles: Vec<(String, Vec<Point>)>,
+    tip: Vec<Point>,
+    x_m: Range<f64>,
+    y_m: Range<f64>,
+}
+
+impl<'a> Stage<'a> {
+    /// The arm along a trajectory.
+    pub(super) fn of(robot: &'a Robot, scene: &'a Scene, trajectory: &Trajectory) -> Self {
+        let at = |share: f64| trajectory.sample(share * trajectory.duration_s()).position_rad;
+        let shares = |count: u32| (0..count).map(move |k| f64::from(k) / f64::from(count - 1));
+        let tip = |share| {
+            let frames = robot.chain.frames(&at(share));
+            let [.., last] = frames;
+            Point3::from(last.translation.vector)
+        };
+        Self {
+            robot,
+            scene,
+            poses_rad: shares(POSES).map(at).collect(),
+            tip_m: shares(PATH_POINTS).map(tip).collect(),
+        }
+    }
+
+    /// Draws the three views beside each other.
+    pub(super) fn draw(&self, area: &Area<'_>) -> Drawn {
+        let areas = area.split_evenly((1, 3));
+        let seen = View::ALL.map(|view| self.seen(view));
+        let (width_px, height_px) = areas.first().map_or((1, 1), Area::dim_in_pixel);
+        let across_px = width_px.saturating_sub(LABELS_PX.0 + 2 * MARGIN_PX).max(1);
+        let up_px = height_px.saturating_sub(LABELS_PX.1 + 2 * MARGIN_PX + TITLE_PX).max(1);
+        // One scale for all: metres look the same in every direction and every view.
+        let need =
+            |s: &Seen| f64::max(length(&s.x_m) / f64::from(across_px), length(&s.y_m) / f64::from(up_px));
+        let m_per_px = seen.iter().map(need).fold(0.0, f64::max) * 1.04;
+        for (area, seen) in areas.iter().zip(&seen) {
+            let x_m = around(&seen.x_m, m_per_px * f64::from(across_px));
+            let y_m = around(&seen.y_m, m_per_px * f64::from(up_px));
+            draw_view(area, seen, x_m, y_m)?;
+        }
+        Ok(())
+    }
+
+    fn seen(&self, view: View) -> Seen {
+        let mut arm = Vec::new();
+        let mut sticks = Vec::new();
+        for q in &self.poses_rad {
+            let frames = self.robot.chain.frames(q);
+            let link = |shape: &taustream_arm::LinkShape| {
+                let frame = frames.get(shape.frame).copied().unwrap_or_default();
+                outline(&shape.shape, &(frame * shape.pose), view)
+            };
+            arm.push(self.robot.shapes.iter().map(link).collect());
+            let used = frames.iter().take(self.robot.joints.len() + 1);
+            sticks.push(used.map(|f| view.of(&Point3::from(f.translation.vector))).collect());
+        }
+        let obstacle = |o: &taustream_arm::Obstacle| (o.name.clone(), outline(&o.shape, &o.pose, view));
+        let obstacles: Vec<(String, Vec<Point>)> = self.scene.obstacles.iter().map(obstacle).collect();
+        let tip: Vec<Point> = self.tip_m.iter().map(|p| view.of(p)).collect();
+
+        let own = || arm.iter().flatten().flatten().chain(sticks.iter().flatten()).chain(&tip);
+        let others = || obstacles.iter().flat_map(|(_, o)| o);
+        let x_m = reach(own().map(|p| p.0), others().map(|p| p.0));
+        let y_m = reach(own().map(|p| p.1), others().map(|p| p.1));
+        Seen { view, arm, sticks, obstacles, tip, x_m, y_m }
+    }
+}
+
+fn length(range: &Range<f64>) -> f64 {
+    range.end - range.start
+}
+
+/// A range of this length about the middle of another.
+fn around(range: &Range<f64>, length_m: f64) -> Range<f64> {
+    let middle = 0.5 * (range.start + range.end);
+    middle - 0.5 * length_m..middle + 0.5 * length_m
+}
+
+/// The arm's own extent, and of the others' what is near it.
+fn reach(own: impl Iterator<Item = f64>, others: impl Iterator<Item = f64>) -> Range<f64> {
+    let own = span(own);
+    let near_m = AROUND * length(&own);
+    let (low, high) = (own.start - near_m, own.end + near_m);
+    span(others.map(|v| v.clamp(low, high)).chain([own.start, own.end]))
+}
+
+fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> Drawn {
+    let (title, right, up) = seen.view.words();
+    let (low, high) = ((x_m.start, y_m.start), (x_m.end, y_m.end));
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN_PX)
+        .caption(title, ("sans-serif", 18))
+        .x_label_area_size(LABELS_PX.1)
+        .y_label_area_size(LABELS_PX.0)
+        .build_cartesian_2d(x_m, y_m)?;
+    chart
+        .configure_mesh()
+        .x_desc(right)
+        .y_desc(up)
+        .x_labels(7)
+        .y_labels(7)
+        .label_style(("sans-serif", 13))
+        .light_line_style(RGBColor(248, 248, 248))
+        .bold_line_style(RGBColor(232, 232, 232))
+        .draw()?;
+
+    for (_, obstacle) in &seen.obstacles {
+        let shown = clipped(obstacle.clone(), low, high);
+        chart.draw_series([Polygon::new(shown.clone(), OBSTACLE.mix(0.28))])?;
+        chart.draw_series([closed(&shown, OBSTACLE, 1)])?;
+    }
+    let poses = seen.arm.len();
+    for (index, (links, stick)) in (0_u32..).zip(seen.arm.iter().zip(&seen.sticks)) {
+        let colour = between(f64::from(index) / f64::from(POSES - 1));
+        let is_end = index == 0 || usize::try_from(index).is_ok_and(|i| i + 1 == poses);
+        let opacity = if is_end { 0.38 } else { 0.10 };
+        chart.draw_series(links.iter().map(|link| Polygon::new(link.clone(), colour.mix(opacity))))?;
+        if is_end {
+            chart.draw_series(links.iter().map(|link| closed(link, colour, 1)))?;
+        }
+        chart.draw_series([open(stick, colour, if is_end { 2 } else { 1 })])?;
+        chart.draw_series(
+            stick.iter().map(|p| Circle::new(*p, if is_end { 3 } else { 1 }, colour.filled())),
+        )?;
+    }
+    chart.draw_series(LineSeries::new(seen.tip.iter().copied(), PATH.stroke_width(2)))?;
+    let ends = seen.tip.first().into_iter().chain(seen.tip.last());
+    chart.draw_series(ends.map(|p| Circle::new(*p, 4, PATH.filled())))?;
+    let font = ("sans-serif", 12).into_font().color(&OBSTACLE);
+    for (name, obstacle) in &seen.obstacles {
+        let shown = clipped(obstacle.clone(), low, high);
+        let (x, y) = (span(shown.iter().map(|p| p.0)), span(shown.iter().map(|p| p.1)));
+        if !shown.is_empty() {
+            let at = (x.start + 0.1 * length(&x), y.start + 0.5 * length(&y));
+            chart.draw_series([Text::new(name.clone(), at, font.clone())])?;
+        }
+    }
+    Ok(())
+}
+
+/// The colour of a pose on the way.
+fn between(share: f64) -> RGBColor {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two colours")]
+    let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+    RGBColor(mix(FIRST.0, LAST.0), mix(FIRST.1, LAST.1), mix(FIRST.2, LAST.2))
+}
+
+fn open(points: &[Point], colour: RGBColor, width_px: u32) -> plotters::element::PathElement<Point> {
+    plotters::element::PathElement::new(points.to_vec(), colour.stroke_width(width_px))
+}
+
+fn closed(points: &[Point], colour: RGBColor, width_px: u32) -> plotters::element::PathElement<Point> {
+    let ring: Vec<Point> = points.iter().chain(points.first()).copied().collect();
+    plotters::element::PathElement::new(ring, colour.stroke_width(width_px))
+}
