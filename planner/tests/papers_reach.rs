@@ -1,7 +1,7 @@
 //! Seed paper 003: its arm and its reward against an independent program, and which methods reach its target.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use taustream_planner::optimize::{Problem, Progress, Reading, Run, Setup, by_name};
-use taustream_planner::papers::reach::{FiveJointArm, Reward};
+use taustream_planner::papers::reach::{FiveJointArm, Reach, Reward};
 
 /// Angles, tip in mm, error in mm, cost: what `oracles/reach.py` prints.
 const PYTHON: [([f64; 4], [f64; 3], f64, f64); 8] = [
@@ -64,6 +64,26 @@ fn reach_arm_and_cost_agree_with_the_python_program() {
         }
         close("error", task.error_m(&angles) * 1000.0, error_mm);
         close("cost", task.cost(&angles), cost);
+    }
+}
+
+#[test]
+fn reach_refuses_numbers_that_do_not_go_together_and_names_them() {
+    let good = FiveJointArm::task(Reading::Corrected);
+    assert!(good.checked().is_ok());
+    let reward = good.reward;
+    let bad = [
+        (Reach { start_rad: &[0.0; 3], ..good }, "the start's number of joints is 3"),
+        (Reach { start_rad: &[0.0, f64::NAN, 0.0, 0.0], ..good }, "the start is NaN"),
+        (Reach { target_m: [0.0, f64::INFINITY, 0.0], ..good }, "the target is inf"),
+        (Reach { speed_rad_s: 0.0, ..good }, "the speed is 0"),
+        (Reach { reward: Reward { inner_m: 1e-3, ..reward }, ..good }, "s is 0.001"),
+        (Reach { reward: Reward { error_max_m: 1e-6, ..reward }, ..good }, "the threshold is 0.000005"),
+        (Reach { reward: Reward { punishment: f64::NAN, ..reward }, ..good }, "e_max, K or j is NaN"),
+    ];
+    for (task, text) in bad {
+        let refusal = task.checked().err().map(|r| r.to_string()).unwrap_or_default();
+        assert!(refusal.contains(text), "{refusal}, not {text}");
     }
 }
 

@@ -9,7 +9,7 @@
 //! paper's own table 5 cannot be meant otherwise. The largest error `e_max` is not given: twice the arm's reach, and
 //! errors beyond it count as it. Table 1's fuzzy rules occur in no equation. Everything is in metres, radians and
 //! seconds; the paper has millimetres, and its 0.02 is 4 ε.
-use crate::optimize::{Problem, Reading};
+use crate::optimize::{Problem, Reading, Refusal};
 
 /// Reward and punishment of an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +79,25 @@ pub struct Reach<'a> {
 }
 
 impl Reach<'_> {
+    /// The same, once its numbers are found to make sense together.
+    ///
+    /// # Errors
+    /// Names the first number that does not: a start of another length than the box, a target that is no place, a
+    /// speed of nothing, thresholds that are not in order.
+    pub fn checked(self) -> Result<Self, Refusal> {
+        let (within, who) = (Refusal::check_number, "reaching a position");
+        let (joints, given) = (self.bounds_rad.len() as f64, self.start_rad.len() as f64);
+        within(who, "the start's number of joints", given, [joints, joints], "one for each range is needed")?;
+        Refusal::check_finite(who, "the target", &self.target_m)?;
+        Refusal::check_finite(who, "the start", self.start_rad)?;
+        within(who, "the speed", self.speed_rad_s, [1e-9, 1e9], "a speed above 0 rad/s is needed")?;
+        let Reward { threshold_m, inner_m, error_max_m, punishment, factor, .. } = self.reward;
+        within(who, "s", inner_m, [1e-15, threshold_m], "above 0 m and at most the threshold is possible")?;
+        within(who, "the threshold", threshold_m, [inner_m, 0.999 * error_max_m], "below e_max is possible")?;
+        Refusal::check_finite(who, "e_max, K or j", &[error_max_m, punishment, factor])?;
+        Ok(self)
+    }
+
     /// Distance of the tip to the target.
     #[must_use]
     pub fn error_m(&self, angles_rad: &[f64]) -> f64 {
