@@ -9,6 +9,9 @@ pub(crate) const MACHINE: [&str; 4] = ["user-mode-linux", "iproute2", "can-utils
 /// What the independent master needs besides.
 pub(crate) const PEERS: [&str; 2] = ["python3", "python3-venv"];
 
+/// What formats the manual pages, so that a test sees whether they can be.
+pub(crate) const MANUAL: [&str; 1] = ["groff-base"];
+
 /// Makes sure that all packages are there. What is missing is installed, as root or with sudo, after saying so.
 pub(crate) fn ensure(packages: &[&str]) -> Result<()> {
     let missing: Vec<&str> = packages.iter().copied().filter(|p| !is_installed(p)).collect();

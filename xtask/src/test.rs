@@ -1,5 +1,5 @@
 //! `cargo xtask test`: everything that must hold before a change lands, in one command.
-use crate::packages::{self, MACHINE, PEERS};
+use crate::packages::{self, MACHINE, MANUAL, PEERS};
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use std::env;
@@ -28,6 +28,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     let root = workspace::root()?;
     packages::ensure(&MACHINE)?;
     packages::ensure(&PEERS)?;
+    packages::ensure(&MANUAL)?;
     for (what, words) in STEPS {
         perform(what, cargo(&root).args(words))?;
     }
