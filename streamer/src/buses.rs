@@ -88,7 +88,7 @@ impl Buses {
     /// Real time: no allocation.
     pub fn encode(&mut self, now: Nanos, wish: DriveWish, commands: &[JointCommand; MAX_JOINTS]) {
         for bus in &mut self.0 {
-            bus.live = wish == DriveWish::Enabled;
+            bus.live = matches!(wish, DriveWish::Enabled | DriveWish::Keep);
             bus.outgoing.clear();
             if !bus.health.is_silent() || wish == DriveWish::TorqueOff {
                 bus.driver.encode(now, wish, commands, &mut bus.outgoing);

@@ -267,8 +267,8 @@ impl Reporter {
         facts.frozen && !self.frozen_before && facts.failed_bus().is_none()
     }
 
-    /// Notes what a controller tells: at once when it is new, else once a second with its count, so that a flood of error
-    /// frames does not flood the log.
+    /// Notes what a controller tells: what is new at most ten times a second, the same again once a second, with its
+    /// count, so that a flood of error frames does not flood the log.
     fn note_buses(&mut self, facts: &Facts) {
         let second_ticks = 1_000_000_000 / self.period_ns;
         for (bus, (found, noted)) in facts.buses.iter().zip(&mut self.noted).enumerate() {
@@ -280,8 +280,10 @@ impl Reporter {
             }
             let count = found.error_frames.saturating_sub(noted.error_frames);
             let is_new = kind(found.newest_error) != kind(noted.error);
-            let is_due = facts.tick.number.saturating_sub(noted.tick) >= second_ticks;
-            if count > 0 && (is_new || is_due) {
+            let rest_ticks = if is_new { second_ticks / 10 } else { second_ticks };
+            let is_due =
+                noted.error_frames == 0 || facts.tick.number.saturating_sub(noted.tick) >= rest_ticks;
+            if count > 0 && is_due {
                 let error = found.newest_error;
                 (noted.error, noted.error_frames, noted.tick) =
                     (error, found.error_frames, facts.tick.number);

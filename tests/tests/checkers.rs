@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 use taustream_tests::cycle_log::{Cycle, Event, parse};
-use taustream_tests::setpoints::{BusFrame, Encoding, Flaw, judge};
+use taustream_tests::setpoints::{BusFrame, Encoding, Flaw, Losses, judge, judge_with};
 
 const JOINTS: usize = 6;
 const CYCLES: u32 = 400;
@@ -246,6 +246,76 @@ fn log_that_hides_something_fails() {
     let (frames, mut log) = recording();
     nth_cycle(&mut log, 30).s = 0.0;
     judge(&frames, &log, 0, &encodings()).expect_err("trajectory time went back");
+}
+
+/// A recording of a bus that took nothing of cycle 101, three frames of cycle 201, and nothing from cycle 301 on.
+fn lossy_recording() -> (Vec<BusFrame>, Vec<Event>) {
+    let (mut frames, mut log) = recording();
+    let mut lose = |from: usize, to: usize| {
+        let (first, last) = (sync_place(&frames, from), sync_place(&frames, to));
+        frames.drain(first..last);
+    };
+    // From the end, so that the places in front stay.
+    lose(301, 401);
+    lose(101, 102);
+    for node in 3..=6 {
+        frames.remove(place(&frames, 200, node)); // The SYNC of cycle 201 is the 200th now.
+    }
+    let mut syncs = 0;
+    for n in 0..400 {
+        let cycle = nth_cycle(&mut log, n);
+        let (sent, lost) = match n + 1 {
+            // The cycle in which the bus failed wanted its frames out; the silent ones after it want nothing.
+            101 | 301 => (0, 7),
+            201 => (3, 4),
+            302.. => (0, 0),
+            _ => (7, 0),
+        };
+        syncs += u64::from(sent > 0);
+        (cycle.sent, cycle.lost, cycle.sync) = (vec![sent], vec![lost], vec![syncs]);
+    }
+    (frames, log)
+}
+
+/// The place of a SYNC; behind the last one, the end.
+fn sync_place(frames: &[BusFrame], sync: usize) -> usize {
+    let mut syncs = frames.iter().enumerate().filter(|(_, frame)| frame.id == 0x080);
+    syncs.nth(sync - 1).map_or(frames.len(), |(at, _)| at)
+}
+
+#[test]
+fn recording_with_losses_passes_only_where_they_are_allowed() {
+    let (frames, log) = lossy_recording();
+    judge(&frames, &log, 0, &encodings()).expect_err("cycles are missing");
+    let verdict = judge_with(Losses::AsLogged, (&frames, &log), 0, &encodings()).expect("the log says so");
+    assert_eq!((verdict.syncs, verdict.setpoints), (299, 298 * JOINTS + 2));
+}
+
+/// Goal: what the losses excuse is only what the log claims: a frame after the bus failed, a frame that nobody claims, a
+/// wrong target in a cycle that was lost in part are all found.
+#[test]
+fn recording_with_losses_that_carries_what_the_log_does_not_claim_fails() {
+    let lossy = |frames: &[BusFrame], log: &[Event]| {
+        judge_with(Losses::AsLogged, (frames, log), 0, &encodings()).expect_err("a flaw").to_string()
+    };
+    let (mut frames, log) = lossy_recording();
+    let stale = sync_place(&frames, 299);
+    let again: Vec<BusFrame> = frames[stale..].to_vec();
+    frames.extend(again);
+    assert!(lossy(&frames, &log).contains("the log does not know"), "stale setpoints after the bus failed");
+
+    let (mut frames, log) = lossy_recording();
+    let at = place(&frames, 200, 2);
+    frames[at].data[2] ^= 4;
+    assert!(lossy(&frames, &log).contains("node 2 got target"), "a wrong target in a part of a cycle");
+
+    let (mut frames, log) = lossy_recording();
+    frames.remove(sync_place(&frames, 200));
+    lossy(&frames, &log);
+
+    let (frames, mut log) = lossy_recording();
+    nth_cycle(&mut log, 100).sent = vec![7];
+    lossy(&frames, &log);
 }
 
 #[test]

@@ -121,7 +121,7 @@ impl CanLink for SocketCan {
     fn reopen(&mut self) -> Result<(), OpenError> {
         let interface = &self.bus.interface;
         check(&self.bus)?;
-        check_controller(interface)?;
+        check_controller(interface, facts::of(interface)?.state)?;
         if !self.gone {
             let failed =
                 |source| OpenError::System { interface: interface.clone(), doing: "look at", source };
@@ -138,10 +138,10 @@ impl CanLink for SocketCan {
 }
 
 /// Refuses a controller that cannot carry setpoints. Drivers that tell no state are taken at their word.
-fn check_controller(interface: &str) -> Result<(), OpenError> {
+fn check_controller(interface: &str, state: Option<CanState>) -> Result<(), OpenError> {
     let restart = || format!("ip link set {interface} type can restart");
     let wait = || format!("wait for it, or: ip link set {interface} down && ip link set {interface} up");
-    let (state, cure) = match facts::of(interface)?.state {
+    let (state, cure) = match state {
         Some(CanState::BusOff) => ("bus-off", restart()),
         Some(CanState::ErrorPassive) => ("error-passive", wait()),
         Some(CanState::Stopped | CanState::Sleeping) => ("not started", wait()),
@@ -240,4 +240,28 @@ fn open_socket(interface: &str, role: LinkRole) -> Result<CanFdSocket, OpenError
         .or_else(|_| set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER_BYTES))
         .map_err(|errno| failed("set up")(errno.into()))?;
     Ok(socket)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Goal: a controller that is off the bus, or about to leave it, is not taken for a bus that carries setpoints, and
+    /// each refusal names the command that helps. No vcan has such a state, so the kernel's answers are given here.
+    #[test]
+    fn controller_out_of_order_is_refused_with_the_cure() {
+        let said = |state| check_controller("can3", state).map_err(|refusal| refusal.to_string());
+        for (state, word, cure) in [
+            (CanState::BusOff, "bus-off", "ip link set can3 type can restart"),
+            (CanState::ErrorPassive, "error-passive", "ip link set can3 down && ip link set can3 up"),
+            (CanState::Stopped, "not started", "ip link set can3 down && ip link set can3 up"),
+            (CanState::Sleeping, "not started", "ip link set can3 down && ip link set can3 up"),
+        ] {
+            let text = said(Some(state)).expect_err("refused");
+            assert!(text.contains("can3") && text.contains(word) && text.contains(cure), "{text}");
+        }
+        for state in [Some(CanState::ErrorActive), Some(CanState::ErrorWarning), None] {
+            assert_eq!(said(state), Ok(()));
+        }
+    }
 }

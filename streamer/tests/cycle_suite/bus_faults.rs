@@ -202,3 +202,21 @@ fn drive_found_energised_after_a_bus_fault_is_reported_and_left_alone() {
         (Phase::Fault, FaultReason::EnergisedUnowned, Some(4))
     );
 }
+
+/// Goal: whoever floods the bus with error frames, the same or ever new ones, does not flood the log; and what does not
+/// concern the course (overflow, warnings, a missing acknowledge) stops nobody.
+#[test]
+fn flood_of_error_frames_is_told_a_few_times_a_second_and_stops_nobody() {
+    let mut rig = Rig::new();
+    rig.move_it();
+    rig.script(|w| (w.error_frame, w.error_state) = (Some(0x004), 0x01));
+    rig.run(1_000);
+    assert!((1..=2).contains(&rig.error_notes), "{} notes of the same in a second", rig.error_notes);
+    rig.error_notes = 0;
+    for round in 0..1_000_u32 {
+        rig.script(|w| w.error_frame = Some([0x020, 0x008, 0x010][round as usize % 3]));
+        rig.step_after(1);
+    }
+    assert!((2..=11).contains(&rig.error_notes), "{} notes of different ones in a second", rig.error_notes);
+    assert_eq!(rig.cause(), None);
+}

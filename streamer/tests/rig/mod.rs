@@ -15,7 +15,7 @@ use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
 use taustream_streamer::facts::{Asked, Cause, Decision, Verdict};
 use taustream_streamer::intake::{self, Desk, Leave};
 use taustream_streamer::names::Names;
-use taustream_streamer::report::{CycleRecord, Readers, Record};
+use taustream_streamer::report::{CycleRecord, Note, Readers, Record};
 use taustream_streamer::tick::Tick;
 use taustream_streamer::words::Answer;
 
@@ -219,6 +219,8 @@ pub struct Rig {
     pub tick: u64,
     pub cycles: Vec<CycleRecord>,
     pub phases: Vec<(Phase, Phase)>,
+    /// Notes of error frames.
+    pub error_notes: u32,
     sequence: u64,
     generation: u64,
     last: Next,
@@ -293,6 +295,7 @@ impl Rig {
             tick: 0,
             cycles: Vec::new(),
             phases: Vec::new(),
+            error_notes: 0,
             sequence: 0,
             generation: 0,
             last: Next::Go,
@@ -317,7 +320,9 @@ impl Rig {
         }
         while self.readers.timings.pop().is_some() {}
         while self.readers.reports.pop().is_some() {}
-        while self.readers.notes.pop().is_some() {}
+        while let Some(note) = self.readers.notes.pop() {
+            self.error_notes += u32::from(matches!(note, Note::BusError { .. }));
+        }
         self.last
     }
 
