@@ -38,6 +38,7 @@ pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
         waypoints_per_segment: args.waypoints_per_segment,
         expansion_m: args.expansion_m,
         weights: args.weights.0,
+        ..CostModel::default()
     };
     let robot = arm::robot(&args.motion.robot)?;
     let scene = arm::scene(&args.motion.scene)?;
