@@ -10,6 +10,7 @@ pub mod bus_load;
 pub mod closed_form;
 mod consistency;
 mod contact;
+pub mod daemon;
 mod description;
 pub mod digest;
 mod document;

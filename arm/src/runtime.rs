@@ -16,8 +16,18 @@ pub struct RuntimeError {
     pub why: String,
 }
 
+/// The system's runtime directory, which the installed services share.
+const SYSTEM: &str = "/run/taustream";
+
+/// The user of the installed services: whose `/run/taustream` is, unless it is root's own.
+#[must_use]
+pub fn user_of_services() -> Option<u32> {
+    let facts = fs::symlink_metadata(SYSTEM).ok()?;
+    (facts.is_dir() && facts.uid() != 0).then(|| facts.uid())
+}
+
 /// The runtime directory, made (mode 0700) when it is missing and refused when it belongs to somebody else:
-/// `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (root, or its owner), else `/run/user/UID/taustream`,
+/// `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (its owner, or root where it is nobody's yet), else `/run/user/UID/taustream`,
 /// else `/tmp/taustream-UID`.
 ///
 /// # Errors
@@ -40,9 +50,10 @@ fn choose(asked: Option<OsString>, uid: u32, run: &Path) -> PathBuf {
         return PathBuf::from(path);
     }
     let system = run.join("taustream");
-    let owned = fs::symlink_metadata(&system).is_ok_and(|facts| facts.uid() == uid);
+    // Root may own services of its own beside those of their user.
+    let owned = fs::symlink_metadata(&system).map_or(uid == 0, |facts| facts.uid() == uid);
     let user = run.join(format!("user/{uid}"));
-    if uid == 0 || owned {
+    if owned {
         system
     } else if user.is_dir() {
         user.join("taustream")
@@ -111,6 +122,7 @@ mod tests {
         fs::create_dir(run.join("taustream")).unwrap();
         assert_eq!(choose(None, own_uid(), run), run.join("taustream"), "its owner uses it");
         assert_ne!(choose(None, stranger, run), run.join("taustream"), "others do not");
+        assert_eq!(choose(None, 0, run) == run.join("taustream"), own_uid() == 0, "not even root");
     }
 
     #[test]

@@ -7,8 +7,10 @@ use taustream_arm::{Kind, Robot, Scene, Settings, TrajectoryFile};
 use taustream_messages::service::is_arm_name;
 use taustream_streamer::names::{BusName, Names};
 
-/// Where an installed controller keeps its settings.
+/// Where a controller keeps the settings of its one arm.
 const INSTALLED: &str = "/etc/taustream/settings.toml";
+/// Where it keeps those of several.
+const INSTALLED_DIRECTORY: &str = "/etc/taustream/settings";
 /// The shipped settings that serve when nothing else is named.
 const SHIPPED: &str = "vcan6";
 
@@ -77,7 +79,34 @@ pub(crate) fn settings_path(given: Option<&Path>) -> Result<PathBuf, Failure> {
     if installed.exists() {
         return Ok(installed.to_owned());
     }
-    find(Kind::Settings, Path::new(SHIPPED))
+    match only_file(Path::new(INSTALLED_DIRECTORY))? {
+        Some(only) => Ok(only),
+        None => find(Kind::Settings, Path::new(SHIPPED)),
+    }
+}
+
+/// The only settings file of a directory; none if it has none.
+fn only_file(directory: &Path) -> Result<Option<PathBuf>, Failure> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> =
+        entries.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
+    files.sort_unstable();
+    match files.as_slice() {
+        [] | [_] => Ok(files.pop()),
+        several => {
+            let names: Vec<String> = several
+                .iter()
+                .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+                .collect();
+            let list = names.join(", ");
+            Err(Failure::Usage(format!("this machine has several arms; name one with --settings: {list}")))
+        }
+    }
+}
+
+/// The name of the arm that would be talked to, as far as its settings can be read; nothing is said about faults.
+pub(crate) fn name_at_a_glance(given: Option<&Path>) -> Option<String> {
+    name_alone(&settings_path(given).ok()?)
 }
 
 /// Settings as a whole, for commands that need robot and scene too.
@@ -97,7 +126,15 @@ pub(crate) fn scene(given: &Path) -> Result<Scene, Failure> {
 
 /// A trajectory file that fits a robot: same number of joints, and the same digest where the file has one.
 pub(crate) fn trajectory_for(path: &Path, robot: &Robot) -> Result<TrajectoryFile, Failure> {
-    let file = TrajectoryFile::load(path)?;
+    fitting(path, TrajectoryFile::load(path)?, robot)
+}
+
+/// As [`trajectory_for`], for a file whose text came with the command.
+pub(crate) fn trajectory_from(path: &Path, text: &str, robot: &Robot) -> Result<TrajectoryFile, Failure> {
+    fitting(path, TrajectoryFile::from_json(path, text)?, robot)
+}
+
+fn fitting(path: &Path, file: TrajectoryFile, robot: &Robot) -> Result<TrajectoryFile, Failure> {
     let (got, joints) = (file.trajectory.joints(), robot.joints.len());
     if got != joints {
         return Err(Failure::unfit(

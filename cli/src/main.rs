@@ -7,6 +7,7 @@ mod arm;
 mod demo;
 mod doctor;
 mod failure;
+mod hand_over;
 mod interrupt;
 mod live;
 mod manual;
@@ -31,14 +32,27 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    let form = if cli.json { Form::Json } else { Form::Text };
-    match run(form, &cli) {
+    if !matches!(cli.action, Action::HandedOver) {
+        return finish(&cli, hand_over::to_services(&cli).and_then(|()| perform(&cli)));
+    }
+    match hand_over::taken() {
+        Ok(Ok(taken)) => finish(&taken, perform(&taken)),
+        Ok(Err(error)) => usage(&error),
+        Err(failure) => finish(&cli, Err(failure)),
+    }
+}
+
+/// Turns what became of a command into words and an exit code.
+fn finish(cli: &Cli, outcome: Result<(), Failure>) -> ExitCode {
+    let form = Form::of(cli);
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => report(form, &failure),
     }
 }
 
-fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
+fn perform(cli: &Cli) -> Result<(), Failure> {
+    let form = Form::of(cli);
     let settings = cli.settings.as_deref();
     match &cli.action {
         Action::Plan(args) => offline::plan::run(form, args),
@@ -65,6 +79,9 @@ fn run(form: Form, cli: &Cli) -> Result<(), Failure> {
         Action::Demo(args) => demo::run(form, args),
         Action::Completions { shell } => manual::completions(form, *shell),
         Action::Man(args) => manual::run(form, args),
+        Action::HandedOver => {
+            Err(Failure::Usage("a command that was handed over cannot hand over".to_owned()))
+        }
     }
 }
 

@@ -1,4 +1,5 @@
 //! What commands say: sentences for people, or one JSON object for programs, on stdout.
+use crate::args::Cli;
 use crate::failure::Failure;
 use serde::Serialize;
 use std::fmt::Display;
@@ -16,6 +17,11 @@ pub(crate) enum Form {
 }
 
 impl Form {
+    /// As the command line asks for it.
+    pub(crate) fn of(cli: &Cli) -> Self {
+        if cli.json { Self::Json } else { Self::Text }
+    }
+
     /// Prints an answer on stdout.
     pub(crate) fn print(self, answer: &(impl Serialize + Display)) -> Result<(), Failure> {
         let line = match self {

@@ -104,8 +104,9 @@ fn prefix(arm: &str, uid: u32) -> String {
     format!("taustream.{uid}.{arm}.")
 }
 
-/// Other uids that have segments of an arm of this name, in rising order.
-fn other_users(arm: &str, own: u32) -> Vec<u32> {
+/// The uids that have segments of an arm of this name, in rising order.
+#[must_use]
+pub fn users_of(arm: &str) -> Vec<u32> {
     let suffix = format!(".{arm}.");
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let mut uids: Vec<u32> = entries
@@ -115,7 +116,6 @@ fn other_users(arm: &str, own: u32) -> Vec<u32> {
             let (uid, rest) = rest.split_at(rest.find('.')?);
             rest.starts_with(&suffix).then(|| uid.parse().ok())?
         })
-        .filter(|uid| *uid != own)
         .collect();
     uids.sort_unstable();
     uids.dedup();
@@ -157,11 +157,11 @@ impl Wire {
     /// That nobody serves this arm, naming other users who do.
     #[must_use]
     pub fn not_running(&self, who: &'static str) -> ServiceError {
-        let uids = other_users(&self.arm, self.uid);
-        let others = if uids.is_empty() {
+        let uids = users_of(&self.arm).into_iter().filter(|uid| *uid != self.uid);
+        let list: Vec<String> = uids.map(|uid| uid.to_string()).collect();
+        let others = if list.is_empty() {
             String::new()
         } else {
-            let list: Vec<String> = uids.iter().map(ToString::to_string).collect();
             format!(", but uid {} runs one: use that user's account", list.join(", "))
         };
         ServiceError::NotRunning { who, arm: self.arm.clone(), uid: self.uid, others }

@@ -9,7 +9,7 @@ use clap::Parser;
     name = "taustream-planner",
     version,
     after_help = "Example: taustream-planner --settings config/settings/vcan6.toml\n\n\
-    SIGTERM or SIGINT end it. Log lines go to stderr; RUST_LOG=debug shows more.\n\n\
+    SIGTERM or SIGINT end it. Log lines go to the journal under systemd, else to stderr; RUST_LOG=debug shows more.\n\n\
     Exit status: 0 ended by SIGINT or SIGTERM, 1 not started or failed, 2 bad usage or bad file."
 )]
 pub struct Arguments {

@@ -2,11 +2,11 @@
 use anyhow::{Context, Result};
 use clap::Parser;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use std::io::IsTerminal;
 use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use taustream_arm::daemon::{self, Manager};
 use taustream_arm::{Faults, Kind, Scene, Settings, find};
 use taustream_messages::service::Wire;
 use taustream_planner::arguments::Arguments;
@@ -14,15 +14,7 @@ use taustream_planner::service::Service;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
-    // Colours are for people: a log file gets plain lines.
-    let colours = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(colours)
-        .with_target(false)
-        .init();
+    daemon::start_log();
     let settings = match load(&arguments) {
         Ok(settings) => settings,
         Err(faults) => {
@@ -58,5 +50,6 @@ fn run(settings: &Settings) -> Result<()> {
     writeln!(std::io::stdout(), "taustream-planner ready: arm {name}, {robot}, {obstacles} obstacles")?;
     std::io::stdout().flush()?;
     service.serve();
+    Manager::stopping();
     Ok(())
 }

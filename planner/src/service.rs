@@ -12,6 +12,7 @@ use iceoryx2::prelude::ipc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
+use taustream_arm::daemon::{Manager, Promise};
 use taustream_arm::{Robot, Scene};
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::{PlanServer, ServiceError, Wire};
@@ -27,6 +28,10 @@ const DEADLINE_DEFAULT: Duration = Duration::from_millis(2_000);
 const DEADLINE_MAX: Duration = Duration::from_secs(60);
 /// How long the streamer may take for a receipt.
 const RECEIPT_WITHIN: Duration = Duration::from_secs(2);
+/// A turn without planning takes a wait for a report and one for a receipt at most.
+const TURN_WITHIN: Duration = Duration::from_secs(5);
+/// What verification and sending may take beyond the deadline of a request; a planner that is later hangs.
+const OVERRUN_MAX: Duration = Duration::from_secs(10);
 /// How long the place of a planner that was killed may stay taken in shared memory.
 const TAKE_OVER_WITHIN: Duration = Duration::from_secs(3);
 
@@ -49,6 +54,9 @@ pub enum OpenError {
     /// The ports to the streamer cannot be opened.
     #[error(transparent)]
     Send(#[from] SendError),
+    /// There is no thread to feed the watchdog from.
+    #[error("cannot start a thread: {0}")]
+    Thread(String),
 }
 
 /// The planner of one arm.
@@ -60,6 +68,7 @@ pub struct Service<'a> {
     stop: &'a AtomicBool,
     seen: Seen,
     waiting: Option<Waiting>,
+    promise: Promise,
 }
 
 /// A proven motion that waits for the end of the one that runs.
@@ -88,12 +97,15 @@ impl<'a> Service<'a> {
     ) -> Result<Self, OpenError> {
         let server = take_server(wire)?;
         let outbox = Outbox::open(wire)?;
-        Ok(Self { robot, scene, outbox, server, stop, seen: Seen::default(), waiting: None })
+        let promise = Promise::start(Manager::from_environment(), TURN_WITHIN)
+            .map_err(|e| OpenError::Thread(e.to_string()))?;
+        Ok(Self { robot, scene, outbox, server, stop, seen: Seen::default(), waiting: None, promise })
     }
 
     /// Serves until `stop` is set.
     pub fn serve(&mut self) {
         while !self.stop.load(Ordering::Relaxed) {
+            self.promise.back_within(TURN_WITHIN);
             self.turn();
             thread::sleep(POLL);
         }
@@ -175,6 +187,7 @@ impl<'a> Service<'a> {
         // The arm stands where it stands: after a stop or a sag nobody could move it otherwise.
         let (robot, scene, goal_rad) = (self.robot, self.scene, asked.goal_rad);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
+        self.promise.back_within(options.deadline + OVERRUN_MAX);
         let result = thread::scope(|scope| {
             let worker = thread::Builder::new().name("plan".to_owned());
             let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(self.stop)));

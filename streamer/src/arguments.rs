@@ -12,14 +12,14 @@ use taustream_drivers::link::LinkChoice;
     version,
     after_help = "Example: taustream-streamer --settings config/settings/vcan6.toml\n\n\
     SIGTERM or SIGINT: stop on the path, hold, de-energise, end. A second one: torque off and end.\n\
-    Log lines go to stderr; RUST_LOG=debug shows more.\n\n\
+    Log lines go to the journal under systemd, else to stderr; RUST_LOG=debug shows more.\n\n\
     Exit status: 0 ended with all drives de-energised, 1 not started, failed, or ended before the drives were seen \
     to be de-energised, 2 bad usage or bad file."
 )]
 pub struct Arguments {
     /// Settings of the arm's controller: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
-    pub settings: PathBuf,
+    pub settings: String,
     /// What carries frames.
     #[arg(long, value_enum, default_value_t)]
     pub link: LinkChoice,

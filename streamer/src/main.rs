@@ -3,13 +3,14 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread;
-use taustream_arm::Settings;
+use taustream_arm::daemon::{self, Manager};
+use taustream_arm::{Kind, Settings, find};
 use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
@@ -24,14 +25,8 @@ use tracing::warn;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false)
-        .init();
-    let settings = match Settings::load(&arguments.settings) {
+    daemon::start_log();
+    let settings = match find(Kind::Settings, &arguments.settings).and_then(|file| Settings::load(&file)) {
         Ok(settings) => settings,
         Err(faults) => {
             tracing::error!("settings:\n{faults}");
@@ -135,6 +130,7 @@ fn forward_signals(leaver: Leaver) -> Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let work = move || {
         for (count, _) in signals.forever().enumerate() {
+            Manager::stopping();
             leaver.ask(if count == 0 { Leave::Orderly } else { Leave::AtOnce });
         }
     };

@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
+use taustream_arm::daemon::Manager;
 use taustream_arm::{RuntimeError, Settings, TrajectoryFile, runtime};
 use taustream_drivers::Nanos;
 use taustream_messages::service::{
@@ -48,6 +49,7 @@ pub struct Service {
     desk: Desk,
     readers: Readers,
     names: Names,
+    arm: String,
     robot: String,
     digest_hex: String,
     checker: Checker,
@@ -66,6 +68,8 @@ pub struct Service {
     newest_generation: u64,
     accepted: u64,
     rejected: u64,
+    manager: Manager,
+    told: Option<Phase>,
 }
 
 /// Why the service thread cannot serve.
@@ -102,6 +106,7 @@ impl Service {
             desk,
             readers,
             names: Names::of(settings),
+            arm: settings.name.clone(),
             robot: settings.robot.name.clone(),
             digest_hex: settings.robot.digest_hex(),
             checker: Checker::start(&settings.robot).map_err(|e| StartError::System(e.to_string()))?,
@@ -120,6 +125,8 @@ impl Service {
             newest_generation: 0,
             accepted: 0,
             rejected: 0,
+            manager: Manager::from_environment(),
+            told: None,
         })
     }
 
@@ -134,9 +141,10 @@ impl Service {
             self.return_answers();
             self.return_checked();
             self.return_verdicts();
-            self.take_timings();
+            let cycles = self.take_timings();
             self.publish_reports();
             self.write_notes();
+            self.tell_manager(cycles);
             if last {
                 return;
             }
@@ -302,13 +310,29 @@ impl Service {
         }
     }
 
-    fn take_timings(&mut self) {
+    /// Returns how many cycles have run since the last call.
+    fn take_timings(&mut self) -> usize {
+        let mut cycles = 0;
         while let Some(timing) = self.readers.timings.pop() {
             self.lateness.saturating_record(timing.lateness_ns);
             self.lateness_window.saturating_record(timing.lateness_ns);
             if timing.cycle_ns > 0 {
                 self.cycle.saturating_record(timing.cycle_ns);
             }
+            cycles += 1;
+        }
+        cycles
+    }
+
+    /// Readiness and the watchdog hang on cycles that have run: this thread's own life says nothing about the arm.
+    fn tell_manager(&mut self, cycles: usize) {
+        if cycles == 0 {
+            return;
+        }
+        self.manager.progress();
+        if self.told != Some(self.phase) {
+            self.told = Some(self.phase);
+            self.manager.status(&format!("arm {}: {}", self.arm, self.phase.word()));
         }
     }
 

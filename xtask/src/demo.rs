@@ -3,15 +3,12 @@ use crate::packages::{self, MACHINE};
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::env;
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-/// Packages of the workspace whose programs the demo starts.
-const PROGRAMS: [&str; 4] = ["taustream-cli", "taustream-drivers", "taustream-streamer", "taustream-planner"];
 /// What the machine takes to boot and to end, beyond the demo itself.
 const MACHINE_S: u32 = 60;
 
@@ -43,7 +40,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.vm {
         packages::ensure(&MACHINE)?;
     }
-    let programs = build(&root, arguments.vm)?;
+    let machine = arguments.vm.then_some("taustream-tests");
+    let programs = workspace::build_release(&root, machine)?;
     let output = root.join(&arguments.output);
     fs::create_dir_all(&output).with_context(|| format!("{} cannot be made", output.display()))?;
 
@@ -71,21 +69,4 @@ fn hand_over(root: &Path, words: &[OsString]) -> Result<ExitCode> {
     let Some((program, rest)) = words.split_first() else { bail!("no program to run") };
     let error = Command::new(program).args(rest).current_dir(root).exec();
     Err(error).with_context(|| format!("{} cannot be started", program.display()))
-}
-
-/// Builds the programs in release; where they are.
-fn build(root: &Path, with_machine: bool) -> Result<PathBuf> {
-    println!("building (the first time takes a few minutes) ..");
-    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--locked", "--bins"]).current_dir(root);
-    let machine = with_machine.then_some("taustream-tests");
-    for package in PROGRAMS.into_iter().chain(machine) {
-        command.args(["--package", package]);
-    }
-    let status = command.status().context("cargo cannot be started")?;
-    if !status.success() {
-        bail!("the build ended with {status}; its messages are above");
-    }
-    Ok(workspace::target(root).join("release"))
 }

@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask demo`, `cargo xtask man` and `cargo xtask test`.
+//! The project's chores: `cargo xtask demo`, `install`, `uninstall`, `man` and `test`.
 //!
 //! Each task installs what it needs on a fresh Debian machine, says so before it does, and ends with a verdict.
 mod demo;
+mod install;
 mod manual;
 mod packages;
 mod test;
@@ -28,6 +29,10 @@ enum Task {
     Man(manual::Arguments),
     /// Check everything: format, lints, tests, documentation, and the scenarios on a real vcan0.
     Test,
+    /// Install programs, units, rules and shipped configuration below a root directory, as a package would.
+    Install(install::Arguments),
+    /// Remove what `install` has installed; settings of this machine in /etc/taustream stay.
+    Uninstall(install::RootArguments),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +40,8 @@ fn main() -> ExitCode {
         Task::Demo(arguments) => ("DEMO FAILED", demo::run(&arguments)),
         Task::Man(arguments) => ("MAN FAILED", manual::run(&arguments)),
         Task::Test => ("TEST FAILED", test::run()),
+        Task::Install(arguments) => ("NOT INSTALLED", install::run(&arguments)),
+        Task::Uninstall(arguments) => ("NOT UNINSTALLED", install::undo(&arguments)),
     };
     match outcome {
         Ok(code) => code,

@@ -53,6 +53,21 @@ pub(crate) fn install(taustream: &Path, share: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Removes what [`install`] has written; how many files.
+pub(crate) fn remove(share: &Path) -> Result<usize> {
+    let pages = fs::read_dir(share.join("man/man1")).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_ours = |path: &PathBuf| {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        name == "taustream.1" || (name.starts_with("taustream-") && name.ends_with(".1"))
+    };
+    let completions = COMPLETIONS.iter().map(|(_, file)| share.join(file)).filter(|path| path.exists());
+    let files: Vec<PathBuf> = pages.filter(is_ours).chain(completions).collect();
+    for file in &files {
+        fs::remove_file(file).with_context(|| format!("{} cannot be removed", file.display()))?;
+    }
+    Ok(files.len())
+}
+
 /// What a run prints; an error with its words when it fails.
 fn output(program: &Path, words: &[&std::ffi::OsStr]) -> Result<Vec<u8>> {
     let ran = Command::new(program).args(words).output();

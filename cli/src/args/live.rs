@@ -88,6 +88,9 @@ pub(crate) struct RunArgs {
     /// Return only when the motion has ended.
     #[arg(long)]
     pub(crate) wait: bool,
+    /// The file's text, when whoever handed the command over has read it.
+    #[arg(skip)]
+    pub(crate) text: Option<String>,
 }
 
 const WATCH_HELP: &str = "\

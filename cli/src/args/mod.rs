@@ -53,8 +53,9 @@ pub(crate) struct Cli {
 
     /// Settings of the arm to talk to: a path, or the name of shipped settings.
     ///
-    /// Without it: `$TAUSTREAM_SETTINGS`, else /etc/taustream/settings.toml if that exists, else the shipped
-    /// `vcan6`. `plan`, `sample`, `plot`, `cost`, `verify` and `check` do not use it.
+    /// Without it: `$TAUSTREAM_SETTINGS`, else /etc/taustream/settings.toml if that exists, else the only file in
+    /// /etc/taustream/settings, else the shipped `vcan6`. `plan`, `sample`, `plot`, `cost`, `verify` and `check` do not
+    /// use it.
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) settings: Option<PathBuf>,
 
@@ -115,6 +116,9 @@ pub(crate) enum Action {
     },
     /// Write the manual pages of all programs into a directory, or print that of taustream.
     Man(ManArgs),
+    /// What sudo starts as the services' user: carries out the command that stands on its standard input.
+    #[command(hide = true)]
+    HandedOver,
 }
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ impl fmt::Display for Answer {
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result<(), Failure> {
     let settings = arm::settings(settings)?;
     let arm = ArmName::of(&settings);
-    let file = load(&args.trajectory, &settings)?;
+    let file = load(args, &settings)?;
     let proof = verify(&settings.robot, &settings.scene, &file.trajectory).map_err(|v| {
         Failure::Refused(format!("{}: not safe, nothing was sent: {v}", args.trajectory.display()))
     })?;
@@ -95,8 +95,12 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
 }
 
 /// A trajectory file that says which robot it was made for; offline use may leave that out, metal may not.
-fn load(path: &Path, settings: &Settings) -> Result<TrajectoryFile, Failure> {
-    let file = arm::trajectory_for(path, &settings.robot)?;
+fn load(args: &RunArgs, settings: &Settings) -> Result<TrajectoryFile, Failure> {
+    let path = &args.trajectory;
+    let file = match &args.text {
+        Some(text) => arm::trajectory_from(path, text, &settings.robot)?,
+        None => arm::trajectory_for(path, &settings.robot)?,
+    };
     if file.digest.is_none() {
         let why = "has no `digest`, so nobody knows which robot it was made for; `taustream plan` writes one";
         return Err(Failure::unfit(path, why));

@@ -3,10 +3,11 @@
 
 use anyhow::Context;
 use clap::Parser;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use taustream_arm::daemon::{self, Manager};
 use taustream_arm::{Kind, Settings, runtime};
 use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
@@ -16,13 +17,7 @@ use taustream_drivers::sim::{FaultOrder, Rig, WiredRig, priority};
 use taustream_drivers::{Nanos, link};
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into()),
-        )
-        .init();
+    daemon::start_log();
     let args = Arguments::parse();
     let rig = match prepare(&args) {
         Ok(prepared) => prepared,
@@ -95,6 +90,7 @@ fn run(args: &Arguments, (settings, rig): (Settings, WiredRig)) -> anyhow::Resul
     let mut stdout = std::io::stdout();
     writeln!(stdout, "taustream-servosim ready: {} drives on {}", settings.servos.len(), on.join(", "))?;
     stdout.flush()?;
+    Manager::from_environment().progress();
     let served = serve(links, rig, Some(&mut StandardInput::default()), &stop)?;
     tracing::info!("heard {} frames, sent {}, lost {}", served.heard, served.sent, served.lost);
     Ok(())
