@@ -12,6 +12,7 @@ use clap::Parser;
 use rustix::fs::{MemfdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 use std::env;
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{Read, Seek, Write, stdin};
 use std::os::unix::process::CommandExt;
@@ -61,7 +62,7 @@ pub(crate) fn to_services(cli: &Cli) -> Result<(), Failure> {
         // Services of one's own, in a session of one's own, come first.
         return Ok(());
     }
-    let order = order(cli, env::args_os().skip(1).map(|word| word.into_string()))?;
+    let order = order(cli, env::args_os().skip(1).map(OsString::into_string))?;
     may_hand_over()?;
     let mut sudo = sudo();
     sudo.args(["--", OURSELVES, COMMAND]).stdin(paper(&order)?);
@@ -69,10 +70,7 @@ pub(crate) fn to_services(cli: &Cli) -> Result<(), Failure> {
 }
 
 /// The order of the caller's command line.
-fn order(
-    cli: &Cli,
-    words: impl Iterator<Item = Result<String, std::ffi::OsString>>,
-) -> Result<Order, Failure> {
+fn order(cli: &Cli, words: impl Iterator<Item = Result<String, OsString>>) -> Result<Order, Failure> {
     let words: Result<Vec<String>, _> = words.collect();
     let mut words = words.map_err(|word| {
         Failure::Usage(format!("{} is not UTF-8 and cannot be handed to the services", word.display()))
@@ -82,10 +80,8 @@ fn order(
     {
         words.extend(["--settings".to_owned(), named]);
     }
-    let trajectory = match &cli.action {
-        Action::Run(args) => Some(read_text(&args.trajectory)?),
-        _others => None,
-    };
+    let trajectory =
+        if let Action::Run(args) = &cli.action { Some(read_text(&args.trajectory)?) } else { None };
     Ok(Order { version: VERSION, words, trajectory })
 }
 
@@ -215,6 +211,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Bench(_)
         | Action::Demo(_)
         | Action::Completions { .. }
+        | Action::Man(_)
         | Action::HandedOver => false,
     }
 }

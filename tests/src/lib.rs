@@ -3,13 +3,19 @@
 //! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`stage`] starts the real processes
 //! for one of the [`scenarios`] and [`bus_scenarios`]. [`candump`] reads what an independent recorder saw on the bus, [`cycle_log`] what the
 //! streamer claims, and [`setpoints`] judges the one by the other.
+//!
+//! [`booted`] boots a whole Debian ([`debian`]) with systemd in that machine, and [`services`] tries the installed services
+//! there.
 #![forbid(unsafe_code)]
 
 pub mod bus_scenarios;
+pub mod booted;
 pub mod candump;
 pub mod cycle_log;
+pub mod debian;
 pub mod machine;
 pub mod scenarios;
 mod scratch;
+pub mod services;
 pub mod setpoints;
 pub mod stage;

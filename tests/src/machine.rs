@@ -175,12 +175,25 @@ impl Machine {
         }
         let scratch = Scratch::new().map_err(host("make its scratch directory"))?;
         self.prepare(&scratch, command)?;
+        let words = [format!("machine_interfaces={}", self.interfaces).into()];
+        self.boot(&scratch, &words, stop, (stdout, stderr))
+    }
+
+    /// Boots what lies in the scratch directory, with further words for the kernel, until its status is there.
+    pub(crate) fn boot(
+        &self,
+        scratch: &Scratch,
+        words: &[OsString],
+        stop: &AtomicBool,
+        (stdout, stderr): (impl Write + Send + 'static, impl Write + Send + 'static),
+    ) -> Result<u8, MachineError> {
         let (out_reader, out_writer) = pipe().map_err(host("make a pipe"))?;
         let (err_reader, err_writer) = pipe().map_err(host("make a pipe"))?;
         let log = File::create(scratch.path().join("log")).map_err(host("make its log"))?;
         // The guest's consoles travel as stdin and stdout of the launching shell: see `launcher`.
-        let mut guest =
-            Guest::start(self.launcher(scratch.path()).stdin(out_writer).stdout(err_writer).stderr(log))?;
+        let mut guest = Guest::start(
+            self.launcher(scratch.path())?.args(words).stdin(out_writer).stdout(err_writer).stderr(log),
+        )?;
         let unheard = Arc::new(AtomicBool::new(false));
         let copies = [copy(out_reader, stdout, &unheard), copy(err_reader, stderr, &unheard)];
         let limit = BOOT_AND_HALT + Duration::from_secs(self.limit_s.into());
@@ -192,7 +205,7 @@ impl Machine {
             let _ended = copy.join();
         }
         if in_time? {
-            read_status(&scratch, status.map_err(host("wait for linux.uml"))?)
+            read_status(scratch, status.map_err(host("wait for linux.uml"))?)
         } else {
             Ok(TIMED_OUT)
         }
@@ -200,11 +213,6 @@ impl Machine {
 
     /// Writes what the guest reads.
     fn prepare(&self, scratch: &Scratch, command: &[OsString]) -> Result<(), MachineError> {
-        let path = scratch.path();
-        if path.as_os_str().as_bytes().iter().any(u8::is_ascii_whitespace) {
-            let why = "it is named on a kernel's command line, so it must have no blank; set TMPDIR".into();
-            return Err(MachineError::BadPath { path: path.into(), why });
-        }
         let mut writable = Vec::new();
         for directory in &self.writable {
             writable.extend(shareable(directory)?);
@@ -220,11 +228,15 @@ impl Machine {
     }
 
     /// The process that becomes the guest's kernel.
-    fn launcher(&self, scratch: &Path) -> Command {
+    fn launcher(&self, scratch: &Path) -> Result<Command, MachineError> {
         // The kernel takes consoles by descriptor number, and descriptors 0 to 2 are the only ones that a child gets
         // without a race; so a shell moves them to 5 and 6, and gives the kernel's own words to the log.
         // umask 0: files that the guest makes get its umask, not both.
         const MOVE: &str = "umask 0; exec 5>&0 6>&1 </dev/null 1>&2; exec \"$@\"";
+        if scratch.as_os_str().as_bytes().iter().any(u8::is_ascii_whitespace) {
+            let why = "it is named on a kernel's command line, so it must have no blank; set TMPDIR".into();
+            return Err(MachineError::BadPath { path: scratch.into(), why });
+        }
         let mut command = Command::new("/bin/sh");
         command.args(["-c", MOVE, "vcan-machine"]).process_group(0).env_clear();
         // No TMPDIR: the guest's memory belongs into /dev/shm. HOME: where it would keep its sockets.
@@ -246,13 +258,12 @@ impl Machine {
         command.args(["loglevel=4", "umid=guest", "con=null", "ssl=null", "con0=null,fd:2"]);
         command.args(["con1=null,fd:5", "con2=null,fd:6"]);
         command.arg(format!("mem={}M", self.memory_mib));
-        command.arg(format!("machine_interfaces={}", self.interfaces));
         for (key, file) in [("uml_dir", ""), ("machine_dir", ""), ("init", "init.sh")] {
             let mut word = OsString::from(format!("{key}="));
             word.push(if file.is_empty() { scratch.to_path_buf() } else { scratch.join(file) });
             command.arg(word);
         }
-        command
+        Ok(command)
     }
 }
 

@@ -55,7 +55,8 @@ pub(crate) fn install(taustream: &Path, share: &Path) -> Result<()> {
 
 /// Removes what [`install`] has written; how many files.
 pub(crate) fn remove(share: &Path) -> Result<usize> {
-    let pages = fs::read_dir(share.join("man/man1")).into_iter().flatten().flatten().map(|entry| entry.path());
+    let pages =
+        fs::read_dir(share.join("man/man1")).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_ours = |path: &PathBuf| {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         name == "taustream.1" || (name.starts_with("taustream-") && name.ends_with(".1"))

@@ -1,0 +1,124 @@
+//! What systemd thinks of the units, what the kernel enforces, and which threads are real-time.
+use super::guest::{done, number, run};
+use super::{PLANNER, SERVOSIM, STREAMER, stall};
+use anyhow::{Context, Result, ensure};
+use std::fs;
+
+/// The most exposure, of 10, that `systemd-analyze security` may see.
+pub const EXPOSURE_MAX: f64 = 1.5;
+
+/// Everything that a probe may find allowed in the streamer's sandbox; whatever else it finds is a hole.
+const STREAMER_MAY: [&str; 8] = [
+    "lock-memory",
+    "realtime",
+    "socket-can",
+    "socket-netlink",
+    "socket-unix",
+    "write-runtime",
+    "write-shm",
+    "write-tmp",
+];
+/// The same for the planner's.
+const PLANNER_MAY: [&str; 4] = ["socket-unix", "write-runtime", "write-shm", "write-tmp"];
+/// Lines that the probe prints.
+const PROBES: usize = 28;
+
+/// `systemd-analyze verify` has nothing to say.
+///
+/// # Errors
+/// What it says.
+pub fn verified() -> Result<String> {
+    let units = [STREAMER, PLANNER, SERVOSIM, "taustream@arm1.target"];
+    let answer = run(&[&["systemd-analyze", "verify", "--man=no"][..], &units].concat())?;
+    let words = format!("{}{}", answer.out, answer.err);
+    ensure!(answer.status == Some(0) && words.trim().is_empty(), "{:?}: {words}", answer.status);
+    let complaints =
+        done(&["journalctl", "--boot", "--no-pager", "--priority=warning", "--unit=systemd-networkd"])?;
+    ensure!(!complaints.contains("taustream"), "networkd complains of our files: {complaints}");
+    Ok(format!("{} units", units.len()))
+}
+
+/// The exposure of every service is small.
+///
+/// # Errors
+/// When one is too exposed.
+pub fn exposures() -> Result<String> {
+    let mut all = Vec::new();
+    for unit in [STREAMER, PLANNER, SERVOSIM] {
+        let exposure = exposure(unit)?;
+        ensure!(exposure <= EXPOSURE_MAX, "{unit}: exposure {exposure}, more than {EXPOSURE_MAX}");
+        all.push(format!("{unit} {exposure}"));
+    }
+    Ok(all.join(", "))
+}
+
+/// The overall exposure of a unit, from the last line of the report.
+///
+/// # Errors
+/// When there is no such line.
+pub fn exposure(unit: &str) -> Result<f64> {
+    let text = done(&["systemd-analyze", "security", "--no-pager", unit])?;
+    fs::write(format!("/machine/output/security-{unit}.txt"), &text)?;
+    let line = text.lines().rev().find(|line| line.contains("Overall exposure level"));
+    let line = line.with_context(|| format!("no overall exposure in {text}"))?;
+    let value = line.rsplit(": ").next().and_then(|rest| rest.split_whitespace().next());
+    value.and_then(|word| word.parse().ok()).with_context(|| format!("no number in {line:?}"))
+}
+
+/// The sandboxes hold, tried from inside.
+///
+/// # Errors
+/// Every hole, and every right that is missing.
+pub fn enforced() -> Result<String> {
+    let streamer = probe("taustream-streamer@probe.service", &STREAMER_MAY)?;
+    let planner = probe("taustream-planner@probe.service", &PLANNER_MAY)?;
+    Ok(format!("{streamer} and {planner} probes"))
+}
+
+/// Starts the probe in a service's sandbox and compares what it may with what it should.
+///
+/// # Errors
+/// Every difference.
+pub fn probe(unit: &str, may: &[&str]) -> Result<usize> {
+    done(&["systemctl", "start", unit])?;
+    let entries = super::guest::journal(unit)?;
+    let starts =
+        entries.iter().rposition(|e| e["MESSAGE"].as_str().is_some_and(|m| m.starts_with("Starting")));
+    let lines = entries.iter().skip(starts.unwrap_or(0)).filter_map(|entry| entry["MESSAGE"].as_str());
+    let results: Vec<(&str, bool)> = lines
+        .filter_map(|line| {
+            let (name, word) = line.split_once(' ')?;
+            matches!(word, "yes" | "no").then_some((name, word == "yes"))
+        })
+        .collect();
+    ensure!(results.len() == PROBES, "{unit}: {} of {PROBES} probes: {results:?}", results.len());
+    let wrong: Vec<String> = results
+        .iter()
+        .filter(|(name, yes)| may.contains(name) != *yes)
+        .map(|(name, yes)| format!("{name} is {}", if *yes { "allowed" } else { "refused" }))
+        .collect();
+    ensure!(wrong.is_empty(), "{unit}: {}", wrong.join(", "));
+    Ok(results.len())
+}
+
+/// The thread of the cycle is `SCHED_FIFO` with the priority of the settings, and no other is; memory is locked.
+///
+/// # Errors
+/// Which thread is not.
+pub fn real_time() -> Result<String> {
+    let process = number(STREAMER, "MainPID")?;
+    let mut all = Vec::new();
+    for (thread, name) in stall::threads(process)? {
+        let said = done(&["chrt", "-p", &thread.to_string()])?;
+        let is_fifo = said.contains("SCHED_FIFO");
+        ensure!(is_fifo == (name == "cycle"), "thread {name}: {said}");
+        ensure!(!is_fifo || said.contains("priority: 80"), "thread {name}: {said}");
+        all.push(name);
+    }
+    ensure!(all.iter().any(|name| name == "cycle"), "no thread is called cycle: {all:?}");
+    let facts = fs::read_to_string(format!("/proc/{process}/status"))?;
+    let locked =
+        facts.lines().find_map(|line| line.strip_prefix("VmLck:")).map(str::trim).unwrap_or_default();
+    ensure!(!locked.is_empty() && !locked.starts_with("0 "), "no memory is locked: {locked:?}");
+    Ok(format!("{} threads, {locked} locked", all.len()))
+}
