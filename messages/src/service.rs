@@ -12,6 +12,7 @@ use iceoryx2::prelude::{
     set_log_level_from_env_or,
 };
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 /// Sends trajectories.
@@ -104,15 +105,22 @@ fn prefix(arm: &str, uid: u32) -> String {
     format!("taustream.{uid}.{arm}.")
 }
 
+/// Where segments are, whatever the root path.
+const SEGMENTS: &str = "/dev/shm";
+/// End of the name of the segment in which iceoryx2 counts nodes. It stays when everybody has gone, so it says nothing
+/// about who is there.
+const NODE_COUNTER: &str = ".global_mgmt";
+
 /// The uids that have segments of an arm of this name, in rising order.
 #[must_use]
 pub fn users_of(arm: &str) -> Vec<u32> {
     let suffix = format!(".{arm}.");
-    let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
     let mut uids: Vec<u32> = entries
         .filter_map(|e| {
             let name = e.file_name();
-            let rest = name.to_str()?.strip_prefix("taustream.")?;
+            let rest =
+                name.to_str()?.strip_prefix("taustream.").filter(|name| !name.ends_with(NODE_COUNTER))?;
             let (uid, rest) = rest.split_at(rest.find('.')?);
             rest.starts_with(&suffix).then(|| uid.parse().ok())?
         })
@@ -120,6 +128,18 @@ pub fn users_of(arm: &str) -> Vec<u32> {
     uids.sort_unstable();
     uids.dedup();
     uids
+}
+
+/// iceoryx2 makes the node counter writable for everybody, whatever the umask. A stranger who cuts it short would end every
+/// process that starts later, so it is taken back at once.
+fn close_node_counter(prefix: &str) {
+    for entry in fs::read_dir(SEGMENTS).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| name.starts_with(prefix) && name.ends_with(NODE_COUNTER)) {
+            // A failure is no reason not to serve: the file may be gone again.
+            let _as_it_is = fs::set_permissions(entry.path(), fs::Permissions::from_mode(0o600));
+        }
+    }
 }
 
 impl Wire {
@@ -145,6 +165,7 @@ impl Wire {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|e| refused(format!("{e:?}")))?;
+        close_node_counter(&prefix(arm, uid));
         Ok(Self { arm: arm.to_owned(), uid, node })
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The image stays as it is: everything that is installed or written lies in memory above it and is gone afterwards,
 //! except for the output directory.
-use crate::machine::{Machine, MachineError};
+use crate::machine::Machine;
 use crate::scratch::{Scratch, quoted};
 use anyhow::{Context, Result, ensure};
 use std::ffi::{OsStr, OsString};
@@ -68,15 +68,12 @@ impl Booted<'_> {
         scratch.write("init.sh", INIT.as_bytes())?;
         scratch.write("driver.sh", DRIVER.as_bytes())?;
         scratch.write("command.sh", &script)?;
-        let mut words: Vec<OsString> =
-            ["systemd.show_status=0", "systemd.log_level=info"]
-                .map(Into::into)
-                .to_vec();
+        let mut words: Vec<OsString> = vec!["systemd.show_status=0".into()];
         words.push(word("ubd0r=", self.image)?);
         words.push(word("machine_out=", self.output)?);
         let machine = Machine::new().limit_s(self.limit_s).realtime(self.realtime);
         let status = machine.boot(&scratch, &words, stop, (std::io::stdout(), std::io::stderr()));
-        Ok(status.map_err(|error: MachineError| error)?)
+        Ok(status?)
     }
 }
 

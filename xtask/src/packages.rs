@@ -12,6 +12,9 @@ pub(crate) const PEERS: [&str; 2] = ["python3", "python3-venv"];
 /// What formats the manual pages, so that a test sees whether they can be.
 pub(crate) const MANUAL: [&str; 1] = ["groff-base"];
 
+/// What a Debian root for the machine is made with.
+pub(crate) const SERVICES: [&str; 2] = ["mmdebstrap", "squashfs-tools-ng"];
+
 /// Makes sure that all packages are there. What is missing is installed, as root or with sudo, after saying so.
 pub(crate) fn ensure(packages: &[&str]) -> Result<()> {
     let missing: Vec<&str> = packages.iter().copied().filter(|p| !is_installed(p)).collect();

@@ -1,6 +1,6 @@
 //! `cargo xtask test`: everything that must hold before a change lands, in one command.
-use crate::packages::{self, MACHINE, MANUAL, PEERS};
-use crate::workspace;
+use crate::packages::{self, MACHINE, MANUAL, PEERS, SERVICES};
+use crate::{install, workspace};
 use anyhow::{Context, Result, bail};
 use std::env;
 use std::path::{Path, PathBuf};
@@ -29,6 +29,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     packages::ensure(&MACHINE)?;
     packages::ensure(&PEERS)?;
     packages::ensure(&MANUAL)?;
+    packages::ensure(&SERVICES)?;
     for (what, words) in STEPS {
         perform(what, cargo(&root).args(words))?;
     }
@@ -40,6 +41,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     independent_master_on_vcan(&root, &programs, &python)?;
     independent_devices_on_vcan(&root, &programs, &python)?;
     scenarios_on_vcan(&root, &programs)?;
+    services_under_systemd(&root, &programs)?;
     figures_on_vcan(&root, &programs)?;
     let skipped = if problems.join("ur5_spherized.urdf").is_file() {
         "nothing was skipped".to_owned()
@@ -175,6 +177,19 @@ fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     let mut command = Command::new(program);
     command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).current_dir(root);
     perform("scenarios on a real vcan0", &mut command)
+}
+
+/// What `cargo xtask install` installs, booted with a Debian whose process 1 is systemd, and tried there.
+fn services_under_systemd(root: &Path, programs: &Path) -> Result<()> {
+    let place = workspace::target(root).join("services");
+    let stage = place.join("stage");
+    // Made anew: a file that is installed no more must not be found.
+    let _not_there = std::fs::remove_dir_all(&stage);
+    install::stage(root, programs, &stage)?;
+    let mut command = Command::new(programs.join("services"));
+    command.arg("boot").arg("--stage").arg(&stage).arg("--cache").arg(place.join("cache"));
+    command.arg("--output").arg(place.join("output")).args(["--realtime", MACHINE_PRIORITY]);
+    perform("services under a real systemd", &mut command)
 }
 
 /// The cycle beside bare loops, for the record: figures of a shared machine are printed, not judged.

@@ -5,8 +5,6 @@ use nix::sys::wait::{WaitPidFlag, waitpid};
 use nix::unistd::Pid;
 use std::fs;
 use std::io::Write;
-use std::thread::sleep;
-use std::time::Duration;
 
 /// The threads of a process that have a name, by number.
 ///
@@ -36,8 +34,7 @@ pub fn hold(process: u64, name: &str) -> Result<()> {
     waitpid(thread, Some(WaitPidFlag::__WALL)).context("wait for the stop")?;
     writeln!(std::io::stdout(), "stalled")?;
     std::io::stdout().flush()?;
-    while fs::exists(format!("/proc/{process}/task/{thread}"))? {
-        sleep(Duration::from_millis(100));
-    }
+    // Its end has to be taken note of: until then a process that was killed is not gone.
+    waitpid(thread, Some(WaitPidFlag::__WALL)).context("wait for the end")?;
     Ok(())
 }
