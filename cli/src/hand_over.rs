@@ -202,12 +202,14 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Stop(_)
         | Action::TorqueOff(_)
         | Action::ClearFault(_)
-        | Action::Status => true,
+        | Action::Status
+        | Action::Watch(_) => true,
         Action::Plan(_)
         | Action::Sample(_)
         | Action::Cost(_)
         | Action::Verify(_)
         | Action::Check(_)
+        | Action::Doctor(_)
         | Action::Bench(_)
         | Action::Demo(_)
         | Action::Completions { .. }

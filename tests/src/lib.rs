@@ -8,8 +8,8 @@
 //! there.
 #![forbid(unsafe_code)]
 
-pub mod bus_scenarios;
 pub mod booted;
+pub mod bus_scenarios;
 pub mod candump;
 pub mod cycle_log;
 pub mod debian;
