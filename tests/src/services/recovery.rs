@@ -49,6 +49,7 @@ pub fn planner_killed() -> Result<String> {
 /// # Errors
 /// When it does not.
 pub fn planner_hung() -> Result<String> {
+    wait(&format!("{PLANNER} is ready"), PATIENCE, || Ok(show(PLANNER, "ActiveState")? == "active"))?;
     let restarts = number(PLANNER, "NRestarts")?;
     done(&["systemctl", "kill", "--signal=STOP", PLANNER])?;
     wait_restarted(PLANNER, restarts, PATIENCE)?;
@@ -105,13 +106,16 @@ fn watchdog_told(unit: &str) -> Result<()> {
     Ok(())
 }
 
+/// A word for it, the command that loses the link, and those that bring it back.
+type Loss = (&'static str, &'static [&'static str], &'static [&'static [&'static str]]);
+
 /// The interface goes down and up, then vanishes and comes back: a fault each time, and recovery on command.
 ///
 /// # Errors
 /// What did not happen.
 pub fn link_lost() -> Result<String> {
     let mut told = Vec::new();
-    let losses: [(&str, &[&str], &[&[&str]]); 2] = [
+    let losses: [Loss; 2] = [
         ("down", &["ip", "link", "set", "vcan0", "down"], &[&["ip", "link", "set", "vcan0", "up"]]),
         (
             "deleted",
