@@ -206,6 +206,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Watch(_) => true,
         Action::Plan(_)
         | Action::Sample(_)
+        | Action::Plot(_)
         | Action::Cost(_)
         | Action::Verify(_)
         | Action::Check(_)
