@@ -111,14 +111,23 @@ fn with_service(name: &str, played: &Played, test: impl FnOnce(&str, &Robot)) {
 }
 
 fn with_service_in(scene: &Scene, name: &str, played: &Played, test: impl FnOnce(&str, &Robot)) {
-    let robot = ur5();
+    with_service_of(&ur5(), scene, name, played, test);
+}
+
+fn with_service_of(
+    robot: &Robot,
+    scene: &Scene,
+    name: &str,
+    played: &Played,
+    test: impl FnOnce(&str, &Robot),
+) {
     let arm = format!("test-{name}-{}", std::process::id());
     let (stop, ready) = (AtomicBool::new(false), AtomicBool::new(false));
     thread::scope(|s| {
-        s.spawn(|| played.play(&arm, &robot));
+        s.spawn(|| played.play(&arm, robot));
         s.spawn(|| {
             let wire = join(&arm, "planner");
-            let mut service = Service::open(&wire, &robot, scene, &stop).expect("opens");
+            let mut service = Service::open(&wire, robot, scene, &stop).expect("opens");
             ready.store(true, Ordering::SeqCst);
             service.serve();
         });
@@ -129,7 +138,7 @@ fn with_service_in(scene: &Scene, name: &str, played: &Played, test: impl FnOnce
                 assert!(since.elapsed() < Duration::from_secs(20), "the service did not open");
                 thread::sleep(Duration::from_millis(5));
             }
-            test(&arm, &robot);
+            test(&arm, robot);
         }));
         stop.store(true, Ordering::SeqCst);
         played.end.store(true, Ordering::SeqCst);
@@ -195,6 +204,17 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
 }
 
 /// The operator's way on after a stop: the arm stands nearer to a ball than the margin, and is led away from it.
+#[test]
+fn service_replan_of_an_arm_from_a_urdf_is_planned_under_its_digest_and_sent() {
+    let robot = Robot::load(&common::config("../tests/robots/ur5_balls.toml")).expect("a robot for tests");
+    let played = Played::new(Phase::Holding);
+    with_service_of(&robot, &scene("open"), "urdf", &played, |arm, _| {
+        let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
+        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 1);
+}
+
 #[test]
 fn service_replan_from_inside_the_margin_is_planned_and_says_so() {
     let played = Played::new(Phase::Holding);
