@@ -40,6 +40,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     let python = python_with_peers(&root)?;
     independent_master_on_vcan(&root, &programs, &python)?;
     independent_devices_on_vcan(&root, &programs, &python)?;
+    independent_damiao_master_on_vcan(&root, &programs, &python)?;
     scenarios_on_vcan(&root, &programs)?;
     services_under_systemd(&root, &programs)?;
     figures_on_vcan(&root, &programs)?;
@@ -168,6 +169,25 @@ fn independent_kinematics(root: &Path, programs: &Path, problems: &Path) -> Resu
     let mut command = Command::new(python);
     command.arg(peers.join("kinematics.py")).arg(programs.join("frames")).arg(root).arg(problems);
     perform("forward kinematics against an independent library", command.current_dir(root))
+}
+
+/// Somebody else's master of Damiao motors, installed with the one above: its frames, then its motors.
+fn independent_damiao_master_on_vcan(root: &Path, programs: &Path, python: &Path) -> Result<()> {
+    let (target, peers) = (workspace::target(root), root.join("tests/peers"));
+    let mut frames = Command::new(python);
+    frames.arg(peers.join("damiao_frames.py")).arg("--check");
+    frames.arg(root.join("drivers/tests/damiao_suite/frames.csv"));
+    perform("frames of Damiao motors by an independent library", &mut frames)?;
+    let words = machine(programs, &target.join("peers"))?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command
+        .args(rest)
+        .arg(python)
+        .arg(peers.join("damiao_master.py"))
+        .arg(programs.join("taustream-servosim"));
+    command.arg(root.join("config/settings/damiao6.toml")).current_dir(root);
+    perform("an independent Damiao master on a real vcan0", &mut command)
 }
 
 fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {

@@ -74,6 +74,8 @@ pub struct Motor {
     controller: Controller,
     /// The newest MIT command, motor side.
     told: MitCommand,
+    /// The largest speed of the newest `POS_VEL` command.
+    speed_rad_s: f64,
     status: u8,
     torque_nm: f64,
     /// Motor angle that counts as zero, after "set zero".
@@ -95,6 +97,7 @@ impl Motor {
             mechanics: Mechanics::new(parameters.plant, parameters.start_rad, parameters.step_ns),
             controller: Controller::new(parameters.loops),
             told: MitCommand::default(),
+            speed_rad_s: 0.0,
             status: STATUS_DISABLED,
             torque_nm: 0.0,
             zero_shift_rad: 0.0,
@@ -255,6 +258,7 @@ impl Motor {
             let to_rad = self.link_rad(position_rad);
             let time_s = (to_rad - self.controller.reference_rad()).abs() / velocity_rad_s;
             self.controller.set_target(self.now, to_rad, time_s.max(POS_VEL_PERIOD_S));
+            self.speed_rad_s = velocity_rad_s;
         }
         Some(self.feedback())
     }
@@ -267,12 +271,16 @@ impl Motor {
     /// Moves the mechanics up to the last whole step before `now`.
     fn move_on(&mut self, now: Nanos) {
         let dt_s = self.mechanics.step_s();
+        // The largest speed that a POS_VEL command states bounds the speed loop too.
+        let plant = self.parameters.plant;
+        let slowed =
+            PlantParameters { speed_rad_s_max: plant.speed_rad_s_max.min(self.speed_rad_s), ..plant };
         for at in self.mechanics.due(now) {
             let read = (self.mechanics.read_rad(0.0), self.mechanics.plant.velocity_rad_s);
             let torque_nm = match self.registers.mode() {
                 _ if !self.is_enabled() => 0.0,
                 MODE_MIT => self.spring_nm(dt_s),
-                MODE_POS_VEL => self.controller.step(at, dt_s, read, &self.parameters.plant),
+                MODE_POS_VEL => self.controller.step(at, dt_s, read, &slowed),
                 _ => 0.0,
             };
             self.torque_nm = torque_nm;

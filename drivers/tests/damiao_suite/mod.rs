@@ -11,6 +11,7 @@ use taustream_drivers::{
 mod bring_up;
 mod faults;
 mod frames;
+mod golden;
 mod hostile;
 mod operation;
 
