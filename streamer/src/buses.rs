@@ -28,6 +28,7 @@ pub struct Bus {
     outgoing: FrameBatch,
     incoming: FrameBatch,
     syncs: u64,
+    frames: u64,
     live: bool,
 }
 
@@ -49,6 +50,7 @@ impl Bus {
             outgoing: FrameBatch::new(),
             incoming: FrameBatch::new(),
             syncs: 0,
+            frames: 0,
             live: false,
         }
     }
@@ -110,10 +112,11 @@ impl Buses {
             for frame in taken {
                 bus.syncs += u64::from(frame.id() == SYNC);
             }
+            bus.frames = bus.frames.saturating_add(u64::from(count(taken.len())));
             let complete = taken.len() == frames.len();
             (found.wanted, found.sent) = (count(frames.len()), count(taken.len()));
             found.fault = sent.fault.filter(|_| !complete);
-            found.syncs = bus.syncs;
+            (found.syncs, found.frames) = (bus.syncs, bus.frames);
             // Known before the commanded pose is: a bus that is silent has carried nothing.
             found.failed = bus.health.failed();
             for joint in bus.driver.joints() {

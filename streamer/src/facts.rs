@@ -125,6 +125,8 @@ pub struct BusFacts {
     pub error_frames: u64,
     /// SYNCs handed over since start.
     pub syncs: u64,
+    /// Frames handed over so far.
+    pub frames: u64,
 }
 
 /// What became of starting the failed buses over.

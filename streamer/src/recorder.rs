@@ -141,7 +141,7 @@ impl Log {
     fn cycle_line(&self, cycle: &CycleRecord) -> Value {
         json!({
             "event": "cycle", "tick": cycle.tick, "time_ns": cycle.time_ns,
-            "sync": cycle.syncs.get(..self.buses), "phase": cycle.phase.word(),
+            "sync": cycle.syncs.get(..self.buses), "frames": cycle.frames.get(..self.buses), "phase": cycle.phase.word(),
             "trajectory_id": cycle.trajectory_id, "s": cycle.s, "sigma": cycle.sigma,
             "position_rad": cycle.position_rad.get(..self.joints),
             "sent": cycle.sent.get(..self.buses), "lost": cycle.lost.get(..self.buses),
@@ -182,6 +182,7 @@ mod tests {
             tick,
             time_ns: 5_270_041_203_103,
             syncs: [tick; BUSES_MAX],
+            frames: [7 * tick; BUSES_MAX],
             phase: Phase::Moving,
             trajectory_id: 7,
             s: 0.1 + 0.2,
@@ -228,7 +229,7 @@ mod tests {
             assert_eq!(bits(&lines[1]["file"]["base_rad"][joint]), base_rad[joint].to_bits());
         }
         assert_eq!(bits(&lines[2]["s"]), (0.1_f64 + 0.2).to_bits());
-        assert_eq!(lines[2]["sync"], json!([41]));
+        assert_eq!((&lines[2]["sync"], &lines[2]["frames"]), (&json!([41]), &json!([287])));
         assert_eq!((&lines[3]["joint"], &lines[3]["reason"]), (&json!(2), &json!("feedback late (s)")));
         assert_eq!((&lines[1]["generation"], &lines[4]["records"]), (&json!(3), &json!(5)));
     }

@@ -75,6 +75,8 @@ pub struct CycleRecord {
     pub time_ns: u64,
     /// SYNCs handed to each bus so far, this cycle's included.
     pub syncs: [u64; BUSES_MAX],
+    /// Frames handed to each bus so far, this cycle's included.
+    pub frames: [u64; BUSES_MAX],
     /// The phase after the cycle.
     pub phase: Phase,
     /// The trajectory that made the setpoint; 0 when the arm holds or brakes.
@@ -327,6 +329,7 @@ impl Reporter {
                 tick: facts.tick.number,
                 time_ns: facts.tick.woke.0,
                 syncs: facts.buses.map(|b| b.syncs),
+                frames: facts.buses.map(|b| b.frames),
                 phase: supervisor.phase(),
                 trajectory_id: facts.trajectory_id,
                 s: if facts.trajectory_id == 0 { 0.0 } else { facts.trajectory_s },

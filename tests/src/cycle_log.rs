@@ -11,6 +11,9 @@ pub struct Cycle {
     pub time_ns: u64,
     /// SYNCs handed to each bus so far, this one included.
     pub sync: Vec<u64>,
+    /// Frames handed to each bus so far, this cycle's included.
+    #[serde(default)]
+    pub frames: Vec<u64>,
     /// The phase's word.
     pub phase: String,
     /// The trajectory that runs; 0 for none.

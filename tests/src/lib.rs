@@ -1,8 +1,9 @@
 //! Scenarios over the real processes on a real vcan0: the machine they run in and what judges their recordings.
 //!
 //! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`stage`] starts the real processes
-//! for one of the [`scenarios`] and [`bus_scenarios`]. [`candump`] reads what an independent recorder saw on the bus, [`cycle_log`] what the
-//! streamer claims, and [`setpoints`] judges the one by the other.
+//! for one of the [`scenarios`], [`bus_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what an independent recorder
+//! saw on the bus, [`cycle_log`] what the streamer claims, and [`setpoints`] judges the one by the other ([`mit_setpoints`]
+//! for motors in MIT mode).
 //!
 //! [`booted`] boots a whole Debian ([`debian`]) with systemd in that machine, and [`services`] tries the installed services
 //! there.
@@ -12,8 +13,10 @@ pub mod booted;
 pub mod bus_scenarios;
 pub mod candump;
 pub mod cycle_log;
+pub mod damiao_scenarios;
 pub mod debian;
 pub mod machine;
+pub mod mit_setpoints;
 pub mod scenarios;
 mod scratch;
 pub mod services;

@@ -209,7 +209,7 @@ fn follows_target(data: &[u8]) -> bool {
 }
 
 /// Phases in which single drives may be off, or on their way on or off.
-fn may_be_off(phase: &str) -> bool {
+pub(crate) fn may_be_off(phase: &str) -> bool {
     matches!(phase, "enabling" | "fast-stopping" | "braking" | "fault" | "locked" | "disabling")
 }
 
@@ -333,7 +333,10 @@ fn is_on_path(phase: &str) -> bool {
     matches!(phase, "moving" | "pausing" | "paused" | "stopping" | "fast-stopping")
 }
 
-fn compare_trajectory(trajectories: &BTreeMap<u64, Trajectory>, cycle: &Cycle) -> Result<usize, Flaw> {
+pub(crate) fn compare_trajectory(
+    trajectories: &BTreeMap<u64, Trajectory>,
+    cycle: &Cycle,
+) -> Result<usize, Flaw> {
     if !is_on_path(&cycle.phase) {
         return Ok(0);
     }
@@ -376,7 +379,7 @@ fn second_formula(trajectory: &Trajectory, t_s: f64) -> JointArray {
 }
 
 /// Reads a trajectory object of the log with plain JSON access.
-fn trajectory(file: &serde_json::Value) -> Result<Trajectory, Flaw> {
+pub(crate) fn trajectory(file: &serde_json::Value) -> Result<Trajectory, Flaw> {
     let missing = || Flaw::Log(format!("a trajectory that is none: {file}"));
     let joints = |v: &serde_json::Value| -> Option<JointArray> {
         let mut array = [0.0; MAX_JOINTS];

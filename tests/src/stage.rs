@@ -427,6 +427,21 @@ impl Stage {
         self.streamer.signal(Signal::TERM)?;
         let status = self.streamer.await_end()?;
         ensure!(status.success(), "the streamer ended with {status}: {}", self.streamer.said());
+        self.leave()
+    }
+
+    /// Like [`Self::close`] for a scenario in which the streamer may have been killed.
+    ///
+    /// # Errors
+    /// When the other processes do not end.
+    pub fn close_whatever_became_of_the_streamer(mut self) -> Result<(String, PathBuf)> {
+        if self.streamer.signal(Signal::TERM).is_ok() {
+            self.streamer.await_end()?;
+        }
+        self.leave()
+    }
+
+    fn leave(mut self) -> Result<(String, PathBuf)> {
         for process in [&mut self.planner, &mut self.simulator, &mut self.candump] {
             process.signal(Signal::TERM)?;
             process.await_end()?;

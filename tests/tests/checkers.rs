@@ -76,6 +76,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             tick: u64::from(tick),
             time_ns: u64::from(tick) * 1_000_000,
             sync: vec![u64::from(tick)],
+            frames: vec![7 * u64::from(tick)],
             phase: if s < 0.35 { "moving" } else { "holding" }.into(),
             trajectory_id: 5,
             s,

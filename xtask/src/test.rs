@@ -42,6 +42,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     independent_devices_on_vcan(&root, &programs, &python)?;
     independent_damiao_master_on_vcan(&root, &programs, &python)?;
     scenarios_on_vcan(&root, &programs)?;
+    damiao_scenarios_on_vcan(&root, &programs)?;
     services_under_systemd(&root, &programs)?;
     figures_on_vcan(&root, &programs)?;
     let skipped = if problems.join("ur5_spherized.urdf").is_file() {
@@ -197,6 +198,15 @@ fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     let mut command = Command::new(program);
     command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).current_dir(root);
     perform("scenarios on a real vcan0", &mut command)
+}
+
+fn damiao_scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    let output = workspace::target(root).join("damiao-scenarios");
+    let words = machine(programs, &output)?;
+    let (program, rest) = words.split_first().context("no program to run")?;
+    let mut command = Command::new(program);
+    command.args(rest).arg(programs.join("damiao-scenarios")).arg("--output").arg(&output).current_dir(root);
+    perform("scenarios of Damiao motors on a real vcan0", &mut command)
 }
 
 /// What `cargo xtask install` installs, booted with a Debian whose process 1 is systemd, and tried there.

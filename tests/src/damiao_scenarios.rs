@@ -1,0 +1,148 @@
+//! What must hold of an arm of Damiao motors over the real processes on a real vcan0.
+use crate::scenarios::Goals;
+use crate::stage::{PATIENCE, Stage};
+use anyhow::{Context, Result, ensure};
+use rustix::process::Signal;
+use std::time::{Duration, Instant};
+use taustream_messages::{FaultReason, Phase, Report};
+
+/// A spring under a load does not stand where it is told: this far off it may rest. The shipped shoulder carries 10 Nm on
+/// 400 Nm/rad.
+const AT_GOAL_RAD: f64 = 0.04;
+
+/// One scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct Scenario {
+    /// Area, event, condition.
+    pub name: &'static str,
+    /// What it does; it fails by an error.
+    pub run: fn(&mut Stage, &Goals) -> Result<()>,
+    /// It kills the streamer, whose log then ends in the middle of something.
+    pub kills: bool,
+}
+
+/// Every scenario, in the order in which they run.
+pub const ALL: &[Scenario] = &[
+    Scenario { name: "damiao_goals_round_obstacles_with_pause_reached", run: goals_with_pause, kills: false },
+    Scenario {
+        name: "damiao_motor_silent_mid_motion_fast_stop_names_joint",
+        run: motor_silent,
+        kills: false,
+    },
+    Scenario { name: "damiao_motor_fault_mid_motion_fast_stop_names_joint", run: motor_fault, kills: false },
+    Scenario { name: "damiao_streamer_killed_mid_motion_motors_let_go", run: streamer_killed, kills: true },
+];
+
+fn enable(stage: &mut Stage) -> Result<()> {
+    stage.cli_done(&["enable"])?;
+    stage.await_phase(Phase::Holding)?;
+    stage.cli_done(&["speed", "100"])?;
+    Ok(())
+}
+
+fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
+    stage.await_through_stalls("the end of the motion", |report, phase| {
+        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
+    })?;
+    stage.await_report("the motors to settle at the goal", |report, _| {
+        goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < AT_GOAL_RAD)
+    })
+}
+
+fn goals_with_pause(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    for index in 0..goals.0.len() {
+        stage.replan(&goals.text(index)?)?;
+        stage.await_under_way(0.3)?;
+        if index == 1 {
+            stage.cli_done(&["pause"])?;
+            let paused = stage.await_phase(Phase::Paused)?;
+            ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
+            stage.cli_done(&["resume"])?;
+        }
+        let report = arrive(stage, goals.rad(index)?)?;
+        ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
+    }
+    stage.cli_done(&["disable"])?;
+    stage.await_phase(Phase::Disabled)?;
+    Ok(())
+}
+
+/// A fault of one motor ends in `Fault` with the joint named; after the cause is gone the arm comes back by command only.
+fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
+    enable(stage)?;
+    stage.cli_done(&["speed", "20"])?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    stage.simulator.tell(fault)?;
+    let report = stage.await_phase(Phase::Fault)?;
+    ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
+    let reason = report.fault().context("a fault without a reason")?;
+    ensure!(reasons.contains(&reason), "reason {reason:?}, expected one of {reasons:?}");
+    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "fault")?;
+    stage.simulator.tell("clear")?;
+    stage.cli_done(&["disable"])?;
+    stage.await_report("all motors off", |report, _| report.energised == 0)?;
+    bring_back(stage)?;
+    enable(stage)?;
+    stage.replan(&goals.text(1)?)?;
+    arrive(stage, goals.rad(1)?)?;
+    Ok(())
+}
+
+/// Clears, again while motors come back with faults of their own, until the arm is ready and stays so.
+fn bring_back(stage: &mut Stage) -> Result<()> {
+    let since = Instant::now();
+    loop {
+        let mut ready = 0;
+        while stage.report()?.1 == Phase::Disabled && ready < 10 {
+            ready += 1;
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        if ready == 10 {
+            return Ok(());
+        }
+        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared: {}", stage.streamer.said());
+        stage.cli(&["clear-fault"])?;
+    }
+}
+
+fn motor_silent(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    let reasons = [FaultReason::FeedbackLate, FaultReason::DriveFault];
+    fault_and_back(stage, goals, "fault joint=3,kind=silence", &reasons)
+}
+
+fn motor_fault(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    fault_and_back(stage, goals, "fault joint=3,kind=fault,value=0xA", &[FaultReason::DriveFault])
+}
+
+fn streamer_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    enable(stage)?;
+    stage.cli_done(&["speed", "20"])?;
+    stage.replan(&goals.text(0)?)?;
+    stage.await_under_way(0.1)?;
+    stage.streamer.signal(Signal::KILL)?;
+    stage.streamer.await_end()?;
+    let since = Instant::now();
+    // Every motor has its own watchdog; status 0xD says that it was what let go, and the brakes hold the arm.
+    while stage.simulator.said().matches("status=0xD").count() < 6 {
+        ensure!(since.elapsed() < PATIENCE, "motors do not let go: {}", stage.simulator.said());
+        stage.simulator.tell("status")?;
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let at = |stage: &Stage| -> Vec<f64> {
+        let said = stage.simulator.said();
+        let angles = said.lines().filter_map(|line| line.split("position_rad=").nth(1));
+        let mut angles: Vec<f64> = angles.filter_map(|rest| rest.split(' ').next()?.parse().ok()).collect();
+        angles.split_off(angles.len().saturating_sub(6))
+    };
+    stage.simulator.tell("status")?;
+    std::thread::sleep(Duration::from_millis(200));
+    let rest_rad = at(stage);
+    std::thread::sleep(Duration::from_millis(500));
+    stage.simulator.tell("status")?;
+    std::thread::sleep(Duration::from_millis(200));
+    let still = at(stage).iter().zip(&rest_rad).all(|(now, then)| (now - then).abs() < 1e-6);
+    ensure!(still && rest_rad.len() == 6, "brakes do not hold: {rest_rad:?}, then {:?}", at(stage));
+    Ok(())
+}
