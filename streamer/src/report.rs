@@ -95,6 +95,7 @@ pub struct CycleRecord {
 
 /// One line of the cycle log.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a box would be allocated by the cycle")]
 pub enum Record {
     /// A trajectory runs from this cycle on.
     Accepted {

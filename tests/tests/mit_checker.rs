@@ -33,6 +33,11 @@ fn moves() -> Trajectory {
     Trajectory::new(MOTORS, [0.0; MAX_JOINTS], &[stroke]).expect("a plain trajectory")
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the values lie inside their ranges"
+)]
 fn code(value: f64, low: f64, high: f64, bits: u32) -> u64 {
     let top = 2_f64.powi(i32::try_from(bits).expect("few bits")) - 1.0;
     ((value - low) * top / (high - low)).floor() as u64
