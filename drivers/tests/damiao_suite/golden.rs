@@ -1,5 +1,6 @@
-//! The codec against frames of an independent library (tests/peers/damiao_frames.py writes them, and checks them in
+//! The codec against frames of an independent library (`tests/peers/damiao_frames.py` writes them, and checks them in
 //! every whole test run).
+use std::fmt::Debug;
 use taustream_drivers::codec::damiao_frames::{Reply, Request, Special, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::{CanFrame, CanId};
@@ -19,12 +20,7 @@ fn numbers<const N: usize>(words: &[&str]) -> [f64; N] {
     std::array::from_fn(|at| words[at].parse().unwrap())
 }
 
-fn agree(
-    what: &str,
-    ours: impl std::fmt::Debug + PartialEq,
-    theirs: impl std::fmt::Debug,
-    same: bool,
-) -> Result<(), String> {
+fn agree(what: &str, (ours, theirs): (&dyn Debug, &dyn Debug), same: bool) -> Result<(), String> {
     if same { Ok(()) } else { Err(format!("{what}: ours {ours:?}, the library's {theirs:?}")) }
 }
 
@@ -49,6 +45,7 @@ fn compare(line: &str) -> Result<(), String> {
             Request::Mit(command.encode(&MitRanges::symmetric(position, velocity, torque)).unwrap())
         }
         "pos_vel" => {
+            #[expect(clippy::cast_possible_truncation, reason = "the frame has this width")]
             let narrow = |word: &str| word.parse::<f64>().unwrap() as f32;
             Request::PosVel { position_rad: narrow(words[2]), velocity_rad_s: narrow(words[3]) }
         }
@@ -64,14 +61,14 @@ fn compare(line: &str) -> Result<(), String> {
         "other" => {
             let mode = Request::OtherMode(words[2].parse().unwrap());
             let read = Request::decode(&theirs, node);
-            return agree(line, read, mode, read == Some(mode));
+            return agree(line, (&read, &mode), read == Some(mode));
         }
         unknown => return Err(format!("{unknown} is no case")),
     };
     let ours = request.encode(node, Wire::Classic);
-    agree(line, ours, theirs, ours == theirs)?;
+    agree(line, (&ours, &theirs), ours == theirs)?;
     let read = Request::decode(&theirs, node);
-    agree(line, read, request, read == Some(request))
+    agree(line, (&read, &request), read == Some(request))
 }
 
 fn compare_feedback(node: u8, words: &[&str]) -> Result<(), String> {
@@ -92,7 +89,7 @@ fn compare_feedback(node: u8, words: &[&str]) -> Result<(), String> {
     ];
     let theirs: [f64; 6] = numbers(&words[7..13]);
     let same = ours.iter().zip(theirs).all(|(ours, theirs)| ours.to_bits() == theirs.to_bits());
-    agree("feedback", ours, theirs, same)
+    agree("feedback", (&ours, &theirs), same)
 }
 
 #[test]
