@@ -27,7 +27,7 @@ pub struct Report {
     pub fault_joint: u32,
     /// Index of the bus of the fault; `u32::MAX` for none.
     pub fault_bus: u32,
-    /// [`Cause::code`].
+    /// Code of the [`Cause`]: what it is depends on the reason.
     pub fault_code: u32,
     /// [`Cause::object`].
     pub fault_object: u32,
