@@ -51,7 +51,7 @@ pub struct WireFacts {
     pub lost_from_drives: u64,
     /// Time in which bits passed, ns.
     pub busy_ns: u64,
-    /// The same in the fullest [`WINDOW_NS`] that has ended.
+    /// The same in the fullest `WINDOW_NS` that has ended.
     pub fullest_window_ns: u64,
     /// Most frames that waited on the master's side.
     pub longest_queue: usize,
