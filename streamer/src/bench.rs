@@ -24,9 +24,11 @@ use peers::Peers;
 use serde::Serialize;
 use stages::StageClock;
 pub use stages::StageTime;
-use taustream_arm::Settings;
+use taustream_arm::{Cia402, Protocol, Servo, Settings};
 use taustream_drivers::codec::canopen::sync;
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, encode_rpdo};
+use taustream_drivers::codec::damiao_frames::{Request, Wire};
+use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::link::LinkChoice;
 use taustream_drivers::{
     CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
@@ -159,9 +161,9 @@ pub fn cycle(options: &BenchOptions) -> Result<CycleBench, BenchError> {
     thread.join().map_err(|_| BenchError::System("the bench has panicked".into()))?
 }
 
-/// Writes the frames of energised CiA 402 drives, and believes them to follow at once.
+/// Writes the frames of energised servos, and believes them to follow at once.
 struct BenchDriver {
-    servos: Vec<taustream_arm::Servo>,
+    servos: Vec<Servo>,
     joints: Vec<usize>,
     commands: [JointCommand; MAX_JOINTS],
     wish: DriveWish,
@@ -177,11 +179,11 @@ impl ServoDriver for BenchDriver {
         out: &mut FrameBatch,
     ) {
         (self.commands, self.wish, self.now) = (*commands, wish, now);
-        out.push(sync());
+        if self.servos.iter().any(|servo| servo.protocol.as_cia402().is_some()) {
+            out.push(sync());
+        }
         for servo in &self.servos {
-            let Some(scale) = CountScale::of(servo) else { continue };
-            let position = commands.get(servo.joint).map_or(0.0, |c| c.position_rad);
-            out.push(encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, position)));
+            out.push(setpoint(servo, &commands.get(servo.joint).copied().unwrap_or_default()));
         }
     }
     fn decode(&mut self, _now: Nanos, _frame: &CanFrame) {}
@@ -201,6 +203,32 @@ impl ServoDriver for BenchDriver {
     fn start_over(&mut self) {}
     fn explain(&self, error_code: u32) -> String {
         format!("{error_code:#06x}")
+    }
+}
+
+/// The frame of an energised servo's setpoint, packed as its protocol packs it.
+fn setpoint(servo: &Servo, command: &JointCommand) -> CanFrame {
+    match servo.protocol {
+        Protocol::Cia402(Cia402 { gear_ratio, counts_per_rev }) => {
+            let Servo { sign, zero_offset_rad, .. } = *servo;
+            let scale = CountScale { sign, gear_ratio, counts_per_rev, zero_offset_rad };
+            encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, command.position_rad))
+        }
+        Protocol::Damiao(damiao) => {
+            let ranges = MitRanges::symmetric(
+                damiao.position_range_rad,
+                damiao.velocity_range_rad_s,
+                damiao.torque_range_nm,
+            );
+            let packed = MitCommand {
+                position_rad: (command.position_rad - servo.zero_offset_rad) * servo.sign,
+                velocity_rad_s: command.velocity_rad_s * servo.sign,
+                stiffness_nm_rad: 100.0,
+                damping_nm_s_rad: 1.0,
+                torque_nm: 0.0,
+            };
+            Request::Mit(packed.encode(&ranges).unwrap_or_default()).encode(servo.node_id, Wire::Classic)
+        }
     }
 }
 
@@ -245,10 +273,13 @@ impl Bench {
         let base_rad = middle(settings);
         let at_base = base_rad.map(|position_rad| JointCommand { position_rad, ..JointCommand::default() });
         let mut buses = Vec::new();
-        let mut frames = vec![sync()];
+        let mut frames = Vec::new();
         for (index, bus) in settings.buses.iter().enumerate() {
             let servos: Vec<_> = settings.servos.iter().filter(|s| s.bus == index).cloned().collect();
-            frames.extend(servos.iter().filter(|_| index == 0).map(|s| encode_rpdo(s.node_id, 0x000F, 0)));
+            if index == 0 {
+                frames.extend(servos.iter().any(|s| s.protocol.as_cia402().is_some()).then(sync));
+                frames.extend(servos.iter().map(|servo| setpoint(servo, &JointCommand::default())));
+            }
             let joints = servos.iter().map(|s| s.joint).collect();
             let (wish, now) = (DriveWish::Disabled, Nanos(0));
             let driver = BenchDriver { servos, joints, commands: at_base, wish, now };
