@@ -22,3 +22,4 @@ mod scratch;
 pub mod services;
 pub mod setpoints;
 pub mod stage;
+pub mod traffic;
