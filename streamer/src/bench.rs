@@ -9,6 +9,7 @@
 //! No servos are needed: the driver writes the frames of the configured drives (SYNC and one setpoint each), calls them
 //! energised, and reports the commanded pose as measured. The arm swings along a trajectory all the time, so sampling,
 //! guard, encoding and supervision do their full work; decoding of answers is not in the figures, since nobody answers.
+mod compare;
 mod peers;
 mod stages;
 mod wake;
@@ -19,6 +20,7 @@ use crate::facts::Asked;
 use crate::intake::{self, Desk};
 use crate::rt;
 use crate::tick::Schedule;
+pub use compare::{Compared, compare};
 use hdrhistogram::Histogram;
 use peers::Peers;
 use serde::Serialize;
@@ -29,6 +31,7 @@ use taustream_drivers::codec::canopen::sync;
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, encode_rpdo};
 use taustream_drivers::codec::damiao_frames::{Request, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
+use taustream_drivers::codec::setpoint_frames::{Group, Rhythm, encode_pair, groups};
 use taustream_drivers::link::LinkChoice;
 use taustream_drivers::{
     CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
@@ -142,16 +145,26 @@ pub fn cycle(options: &BenchOptions) -> Result<CycleBench, BenchError> {
         return Err(BenchError::Options { seconds, slices });
     }
     let options = options.clone();
+    on_the_real_time_thread(options.settings.cycle, options.allow_non_realtime, move |realtime| {
+        Bench::prepare(&options)?.measure(&options, realtime)
+    })
+}
+
+/// Does `work` on a thread of its own with the priority that the streamer's would have; tells it whether it has it.
+fn on_the_real_time_thread<T: Send + 'static>(
+    cycle: taustream_arm::settings::Cycle,
+    allow_non_realtime: bool,
+    work: impl FnOnce(bool) -> Result<T, BenchError> + Send + 'static,
+) -> Result<T, BenchError> {
     let work = move || {
         let mut missing = Vec::new();
         missing.extend(rt::lock_memory().err());
-        let cycle = options.settings.cycle;
         missing.extend(rt::enter(cycle.priority, cycle.cpu).err().into_iter().flatten());
-        if !missing.is_empty() && !options.allow_non_realtime {
+        if !missing.is_empty() && !allow_non_realtime {
             let list: Vec<String> = missing.iter().map(ToString::to_string).collect();
             return Err(BenchError::Rights(list.join("; ")));
         }
-        Bench::prepare(&options)?.measure(&options, missing.is_empty())
+        work(missing.is_empty())
     };
     let thread = std::thread::Builder::new()
         .name("bench".into())
@@ -164,6 +177,8 @@ pub fn cycle(options: &BenchOptions) -> Result<CycleBench, BenchError> {
 /// Writes the frames of energised servos, and believes them to follow at once.
 struct BenchDriver {
     servos: Vec<Servo>,
+    groups: Vec<Group>,
+    rhythm: Rhythm,
     joints: Vec<usize>,
     commands: [JointCommand; MAX_JOINTS],
     wish: DriveWish,
@@ -182,9 +197,23 @@ impl ServoDriver for BenchDriver {
         if self.servos.iter().any(|servo| servo.protocol.as_cia402().is_some()) {
             out.push(sync());
         }
-        for servo in &self.servos {
-            out.push(setpoint(servo, &commands.get(servo.joint).copied().unwrap_or_default()));
+        let command = |servo: &Servo| commands.get(servo.joint).copied().unwrap_or_default();
+        let counts =
+            |servo: &Servo| Some(counts_from_rad(&CountScale::of(servo)?, command(servo).position_rad));
+        for (number, group) in self.groups.iter().enumerate() {
+            let frame = match *group {
+                _ if !self.rhythm.is_turn(number) => None,
+                Group::One(at) => self.servos.get(at).map(|servo| setpoint(servo, &command(servo))),
+                Group::Pair([first, second]) => {
+                    let pair = self.servos.get(first).zip(self.servos.get(second));
+                    pair.and_then(|(a, b)| Some(encode_pair(a.node_id, [counts(a)?, counts(b)?])))
+                }
+            };
+            frame.into_iter().for_each(|frame| {
+                out.push(frame);
+            });
         }
+        self.rhythm.advance();
     }
     fn decode(&mut self, _now: Nanos, _frame: &CanFrame) {}
     fn joints(&self) -> &[usize] {
@@ -282,7 +311,9 @@ impl Bench {
             }
             let joints = servos.iter().map(|s| s.joint).collect();
             let (wish, now) = (DriveWish::Disabled, Nanos(0));
-            let driver = BenchDriver { servos, joints, commands: at_base, wish, now };
+            let groups = groups(servos.len(), bus.traffic.packed);
+            let rhythm = Rhythm::new(bus.traffic);
+            let driver = BenchDriver { servos, groups, rhythm, joints, commands: at_base, wish, now };
             buses.push(Bus::new(peers.master(bus)?, Box::new(driver), settings));
         }
         let buses = Buses::new(buses).map_err(|e| BenchError::System(e.to_string()))?;

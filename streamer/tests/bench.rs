@@ -3,7 +3,7 @@
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::link::LinkChoice;
-use taustream_streamer::bench::{BenchError, BenchOptions, cycle};
+use taustream_streamer::bench::{BenchError, BenchOptions, compare, cycle};
 
 fn options(link: Option<LinkChoice>) -> BenchOptions {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
@@ -33,4 +33,16 @@ fn bench_counts_every_slice_and_stage() {
 fn bench_without_slices_is_refused() {
     let refused = cycle(&BenchOptions { slices: 1, ..options(None) });
     assert!(matches!(refused, Err(BenchError::Options { .. })));
+}
+
+/// Goal: two arms on one interface's name are compared in one run, each with its own frames.
+#[test]
+fn bench_compares_one_bus_and_two_in_one_run() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/dual-bus.toml");
+    let two = Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"));
+    let result = compare(&BenchOptions { slices: 2, ..options(Some(LinkChoice::Local)) }, &[two]).unwrap();
+    let names: Vec<(&str, usize)> = result.iter().map(|arm| (arm.arm.as_str(), arm.buses)).collect();
+    assert_eq!(names, [("vcan6", 1), ("dual-bus", 2)]);
+    assert!(result.iter().all(|arm| arm.cycle.count >= 190 && arm.bare.count >= 190), "{result:?}");
+    assert!((result[0].p50_ratio - 1.0).abs() < 1e-12 && result[1].p50_ratio > 0.0, "{result:?}");
 }

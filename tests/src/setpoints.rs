@@ -75,6 +75,19 @@ pub struct Verdict {
     pub last_setpoint_rad: Vec<f64>,
 }
 
+impl Verdict {
+    /// Takes in what another bus of the same recording showed.
+    pub fn add(&mut self, other: Self) {
+        self.frames += other.frames;
+        self.syncs += other.syncs;
+        self.setpoints += other.setpoints;
+        self.on_trajectory += other.on_trajectory;
+        self.trajectories = self.trajectories.max(other.trajectories);
+        self.last_measured_rad.extend(other.last_measured_rad);
+        self.last_setpoint_rad = other.last_setpoint_rad;
+    }
+}
+
 /// What is wrong with a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Flaw {

@@ -4,8 +4,8 @@ mod offline;
 
 pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs};
 pub(crate) use offline::{
-    BenchArgs, BenchName, CheckArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs, PlotArgs,
-    SampleArgs,
+    BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs,
+    PlotArgs, SampleArgs,
 };
 
 use clap::{Parser, Subcommand};

@@ -218,6 +218,30 @@ pub(crate) enum BenchName {
         #[arg(long)]
         allow_non_realtime: bool,
     },
+    /// Time of the streamer's cycle with several settings files, in turns in one run: two buses against one, say.
+    ///
+    /// As with `cycle`, no servos are needed, and real ones on the bus would get setpoints.
+    Compare(CompareArgs),
+}
+
+/// What `taustream bench compare` takes.
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// Settings files, or names of some; the first one is what the others are measured by.
+    #[arg(required = true, num_args = 2.., value_name = "SETTINGS")]
+    pub(crate) arms: Vec<PathBuf>,
+    /// How long to measure each arm, s.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0)]
+    pub(crate) seconds: f64,
+    /// Rounds in which each arm has its turn.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 10)]
+    pub(crate) slices: u32,
+    /// What carries the frames; without it they are dropped, without system calls.
+    #[arg(long, value_name = "LINK")]
+    pub(crate) link: Option<LinkChoice>,
+    /// Measure without real-time rights too; such figures say little.
+    #[arg(long)]
+    pub(crate) allow_non_realtime: bool,
 }
 
 /// The planners by name; clap lists them in the help and suggests the nearest.

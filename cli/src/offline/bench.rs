@@ -15,7 +15,12 @@ struct Answer(CycleBench);
 
 /// Measures and prints.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Result<(), Failure> {
-    let BenchName::Cycle { seconds, slices, link, allow_non_realtime } = &args.name;
+    let (seconds, slices, link, allow_non_realtime) = match &args.name {
+        BenchName::Cycle { seconds, slices, link, allow_non_realtime } => {
+            (seconds, slices, link, allow_non_realtime)
+        }
+        BenchName::Compare(args) => return super::compare::run(form, args),
+    };
     let options = BenchOptions {
         settings: arm::settings(settings)?,
         seconds: *seconds,
@@ -24,13 +29,17 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         allow_non_realtime: *allow_non_realtime,
     };
     form.progress(format_args!("measuring for {seconds} s, the two loops in turns ({slices} slices) .."));
-    let measured = cycle(&options).map_err(|error| match error {
+    form.print(&Answer(cycle(&options).map_err(failure)?))
+}
+
+/// Why nothing was measured, as a failure of the command.
+pub(super) fn failure(error: BenchError) -> Failure {
+    match error {
         BenchError::Options { .. } => Failure::Usage(error.to_string()),
         BenchError::Link(_) | BenchError::Rights(_) | BenchError::NotMoving(_) | BenchError::System(_) => {
             Failure::Failed(format!("nothing was measured: {error}"))
         }
-    })?;
-    form.print(&Answer(measured))
+    }
 }
 
 impl fmt::Display for Answer {

@@ -3,6 +3,7 @@ pub(crate) mod bench;
 mod bus_table;
 pub(crate) mod check;
 mod checked_robot;
+mod compare;
 pub(crate) mod cost;
 pub(crate) mod plan;
 pub(crate) mod plot;

@@ -1,13 +1,14 @@
 //! Runs every scenario on a real vcan0 and judges every recording. Meant to run inside the test machine.
 use anyhow::{Context, Error, Result, anyhow, bail, ensure};
 use clap::Parser;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use taustream_arm::Settings;
 use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
 use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
 use taustream_tests::stage::{Place, Stage};
+use taustream_tests::traffic::as_plain;
 use taustream_tests::{bus_scenarios, candump, cycle_log};
 
 /// Runs the scenarios over the real processes on a real vcan0.
@@ -16,6 +17,9 @@ struct Arguments {
     /// Demo file: settings, start pose and goals.
     #[arg(long, default_value = "config/demo.toml")]
     demo: PathBuf,
+    /// Settings file instead of the demo's.
+    #[arg(long)]
+    settings: Option<PathBuf>,
     /// Folder of the built programs; default: where this program is.
     #[arg(long)]
     programs: Option<PathBuf>,
@@ -44,9 +48,10 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read_demo(arguments)?;
     let settings = Settings::load(&place.settings)?;
-    let bus = settings.buses.first().context("the settings have no bus")?;
-    let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
-    ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
+    for bus in &settings.buses {
+        let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
+        ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
+    }
     let all = scenarios::ALL.iter().chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
@@ -100,22 +105,31 @@ fn perform_with_patience(scenario: &Scenario, place: &Place, goals: &Goals) -> R
 
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
     let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
-    let encodings = encodings(&stage.settings);
+    let settings = stage.settings.clone();
     if let Err(error) = (scenario.run)(&mut stage, goals) {
         let stalled = stage.was_stalled();
         return Err(Failed { error, stalled });
     }
-    let bus = stage.settings.buses.first().context("the settings have no bus")?.interface.clone();
     let (recording, log) = stage.close()?;
     let losses = match scenario.judged {
         Judged::Exactly => Losses::None,
         Judged::WithLosses => Losses::AsLogged,
     };
-    let log = cycle_log::read(&log).map_err(Error::from)?;
-    let verdict =
-        judge_with(losses, (&frames(&recording, &bus)?, &log), 0, &encodings).map_err(Error::from)?;
+    let verdict = judge_all(&settings, &recording, &log, losses)?;
     if verdict.on_trajectory == 0 {
         return Err(anyhow!("nothing was compared with a trajectory: it would pass every comparison").into());
+    }
+    Ok(verdict)
+}
+
+/// Judges every bus of a recording.
+fn judge_all(settings: &Settings, recording: &str, log: &Path, losses: Losses) -> Result<Verdict> {
+    let log = cycle_log::read(log)?;
+    let mut verdict = Verdict::default();
+    for (index, bus) in settings.buses.iter().enumerate() {
+        let encodings = encodings(settings, index);
+        let frames = as_plain(frames(recording, &bus.interface)?, &log, index, &encodings, bus.traffic)?;
+        verdict.add(judge_with(losses, (&frames, &log), index, &encodings)?);
     }
     Ok(verdict)
 }
@@ -130,7 +144,8 @@ fn frames(recording: &str, interface: &str) -> Result<Vec<BusFrame>> {
     Ok(records.filter(|record| record.interface == interface).map(seen).collect())
 }
 
-fn encodings(settings: &Settings) -> Vec<Encoding> {
+/// The servos of one bus.
+fn encodings(settings: &Settings, bus: usize) -> Vec<Encoding> {
     let encoding = |servo: &taustream_arm::Servo| {
         let cia402 = servo.protocol.as_cia402()?;
         Some(Encoding {
@@ -140,7 +155,7 @@ fn encodings(settings: &Settings) -> Vec<Encoding> {
             zero_rad: servo.zero_offset_rad,
         })
     };
-    settings.servos.iter().filter_map(encoding).collect()
+    settings.servos.iter().filter(|servo| servo.bus == bus).filter_map(encoding).collect()
 }
 
 fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
@@ -165,7 +180,7 @@ fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
     }
     let place = Place {
         programs,
-        settings: folder.join(settings),
+        settings: arguments.settings.clone().unwrap_or_else(|| folder.join(settings)),
         start_rad: start.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
         output: arguments.output.clone(),
     };
