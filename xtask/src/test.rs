@@ -192,12 +192,23 @@ fn independent_damiao_master_on_vcan(root: &Path, programs: &Path, python: &Path
 }
 
 fn scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
+    scenarios(root, programs, "scenarios on a real vcan0", &[])?;
+    // Ways to carry setpoints: over two buses with modelled bit rates, and packed, staggered and rarer over one.
+    for settings in ["dual-bus", "one-bus"] {
+        let file = format!("config/settings/{settings}.toml");
+        let words = ["--settings", file.as_str(), "--only", "three_goals"];
+        scenarios(root, programs, &format!("three goals with {settings} on a real vcan"), &words)?;
+    }
+    Ok(())
+}
+
+fn scenarios(root: &Path, programs: &Path, what: &str, further: &[&str]) -> Result<()> {
     let output = workspace::target(root).join("scenarios");
     let words = machine(programs, &output)?;
     let (program, rest) = words.split_first().context("no program to run")?;
     let mut command = Command::new(program);
-    command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).current_dir(root);
-    perform("scenarios on a real vcan0", &mut command)
+    command.args(rest).arg(programs.join("scenarios")).arg("--output").arg(&output).args(further);
+    perform(what, command.current_dir(root))
 }
 
 fn damiao_scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
@@ -229,5 +240,19 @@ fn figures_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     let mut command = Command::new(program);
     command.args(rest).arg(programs.join("taustream")).current_dir(root);
     command.args(["bench", "cycle", "--seconds", "8", "--link", "socketcan"]);
-    perform("figures of the cycle on a real vcan0 (not judged)", &mut command)
+    perform("figures of the cycle on a real vcan0 (not judged)", &mut command)?;
+    let mut command = Command::new(program);
+    command.args(rest).arg(programs.join("taustream")).current_dir(root);
+    command.args([
+        "bench",
+        "compare",
+        "vcan6",
+        "dual-bus",
+        "one-bus",
+        "--seconds",
+        "6",
+        "--link",
+        "socketcan",
+    ]);
+    perform("figures of two buses beside one on a real vcan (not judged)", &mut command)
 }
