@@ -68,3 +68,46 @@ fn ways_out_state_the_load_that_the_settings_then_have() {
     assert_eq!(settings.bus_load(7), None);
     assert!(settings.ways_out(7).is_empty());
 }
+
+/// The faults of a text, which has some.
+fn faults_of(file: &Path, text: &str) -> String {
+    Settings::from_toml(file, text).unwrap_err().to_string()
+}
+
+#[test]
+fn rare_setpoints_and_answers_must_fit_the_watchdogs_and_the_supervision() {
+    let edited = |bus: &str, from: &str, to: &str| {
+        let text = text_with(bus);
+        assert!(text.contains(from), "no `{from}`");
+        text.replace(from, to)
+    };
+    let slow =
+        edited("virtual = true\nsetpoint_every = 10", "drive_watchdog_ms = 100", "drive_watchdog_ms = 11");
+    let slow = slow.replace("stall_resume_ms = 20", "stall_resume_ms = 5");
+    let said = faults_of(&file(), &slow);
+    assert!(said.contains("bus[0].setpoint_every = 10") && said.contains("11 ms as it stands"), "{said}");
+    let late = edited(
+        "virtual = true\nfeedback_every = 10",
+        "feedback_age_s_max = 0.05",
+        "feedback_age_s_max = 0.01",
+    );
+    let said = faults_of(&file(), &late);
+    assert!(said.contains("bus[0].feedback_every = 10") && said.contains("0.011 s or more"), "{said}");
+}
+
+#[test]
+fn one_servo_alone_shares_no_frame() {
+    let two = file().with_file_name("dual-bus.toml");
+    let mut text = std::fs::read_to_string(&two).unwrap();
+    for (from, to) in [
+        ("bus = \"wrist\"\nnode_id = 1\n", "bus = \"base\"\nnode_id = 4\n"),
+        ("bus = \"wrist\"\nnode_id = 2\n", "bus = \"base\"\nnode_id = 5\n"),
+        ("interface = \"vcan0\"\nbitrate_bit_s = 1000000", "interface = \"vcan0\"\nvirtual = true"),
+        ("interface = \"vcan1\"\n", "interface = \"vcan1\"\npacked = true\n"),
+    ] {
+        assert!(text.contains(from), "no `{from}`");
+        text = text.replace(from, to);
+    }
+    let said = faults_of(&two, &text);
+    assert!(said.contains("bus[1].packed = true") && said.contains("two servos on the bus"), "{said}");
+}

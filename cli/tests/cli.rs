@@ -1,6 +1,8 @@
 //! The real `taustream` command, as users meet it.
 #[path = "cli/bad_input.rs"]
 mod bad_input;
+#[path = "cli/buses.rs"]
+mod buses;
 #[path = "cli/common.rs"]
 mod common;
 #[path = "cli/doctor.rs"]

@@ -3,7 +3,7 @@ use super::bench::{Bench, NODE, enabled, parameters};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use std::path::Path;
 use taustream_arm::Settings;
-use taustream_drivers::sim::settings::drives;
+use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{FaultOrder, Order, ServoParameters};
 use taustream_drivers::{CanFrame, CanId};
 
@@ -136,6 +136,21 @@ fn every_fault_of_the_simulator_section_is_reported_at_once() {
         assert_eq!(text.matches(words).count(), 1, "{words} in:\n{text}");
     }
     assert_eq!(text.lines().count(), 9, "{text}");
+}
+
+#[test]
+fn keys_of_modelled_buses_are_checked_too() {
+    for (section, words) in [
+        ("bus_queue_frames = 0", "simulator.bus_queue_frames = 0: expected a whole number from 1 to 4096"),
+        ("bus_queue_frames = 5000", "simulator.bus_queue_frames = 5000"),
+        ("bus_queue_frames = \"many\"", "simulator.bus_queue_frames = \"many\""),
+    ] {
+        let text = queue_frames(&settings_with(section)).unwrap_err().to_string();
+        assert!(text.contains(words), "{section}: {text}");
+    }
+    assert_eq!(queue_frames(&settings_with("")), Ok(64));
+    let text = drives(&settings_with("dummy_mapping = 3"), None).unwrap_err().to_string();
+    assert!(text.contains("simulator.dummy_mapping = 3: expected true or false"), "{text}");
 }
 
 #[test]
