@@ -47,7 +47,7 @@ pub fn as_plain(
             }
             // A controlword alone: what a shared frame's target belongs to.
             (Some(node), None) if frame.data.len() == 2 => {
-                tell(&mut nodes, node, |it| it.control = frame.data)
+                tell(&mut nodes, node, |it| it.control = frame.data);
             }
             (Some(node), None) => {
                 tell(&mut nodes, node, |it| {
@@ -75,6 +75,9 @@ pub fn as_plain(
     Ok(plain)
 }
 
+/// Logged setpoints by the number of the SYNC that they follow, with the cycle's number.
+type Wanted = BTreeMap<u64, (u64, Vec<f64>)>;
+
 /// What was heard of a node.
 #[derive(Clone, Debug, Default)]
 struct Node {
@@ -92,8 +95,7 @@ fn tell(nodes: &mut BTreeMap<u32, Node>, node: u32, change: impl FnOnce(&mut Nod
     }
 }
 
-/// Logged setpoints by the number of the SYNC that they follow, with the cycle's number.
-fn wanted_by_sync(log: &[Event], bus: usize) -> BTreeMap<u64, (u64, Vec<f64>)> {
+fn wanted_by_sync(log: &[Event], bus: usize) -> Wanted {
     let mut wanted = BTreeMap::new();
     for event in log {
         if let Event::Cycle(cycle) = event
@@ -110,7 +112,7 @@ fn fill(
     plain: &mut Vec<BusFrame>,
     sync: u64,
     nodes: &mut BTreeMap<u32, Node>,
-    (wanted, encodings): (&BTreeMap<u64, (u64, Vec<f64>)>, &[Encoding]),
+    (wanted, encodings): (&Wanted, &[Encoding]),
     traffic: Traffic,
 ) -> Result<(), Flaw> {
     let logged = wanted.get(&sync);

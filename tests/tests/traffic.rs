@@ -42,6 +42,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
         log.push(Event::Cycle(Cycle {
             tick: u64::from(cycle),
             time_ns: u64::from(cycle) * 1_000_000,
+            frames: vec![2 * u64::from(cycle) + 5],
             sync: vec![u64::from(cycle)],
             phase: "holding".into(),
             trajectory_id: 0,

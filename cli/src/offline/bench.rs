@@ -29,11 +29,11 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         allow_non_realtime: *allow_non_realtime,
     };
     form.progress(format_args!("measuring for {seconds} s, the two loops in turns ({slices} slices) .."));
-    form.print(&Answer(cycle(&options).map_err(failure)?))
+    form.print(&Answer(cycle(&options).map_err(|error| failure(&error))?))
 }
 
 /// Why nothing was measured, as a failure of the command.
-pub(super) fn failure(error: BenchError) -> Failure {
+pub(super) fn failure(error: &BenchError) -> Failure {
     match error {
         BenchError::Options { .. } => Failure::Usage(error.to_string()),
         BenchError::Link(_) | BenchError::Rights(_) | BenchError::NotMoving(_) | BenchError::System(_) => {

@@ -30,7 +30,7 @@ pub(super) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
     };
     let count = arms.len();
     form.progress(format_args!("measuring {count} arms for {seconds} s each, in {slices} rounds .."));
-    form.print(&Answer(compare(&options, beside).map_err(super::bench::failure)?))
+    form.print(&Answer(compare(&options, beside).map_err(|error| super::bench::failure(&error))?))
 }
 
 impl fmt::Display for Answer {

@@ -1,9 +1,10 @@
 //! Buses in `taustream check`: the table, the verdict, the ways out.
+#![expect(clippy::expect_used, reason = "a helper of tests fails by panicking")]
 use crate::common::{Scratch, config};
 
 /// The shipped six servos on one bus that `keys` describe; its file names robot and scene by whole paths.
 fn one_bus(scratch: &Scratch, keys: &str) -> String {
-    let text = std::fs::read_to_string(config().join("settings/vcan6.toml")).unwrap();
+    let text = std::fs::read_to_string(config().join("settings/vcan6.toml")).expect("shipped settings");
     assert!(text.contains("virtual = true"));
     let text = text.replace("virtual = true", keys).replace("\"../", &format!("\"{}/", config().display()));
     scratch.write("one.toml", &text).display().to_string()
