@@ -18,6 +18,7 @@ pub mod draw;
 pub mod fault;
 mod hull;
 mod identifiers;
+pub mod last_pose;
 pub mod lookup;
 mod mesh;
 pub mod protocol;

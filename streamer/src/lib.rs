@@ -19,6 +19,7 @@ pub mod guard;
 mod health;
 pub mod intake;
 pub mod log;
+pub mod memory;
 pub mod names;
 mod operator;
 pub mod phases;

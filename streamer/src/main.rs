@@ -10,13 +10,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use taustream_arm::daemon::{self, Manager};
-use taustream_arm::{Kind, Settings, find};
+use taustream_arm::{Kind, Settings, find, last_pose};
 use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
 use taustream_streamer::intake::{self, Desk, Leave, Leaver};
+use taustream_streamer::memory::{self, Keeper};
 use taustream_streamer::recorder::{Candidate, Recorder};
 use taustream_streamer::report::Readers;
 use taustream_streamer::rt;
@@ -52,7 +53,11 @@ fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
     let (queues, desk) = intake::pair();
     let leaver = desk.leaver();
     let recording = arguments.cycle_log.is_some();
-    let core = Core::new(&settings, buses, queues, recording);
+    let mut core = Core::new(&settings, buses, queues, recording);
+    let state = last_pose::directory(arguments.state_dir.as_deref());
+    core.recall(&memory::recall(&settings, &state));
+    let keeper =
+        Keeper::start(&settings, state).context("cannot start the thread that keeps the last pose")?;
     let readers = core.readers();
 
     lock_memory(arguments.allow_non_realtime)?;
@@ -67,7 +72,7 @@ fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
     let settings = Arc::new(settings);
     let stop = Arc::new(AtomicBool::new(false));
     let candidates = recording.then_some(candidates);
-    let service = start_service(&settings, desk, readers, candidates, Arc::clone(&stop))?;
+    let service = start_service(&settings, (desk, readers), candidates, keeper, Arc::clone(&stop))?;
     forward_signals(leaver)?;
 
     let outcome = run_real_time(core, &settings, arguments.allow_non_realtime, &described);
@@ -105,17 +110,17 @@ fn lock_memory(allowed_without: bool) -> Result<()> {
 
 fn start_service(
     settings: &Arc<Settings>,
-    desk: Desk,
-    readers: Readers,
+    (desk, readers): (Desk, Readers),
     candidates: Option<Sender<Candidate>>,
+    keeper: Keeper,
     stop: Arc<AtomicBool>,
 ) -> Result<thread::JoinHandle<()>> {
     let (opened, result) = channel();
     let settings = Arc::clone(settings);
     let work = move || match Service::open(&settings, desk, readers, candidates) {
-        Ok(mut service) => {
+        Ok(service) => {
             let _ = opened.send(Ok(()));
-            service.serve(&stop);
+            service.keeping(keeper).serve(&stop);
         }
         Err(e) => {
             let _ = opened.send(Err(e));

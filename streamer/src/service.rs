@@ -8,6 +8,7 @@ use crate::check::{Checked, Checker};
 use crate::facts::{Asked, Decision, Verdict};
 use crate::intake::{COMMANDS_PENDING_MAX, Desk};
 use crate::log;
+use crate::memory::Keeper;
 use crate::names::Names;
 use crate::recorder::Candidate;
 use crate::report::{Note, Readers};
@@ -70,6 +71,7 @@ pub struct Service {
     rejected: u64,
     manager: Manager,
     told: Option<Phase>,
+    keeper: Option<Keeper>,
 }
 
 /// Why the service thread cannot serve.
@@ -127,7 +129,14 @@ impl Service {
             rejected: 0,
             manager: Manager::from_environment(),
             told: None,
+            keeper: None,
         })
+    }
+
+    /// The same, keeping the last pose on disk.
+    #[must_use]
+    pub fn keeping(self, keeper: Keeper) -> Self {
+        Self { keeper: Some(keeper), ..self }
     }
 
     /// Serves until `stop`; then tells what is left to tell.
@@ -353,6 +362,9 @@ impl Service {
             };
             self.report_sequence += 1;
             self.lateness_window.reset();
+            if let Some(keeper) = &mut self.keeper {
+                keeper.note(&report);
+            }
             if let Err(e) = self.reports.send_copy(report) {
                 error!("cannot publish a report: {e:?}");
             }
