@@ -72,6 +72,7 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
         Action::Stop(args) => command(form, settings, Command::Stop, args.waiting.wait_s),
         Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
+        Action::Reference(args) => live::reference::run(form, settings, args),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Watch(args) => live::watch::run(form, settings, args),
         Action::Doctor(args) => doctor::run(form, settings, args),

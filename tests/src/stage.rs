@@ -170,7 +170,18 @@ impl Stage {
         simulator.await_words("taustream-servosim ready")?;
         let log = dir.join("cycles.jsonl");
         let log_arg = log.to_str().context("the log's path is not UTF-8")?;
-        let streamer_args = ["--settings", settings_arg, "--link", "socketcan", "--cycle-log", log_arg];
+        let state = dir.join("state");
+        let state_arg = state.to_str().context("the state directory's path is not UTF-8")?;
+        let streamer_args = [
+            "--settings",
+            settings_arg,
+            "--link",
+            "socketcan",
+            "--cycle-log",
+            log_arg,
+            "--state-dir",
+            state_arg,
+        ];
         let mut streamer = Process::start(&program("taustream-streamer"), &streamer_args, &dir, "streamer")?;
         streamer.await_words("taustream-streamer ready")?;
         let mut planner =

@@ -36,6 +36,41 @@ pub(crate) struct StopArgs {
     pub(crate) waiting: CommandArgs,
 }
 
+const REFERENCE_HELP: &str = "\
+Examples:
+  taustream reference                                       what is known, and what each joint's feedback can mean
+  taustream reference --joint elbow --at-rad 1.57           the elbow stands at 1.57 rad: you have looked
+  taustream reference --confirm                             what is shown is where the arm stands: you have looked
+
+A feedback that repeats itself (`feedback = \"wraps\"`) tells an angle but for whole turns, and one that counts from where it
+was switched on (\"incremental\") tells none. A wrong turn looks right and sends the joint the wrong way, so such a joint is
+energised only when its turn is known: from the last pose on disk, or from you. Look at the arm, not at the screen. It is
+taken only while nothing is energised and the arm rests; --at-rad may miss a turn of the feedback by 0.4 of it. Changing
+sign, gear, zero or drive in the settings makes it necessary anew.";
+
+/// `taustream reference`
+#[derive(Args, Debug)]
+#[command(after_help = REFERENCE_HELP)]
+pub(crate) struct ReferenceArgs {
+    /// Joint, by its name or its number from 1; without it, all.
+    #[arg(long, value_name = "JOINT")]
+    pub(crate) joint: Option<String>,
+    /// Where the joint stands, rad, by your own eyes or a mark on the arm.
+    #[arg(long, value_name = "RAD", allow_hyphen_values = true, conflicts_with = "confirm", value_parser = angle_rad)]
+    pub(crate) at_rad: Option<f64>,
+    /// What is shown is where the joint stands; for joints whose feedback can mean one angle only.
+    #[arg(long)]
+    pub(crate) confirm: bool,
+}
+
+/// An angle: a finite number.
+fn angle_rad(text: &str) -> Result<f64, String> {
+    text.parse::<f64>()
+        .ok()
+        .filter(|angle| angle.is_finite())
+        .ok_or_else(|| "expected a finite number of rad".to_owned())
+}
+
 const REPLAN_HELP: &str = "\
 Examples:
   taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait

@@ -2,7 +2,9 @@
 mod live;
 mod offline;
 
-pub(crate) use live::{CommandArgs, DemoArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs};
+pub(crate) use live::{
+    CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
+};
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs,
     PlotArgs, SampleArgs,
@@ -99,6 +101,8 @@ pub(crate) enum Action {
     TorqueOff(CommandArgs),
     /// Forget a fault whose cause is gone; `enable` makes the arm ready again.
     ClearFault(CommandArgs),
+    /// Show which joints' turns are known, or say where a joint stands.
+    Reference(ReferenceArgs),
     /// Show what the streamer does: phase, joints, timing, bus.
     Status,
     /// Show what the streamer does, live, until you leave it; the arm does not notice.

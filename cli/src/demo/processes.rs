@@ -58,7 +58,9 @@ impl Processes {
         all.add(form, "taustream-servosim", &words(&["--link", &link, "--start-rad", &start]))?;
 
         let mut streamer = words(&["--link", &link, "--cycle-log"]);
+        let state = cycle_log.with_file_name("state");
         streamer.push(cycle_log.into_os_string());
+        streamer.extend(["--state-dir".into(), state.into_os_string()]);
         if let Err(refused) = all.add(form, "taustream-streamer", &streamer) {
             // The streamer's own refusal names the option exactly when rights are missing.
             if !refused.to_string().contains("--allow-non-realtime") {

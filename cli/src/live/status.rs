@@ -7,7 +7,7 @@ use crate::words::fault_sentence;
 use serde::Serialize;
 use std::fmt;
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusReport, Phase, Report};
+use taustream_messages::{BusReport, Phase, Report, Standing};
 
 /// One joint.
 #[derive(Debug, Serialize)]
@@ -25,6 +25,9 @@ struct JointStatus {
     feedback_age_s: f64,
     drive_status: u32,
     drive_error: u32,
+    /// Its turn is known; only then it may be energised.
+    referenced: bool,
+    reference: &'static str,
 }
 
 /// The fault of the arm.
@@ -78,6 +81,10 @@ pub(crate) struct Status {
     fault: Option<FaultStatus>,
     sigma: f64,
     speed_percent: f64,
+    /// The speed is still that of the start.
+    first_speed: bool,
+    /// Drives are kept as they were found holding at start.
+    adopted: bool,
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
     buses: Vec<BusStatus>,
@@ -136,6 +143,8 @@ impl Status {
             fault,
             sigma: r.sigma,
             speed_percent: r.speed_percent,
+            first_speed: r.first_speed == 1,
+            adopted: r.adopted == 1,
             motion,
             joints: joints(r, arm),
             buses: buses(r, arm),
@@ -179,6 +188,8 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
             feedback_age_s: at(&r.feedback_age_s, j),
             drive_status: word(&r.drive_status, j),
             drive_error: word(&r.drive_error, j),
+            referenced: Standing::from_code(word(&r.standing, j)).is_referenced(),
+            reference: Standing::from_code(word(&r.standing, j)).word(),
         })
         .collect()
 }
@@ -213,6 +224,18 @@ impl fmt::Display for Status {
             "arm {}: {}, {energised}, speed {} %, sigma {:.3}",
             self.arm, self.phase, self.speed_percent, self.sigma
         )?;
+        if self.first_speed {
+            writeln!(f, "the first speed after start: `taustream speed 100` lifts it")?;
+        }
+        if self.adopted {
+            writeln!(
+                f,
+                "drives hold from before this start, as this arm's settings left them: `enable` takes them over"
+            )?;
+        }
+        for joint in self.joints.iter().filter(|joint| !joint.referenced) {
+            writeln!(f, "joint {} is not referenced: {}", joint.name, joint.reference)?;
+        }
         if let Some(fault) = &self.fault {
             writeln!(f, "fault: {}", fault.message)?;
         }

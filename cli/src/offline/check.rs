@@ -9,7 +9,7 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
-use taustream_arm::{Robot, Scene, Servo, Settings, TrajectoryFile};
+use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
@@ -110,6 +110,11 @@ struct ServoLine {
     own: ProtocolLine,
     zero_offset_rad: f64,
     limp_is_safe: bool,
+    /// What the drive does when setpoints stop coming.
+    reaction: &'static str,
+    /// What the feedback knows after power-up.
+    feedback: &'static str,
+    feedback_range_rad: [f64; 2],
 }
 
 /// Settings that are sound.
@@ -138,6 +143,9 @@ impl CheckedSettings {
             own: ProtocolLine(servo.protocol),
             zero_offset_rad: servo.zero_offset_rad,
             limp_is_safe: servo.limp_is_safe,
+            reaction: servo.reaction.word(),
+            feedback: servo.feedback.word(),
+            feedback_range_rad: servo.feedback_range_rad,
         };
         let buses = settings.buses.iter().enumerate();
         Self {
@@ -176,6 +184,27 @@ impl fmt::Display for CheckedSettings {
                 "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>12.6}  {limp:<14}  {}",
                 s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
+        }
+        writeln!(f, "  when setpoints stop coming, because the streamer or the bus died:")?;
+        for reaction in Reaction::ALL {
+            let of = |s: &&ServoLine| s.reaction == reaction.word();
+            let joints: Vec<&str> = self.servos.iter().filter(of).map(|s| s.joint.as_str()).collect();
+            if !joints.is_empty() {
+                writeln!(f, "    {}: {}: each {}", reaction.word(), joints.join(", "), reaction.sentence())?;
+            }
+        }
+        writeln!(f, "  after power-up, a joint's turn is known:")?;
+        for s in &self.servos {
+            let [low, high] = s.feedback_range_rad;
+            let how = match s.feedback {
+                "multi-turn" => "by its feedback".to_owned(),
+                "wraps" => format!(
+                    "by the last pose on disk or the operator, unless its range leaves one turn (its feedback repeats after {:.6} rad)",
+                    high - low
+                ),
+                _ => "by the operator alone (`taustream reference`)".to_owned(),
+            };
+            writeln!(f, "    {:<18} {how}", s.joint)?;
         }
         let full = self.buses.iter().filter(|bus| bus.is_refused()).count();
         if full == 0 {
