@@ -202,6 +202,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Stop(_)
         | Action::TorqueOff(_)
         | Action::ClearFault(_)
+        | Action::Reference(_)
         | Action::Status
         | Action::Watch(_) => true,
         Action::Plan(_)
