@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Write every cycle to this file, one JSON object a line.
     #[arg(long, value_name = "FILE")]
     pub cycle_log: Option<PathBuf>,
-    /// Where the last pose is kept [default: $STATE_DIRECTORY, $XDG_STATE_HOME/taustream, ~/.local/state/taustream].
+    /// Where the last pose is kept; default: `$STATE_DIRECTORY`, `$XDG_STATE_HOME/taustream`, `~/.local/state/taustream`.
     #[arg(long, value_name = "DIR")]
     pub state_dir: Option<PathBuf>,
 }

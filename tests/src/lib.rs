@@ -17,6 +17,7 @@ pub mod damiao_scenarios;
 pub mod debian;
 pub mod machine;
 pub mod mit_setpoints;
+pub mod restart_scenarios;
 pub mod scenarios;
 mod scratch;
 pub mod services;

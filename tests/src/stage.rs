@@ -235,6 +235,29 @@ impl Stage {
         self.planner.await_words("taustream-planner ready")
     }
 
+    /// Starts the streamer again after its end, as a service manager would. Its cycles are not logged: a log ends with its
+    /// streamer.
+    ///
+    /// # Errors
+    /// When it does not come up.
+    pub fn restart_streamer(&mut self) -> Result<()> {
+        let settings = self.settings_file.to_str().context("path is not UTF-8")?;
+        let state = self.dir.join("state");
+        let state = state.to_str().context("path is not UTF-8")?;
+        let args = ["--settings", settings, "--link", "socketcan", "--state-dir", state];
+        let program = self.programs.join("taustream-streamer");
+        self.streamer = Process::start(&program, &args, &self.dir, "streamer-again")?;
+        self.streamer.await_words("taustream-streamer ready")
+    }
+
+    /// What candump has written so far.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn recorded(&self) -> Result<String> {
+        Ok(fs::read_to_string(&self.candump.stdout)?)
+    }
+
     /// Starts another streamer on the same bus and waits for its end.
     ///
     /// # Errors

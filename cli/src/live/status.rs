@@ -216,14 +216,9 @@ fn buses(r: &Report, arm: &ArmName) -> Vec<BusStatus> {
     r.buses().iter().enumerate().map(status).collect()
 }
 
-impl fmt::Display for Status {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let energised = if self.energised { "energised" } else { "not energised" };
-        writeln!(
-            f,
-            "arm {}: {}, {energised}, speed {} %, sigma {:.3}",
-            self.arm, self.phase, self.speed_percent, self.sigma
-        )?;
+impl Status {
+    /// What has to be known before the arm is trusted to move.
+    fn trust(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.first_speed {
             writeln!(f, "the first speed after start: `taustream speed 100` lifts it")?;
         }
@@ -236,6 +231,19 @@ impl fmt::Display for Status {
         for joint in self.joints.iter().filter(|joint| !joint.referenced) {
             writeln!(f, "joint {} is not referenced: {}", joint.name, joint.reference)?;
         }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let energised = if self.energised { "energised" } else { "not energised" };
+        writeln!(
+            f,
+            "arm {}: {}, {energised}, speed {} %, sigma {:.3}",
+            self.arm, self.phase, self.speed_percent, self.sigma
+        )?;
+        self.trust(f)?;
         if let Some(fault) = &self.fault {
             writeln!(f, "fault: {}", fault.message)?;
         }

@@ -9,7 +9,7 @@ use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
 use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
 use taustream_tests::stage::{Place, Stage};
 use taustream_tests::traffic::as_plain;
-use taustream_tests::{bus_scenarios, candump, cycle_log};
+use taustream_tests::{bus_scenarios, candump, cycle_log, restart_scenarios};
 
 /// Runs the scenarios over the real processes on a real vcan0.
 #[derive(Parser, Debug)]
@@ -54,7 +54,11 @@ fn run(arguments: &Arguments) -> Result<usize> {
     }
     let all = scenarios::ALL.iter().chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
-    ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
+    let restarts: Vec<_> = restart_scenarios::ALL
+        .iter()
+        .filter(|r| r.name.contains(&arguments.only) && settings.buses.len() == 1)
+        .collect();
+    ensure!(!(chosen.is_empty() && restarts.is_empty()), "no scenario is called `{}`", arguments.only);
     let mut failed = 0;
     for scenario in &chosen {
         let since = Instant::now();
@@ -71,7 +75,25 @@ fn run(arguments: &Arguments) -> Result<usize> {
             }
         }
     }
-    println!("{} passed, {failed} failed", chosen.len() - failed);
+    for restart in &restarts {
+        let tries = (1..=TRIES).map(|attempt| (attempt, restart_scenarios::perform(restart, &place, &goals)));
+        let ended = tries.inspect(|(attempt, result)| {
+            if let (Err(error), true) = (result, *attempt < TRIES) {
+                println!("       {}: trying again: {error:#}", restart.name);
+            }
+        });
+        let Some((_, result)) = ended.into_iter().find(|(attempt, r)| r.is_ok() || *attempt == TRIES) else {
+            continue;
+        };
+        match result {
+            Ok(seen) => println!("ok     {}: {seen}", restart.name),
+            Err(error) => {
+                failed += 1;
+                println!("FAILED {}: {error:#}", restart.name);
+            }
+        }
+    }
+    println!("{} passed, {failed} failed", chosen.len() + restarts.len() - failed);
     Ok(failed)
 }
 
