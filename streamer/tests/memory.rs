@@ -1,5 +1,10 @@
 //! The last pose: what is written when, what is believed at the next start, and how turns are chosen by it.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test ends by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a test ends by panicking and may sleep"
+)]
 use std::path::{Path, PathBuf};
 use taustream_arm::last_pose::LastPose;
 use taustream_arm::{Feedback, Settings};
