@@ -1,7 +1,7 @@
 //! The live view of an arm: what `watch` and `demo` show while it moves.
 //!
 //! [`picture`] turns a report into lines whose parts say what they mean; [`screen`] puts lines on a terminal, in colour
-//! or not. Everything that is not a terminal gets [`line`].
+//! or not. Everything that is not a terminal gets [`line()`].
 mod bar;
 mod joints;
 mod picture;
