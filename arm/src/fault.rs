@@ -1,5 +1,5 @@
 //! What is wrong with a file: every fault at once.
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// One fault of a file.
@@ -27,17 +27,19 @@ impl Fault {
 }
 
 impl fmt::Display for Fault {
+    /// One line; what a hostile file smuggles in stands escaped, so that it cannot steer a terminal.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (key, value, expected) = (&self.key, &self.value, &self.expected);
-        write!(f, "{}", self.file.display())?;
-        if let Some(line) = self.line {
-            write!(f, ":{line}")?;
+        let line = self.line.map(|line| format!(":{line}")).unwrap_or_default();
+        let key = if self.key.is_empty() { String::new() } else { format!("{} = ", self.key) };
+        let text = format!("{}{line}: {key}{}: expected {}", self.file.display(), self.value, self.expected);
+        for character in text.chars() {
+            if character.is_control() {
+                write!(f, "{}", character.escape_default())?;
+            } else {
+                f.write_char(character)?;
+            }
         }
-        if key.is_empty() {
-            write!(f, ": {value}: expected {expected}")
-        } else {
-            write!(f, ": {key} = {value}: expected {expected}")
-        }
+        Ok(())
     }
 }
 
@@ -71,5 +73,11 @@ mod tests {
         let both = Faults(vec![fault.clone(), fault]);
         assert_eq!(both.to_string().lines().count(), 2);
         assert!(both.to_string().starts_with("ur5.toml:7: 3: expected a name"), "{both}");
+    }
+
+    #[test]
+    fn fault_shown_escapes_what_would_steer_a_terminal() {
+        let fault = Fault::new(Path::new("a\0b.toml"), "", "\u{1b}[2J", "a name");
+        assert_eq!(fault.to_string(), "a\\u{0}b.toml: \\u{1b}[2J: expected a name");
     }
 }
