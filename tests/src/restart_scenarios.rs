@@ -2,6 +2,7 @@
 //!
 //! The stage's recording goes on over the kill; the judge of setpoints does not, because a log ends with its streamer.
 use crate::candump;
+use crate::patience::Failed;
 use crate::scenarios::Goals;
 use crate::stage::{Place, Stage};
 use anyhow::{Context, Result, ensure};
@@ -44,16 +45,16 @@ fn holding_settings(place: &Place) -> Result<PathBuf> {
 ///
 /// # Errors
 /// What did not hold.
-pub fn perform(restart: &Restart, place: &Place, goals: &Goals) -> Result<String> {
+pub fn perform(restart: &Restart, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let settings = holding_settings(place)?;
     let place = Place { settings: settings.clone(), ..place.clone() };
-    let outcome = kill_and_restart(restart, &place, goals);
-    fs::remove_file(&settings)?;
-    outcome
+    let mut stage = Stage::open(&place, &format!("{}-{attempt}", restart.name))?;
+    let outcome = kill_and_restart(restart, &mut stage, goals);
+    fs::remove_file(&settings).context("the settings of this scenario cannot be removed")?;
+    outcome.map_err(|error| Failed { stalled: stage.was_stalled(), error })
 }
 
-fn kill_and_restart(restart: &Restart, place: &Place, goals: &Goals) -> Result<String> {
-    let mut stage = Stage::open(place, restart.name)?;
+fn kill_and_restart(restart: &Restart, stage: &mut Stage, goals: &Goals) -> Result<String> {
     stage.cli_done(&["enable"])?;
     stage.await_phase(Phase::Holding)?;
     if restart.mid_motion {

@@ -1,11 +1,13 @@
 //! Runs the scenarios of Damiao motors on a real vcan0 and judges their recordings. Meant to run inside the test machine.
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 use taustream_tests::damiao_scenarios::{ALL, Scenario};
+use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::mit_setpoints::{LogEnds, encodings, judge};
+use taustream_tests::patience::{Failed, with_patience};
 use taustream_tests::scenarios::Goals;
 use taustream_tests::setpoints::{BusFrame, Verdict};
 use taustream_tests::stage::{Place, Stage};
@@ -28,9 +30,6 @@ struct Arguments {
     only: String,
 }
 
-/// How often a scenario is tried on a host that stalls the machine.
-const TRIES: usize = 3;
-
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(0) => ExitCode::SUCCESS,
@@ -49,7 +48,7 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let mut failed = 0;
     for scenario in &chosen {
         let since = Instant::now();
-        let result = perform_with_patience(scenario, &place, &goals);
+        let result = with_patience(scenario.name, |attempt| perform(scenario, &place, &goals, attempt));
         let took_s = since.elapsed().as_secs_f64();
         match result {
             Ok(v) => println!(
@@ -66,33 +65,14 @@ fn run(arguments: &Arguments) -> Result<usize> {
     Ok(failed)
 }
 
-/// Tries a scenario again, aloud, when the host held the whole machine up. A fault of the product comes back in every try.
-fn perform_with_patience(scenario: &Scenario, place: &Place, goals: &Goals) -> Result<Verdict> {
-    for attempt in 1..TRIES {
-        let folder = format!("{}-{attempt}", scenario.name);
-        match perform(scenario, place, goals, &folder) {
-            Err(error) if was_stalled(place, &folder) => {
-                let reason: String = error.to_string().chars().take(160).collect();
-                println!("       {}: the host stalled the machine, trying again: {reason}", scenario.name);
-            }
-            outcome => return outcome,
-        }
-    }
-    perform(scenario, place, goals, &format!("{}-{TRIES}", scenario.name))
-}
-
-/// True when the streamer could not run for longer than the motors bridge.
-fn was_stalled(place: &Place, folder: &str) -> bool {
-    let said = std::fs::read_to_string(place.output.join(folder).join("streamer.err")).unwrap_or_default();
-    ["no setpoint left for", "loop stalled"].iter().any(|sign| said.contains(sign))
-}
-
-fn perform(scenario: &Scenario, place: &Place, goals: &Goals, folder: &str) -> Result<Verdict> {
-    let mut stage = Stage::open(place, folder)?;
+fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
+    let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
     let motors = encodings(&stage.settings).context("not every servo is a Damiao motor in MIT mode")?;
     let period_s = f64::from(stage.settings.cycle.period_us) * 1e-6;
     let interface = stage.settings.buses.first().context("no bus")?.interface.clone();
-    (scenario.run)(&mut stage, goals)?;
+    if let Err(error) = (scenario.run)(&mut stage, goals) {
+        return Err(Failed { stalled: stage.was_stalled(), error });
+    }
     let (recording, log) = stage.close_whatever_became_of_the_streamer()?;
     let seen = |record: candump::Record| BusFrame {
         id: record.frame.id().raw(),
@@ -108,30 +88,19 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, folder: &str) -> R
     let ends = if scenario.kills { LogEnds::Early } else { LogEnds::WithTheStreamer };
     let verdict = judge((&frames, &cycle_log::parse(&text)?), 0, (&motors, period_s), ends)?;
     // A recording without motion would pass every comparison.
-    ensure!(verdict.on_trajectory > 0, "nothing was compared with a trajectory");
+    if verdict.on_trajectory == 0 {
+        return Err(anyhow!("nothing was compared with a trajectory").into());
+    }
     Ok(verdict)
 }
 
 fn read(arguments: &Arguments) -> Result<(Place, Goals)> {
-    let file = &arguments.demo;
-    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let demo: toml::Table = text.parse().with_context(|| format!("{} is no TOML", file.display()))?;
-    let numbers = |value: &toml::Value| -> Option<Vec<f64>> {
-        value.as_array()?.iter().map(toml::Value::as_float).collect()
-    };
-    let start = demo.get("start_rad").and_then(numbers).context("start_rad is missing")?;
-    let goals = demo.get("goals_rad").and_then(|v| v.as_array()).context("goals_rad is missing")?;
-    let goals: Option<Vec<Vec<f64>>> = goals.iter().map(numbers).collect();
-    let goals = goals.context("goals_rad holds something that is no number")?;
-    if goals.len() < 3 {
-        bail!("{} goals; the scenarios need three", goals.len());
-    }
-    let programs = std::env::current_exe()?.parent().context("no folder of programs")?.to_owned();
+    let demo = DemoFile::read(&arguments.demo)?;
     let place = Place {
-        programs,
+        programs: programs_beside()?,
         settings: arguments.settings.clone(),
-        start_rad: start.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
+        start_rad: demo.start_rad,
         output: arguments.output.clone(),
     };
-    Ok((place, Goals(goals)))
+    Ok((place, demo.goals))
 }

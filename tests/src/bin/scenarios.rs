@@ -1,10 +1,12 @@
 //! Runs every scenario on a real vcan0 and judges every recording. Meant to run inside the test machine.
-use anyhow::{Context, Error, Result, anyhow, bail, ensure};
+use anyhow::{Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use taustream_arm::Settings;
+use taustream_tests::demo_file::{DemoFile, programs_beside};
+use taustream_tests::patience::{Failed, with_patience};
 use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
 use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
 use taustream_tests::stage::{Place, Stage};
@@ -31,9 +33,6 @@ struct Arguments {
     only: String,
 }
 
-/// How often a scenario is tried on a host that stalls the machine.
-const TRIES: usize = 3;
-
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(0) => ExitCode::SUCCESS,
@@ -54,15 +53,14 @@ fn run(arguments: &Arguments) -> Result<usize> {
     }
     let all = scenarios::ALL.iter().chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
-    let restarts: Vec<_> = restart_scenarios::ALL
-        .iter()
-        .filter(|r| r.name.contains(&arguments.only) && settings.buses.len() == 1)
-        .collect();
+    // Written for one bus; where the settings have more, the other settings' run has them.
+    let restarts = if settings.buses.len() == 1 { restart_scenarios::ALL } else { &[] };
+    let restarts: Vec<_> = restarts.iter().filter(|r| r.name.contains(&arguments.only)).collect();
     ensure!(!(chosen.is_empty() && restarts.is_empty()), "no scenario is called `{}`", arguments.only);
     let mut failed = 0;
     for scenario in &chosen {
         let since = Instant::now();
-        let result = perform_with_patience(scenario, &place, &goals);
+        let result = with_patience(scenario.name, |attempt| perform(scenario, &place, &goals, attempt));
         let took_s = since.elapsed().as_secs_f64();
         match result {
             Ok(v) => println!(
@@ -76,15 +74,9 @@ fn run(arguments: &Arguments) -> Result<usize> {
         }
     }
     for restart in &restarts {
-        let tries = (1..=TRIES).map(|attempt| (attempt, restart_scenarios::perform(restart, &place, &goals)));
-        let ended = tries.inspect(|(attempt, result)| {
-            if let (Err(error), true) = (result, *attempt < TRIES) {
-                println!("       {}: trying again: {error:#}", restart.name);
-            }
+        let result = with_patience(restart.name, |attempt| {
+            restart_scenarios::perform(restart, &place, &goals, attempt)
         });
-        let Some((_, result)) = ended.into_iter().find(|(attempt, r)| r.is_ok() || *attempt == TRIES) else {
-            continue;
-        };
         match result {
             Ok(seen) => println!("ok     {}: {seen}", restart.name),
             Err(error) => {
@@ -95,34 +87,6 @@ fn run(arguments: &Arguments) -> Result<usize> {
     }
     println!("{} passed, {failed} failed", chosen.len() + restarts.len() - failed);
     Ok(failed)
-}
-
-/// A scenario that did not end well.
-struct Failed {
-    error: Error,
-    /// The host held the machine up: the streamer's own counters say so.
-    stalled: bool,
-}
-
-impl From<Error> for Failed {
-    fn from(error: Error) -> Self {
-        Self { error, stalled: false }
-    }
-}
-
-/// Tries a scenario again, aloud, when the host held the whole machine up: the arm then pauses or faults, as it must,
-/// and the scenario's own event never comes. A fault of the product comes back in every try.
-fn perform_with_patience(scenario: &Scenario, place: &Place, goals: &Goals) -> Result<Verdict> {
-    for attempt in 1..TRIES {
-        match perform(scenario, place, goals, attempt) {
-            Err(Failed { error, stalled: true }) => {
-                let reason: String = error.to_string().chars().take(160).collect();
-                println!("       {}: the host stalled the machine, trying again: {reason}", scenario.name);
-            }
-            outcome => return outcome.map_err(|failed| failed.error),
-        }
-    }
-    perform(scenario, place, goals, TRIES).map_err(|failed| failed.error)
 }
 
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
@@ -181,30 +145,13 @@ fn encodings(settings: &Settings, bus: usize) -> Vec<Encoding> {
 }
 
 fn read_demo(arguments: &Arguments) -> Result<(Place, Goals)> {
-    let file = &arguments.demo;
-    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let demo: toml::Table = text.parse().with_context(|| format!("{} is no TOML", file.display()))?;
-    let numbers = |value: &toml::Value| -> Option<Vec<f64>> {
-        value.as_array()?.iter().map(toml::Value::as_float).collect()
-    };
-    let start = demo.get("start_rad").and_then(numbers).context("start_rad is missing")?;
-    let goals = demo.get("goals_rad").and_then(|v| v.as_array()).context("goals_rad is missing")?;
-    let goals: Option<Vec<Vec<f64>>> = goals.iter().map(numbers).collect();
-    let goals = goals.context("goals_rad holds something that is no number")?;
-    let settings = demo.get("settings").and_then(|v| v.as_str()).context("settings is missing")?;
-    let folder = file.parent().context("the demo file has no folder")?;
-    let programs = match &arguments.programs {
-        Some(programs) => programs.clone(),
-        None => std::env::current_exe()?.parent().context("no folder of programs")?.to_owned(),
-    };
-    if goals.len() < 3 {
-        bail!("{} goals; the scenarios need three", goals.len());
-    }
+    let demo = DemoFile::read(&arguments.demo)?;
+    let programs = arguments.programs.clone().map_or_else(programs_beside, Ok)?;
     let place = Place {
         programs,
-        settings: arguments.settings.clone().unwrap_or_else(|| folder.join(settings)),
-        start_rad: start.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
+        settings: arguments.settings.clone().unwrap_or(demo.settings),
+        start_rad: demo.start_rad,
         output: arguments.output.clone(),
     };
-    Ok((place, Goals(goals)))
+    Ok((place, demo.goals))
 }

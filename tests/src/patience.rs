@@ -1,0 +1,62 @@
+//! Trying again, aloud, where the host held the whole machine up: the arm then pauses or faults, as it must, and the
+//! scenario's own event never comes. A fault of the product comes back in every try.
+use anyhow::{Error, Result};
+
+/// How often a scenario is tried on a host that stalls the machine.
+const TRIES: usize = 3;
+
+/// A scenario that did not end well.
+#[derive(Debug)]
+pub struct Failed {
+    /// What did not hold.
+    pub error: Error,
+    /// The host held the machine up: the streamer's own counters say so.
+    pub stalled: bool,
+}
+
+impl<E: Into<Error>> From<E> for Failed {
+    fn from(error: E) -> Self {
+        Self { error: error.into(), stalled: false }
+    }
+}
+
+/// Performs a scenario, which is told the number of the attempt; again only after a stall of the host.
+///
+/// # Errors
+/// What did not hold in the last try.
+pub fn with_patience<T>(name: &str, perform: impl Fn(usize) -> Result<T, Failed>) -> Result<T> {
+    for attempt in 1..TRIES {
+        match perform(attempt) {
+            Err(Failed { error, stalled: true }) => {
+                let reason: String = error.to_string().chars().take(160).collect();
+                println!("       {name}: the host stalled the machine, trying again: {reason}");
+            }
+            outcome => return outcome.map_err(|failed| failed.error),
+        }
+    }
+    perform(TRIES).map_err(|failed| failed.error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::anyhow;
+    use std::cell::Cell;
+
+    fn tries(stalled: bool, good_at: usize) -> (usize, bool) {
+        let made = Cell::new(0);
+        let outcome = with_patience("a", |attempt| {
+            made.set(attempt);
+            if attempt == good_at { Ok(()) } else { Err(Failed { error: anyhow!("no"), stalled }) }
+        });
+        (made.get(), outcome.is_ok())
+    }
+
+    #[test]
+    fn scenario_is_tried_again_after_a_stall_only() {
+        assert_eq!(tries(false, 9), (1, false));
+        assert_eq!(tries(true, 9), (3, false));
+        assert_eq!(tries(true, 2), (2, true));
+        assert_eq!(tries(false, 1), (1, true));
+    }
+}
