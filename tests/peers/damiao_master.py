@@ -114,6 +114,8 @@ def modes(ear, motor):
     check(mode(motor, "POS_VEL") == 2, "POS_VEL is taken")
     check(mode(motor, "VEL") == 3, "VEL is taken")
     check(mode(motor, "MIT") == 1, "MIT is taken again")
+    # The ear hears on a thread of its own: what answered the mode must have been counted.
+    time.sleep(0.1)
     before = ear.count(0x11)
     motor.send_raw(bytes(8), arbitration_id=0x101)
     motor.send_raw(bytes(8), arbitration_id=0x201)
