@@ -109,14 +109,18 @@ def registers(motor):
         check(read(motor, number) == before, f"register {number} does not take {value}", read(motor, number))
 
 
+def settled(ear):
+    """What the ear has counted, once everything sent so far is answered: it hears on a thread of its own."""
+    time.sleep(0.1)
+    return ear.count(0x11)
+
+
 def modes(ear, motor):
     """Modes are taken, and a command of another mode is ignored."""
     check(mode(motor, "POS_VEL") == 2, "POS_VEL is taken")
     check(mode(motor, "VEL") == 3, "VEL is taken")
     check(mode(motor, "MIT") == 1, "MIT is taken again")
-    # The ear hears on a thread of its own: what answered the mode must have been counted.
-    time.sleep(0.1)
-    before = ear.count(0x11)
+    before = settled(ear)
     motor.send_raw(bytes(8), arbitration_id=0x101)
     motor.send_raw(bytes(8), arbitration_id=0x201)
     time.sleep(0.1)
@@ -129,7 +133,7 @@ def energise(ear, motor):
     motor.enable()
     check(within(1, lambda: motor.get_states().get("status") == "ENABLED"), "enabled", motor.get_states().get("status"))
     at = motor.get_states()["pos"]
-    before = ear.count(0x11)
+    before = settled(ear)
     sent = stream(1.5, lambda t: motor.send_cmd_mit(at + 0.4 * min(t, 1.0), 0.4 if t < 1.0 else 0.0, 300.0, 4.0))
     time.sleep(0.05)
     answers = ear.count(0x11) - before
@@ -141,7 +145,7 @@ def energise(ear, motor):
     check(motor.get_states()["vel"] > 0.5, "torque without stiffness drives it on", motor.get_states()["vel"])
     stream(0.5, lambda t: motor.send_cmd_mit(0.0, 0.0, 0.0, 5.0))
     check(abs(motor.get_states()["vel"]) < 0.3, "damping alone brings it to rest", motor.get_states()["vel"])
-    before = ear.count(0x11)
+    before = settled(ear)
     motor.request_motor_feedback()
     time.sleep(0.1)
     check(ear.count(0x11) == before + 1, "one feedback for a refresh, and none by itself", ear.count(0x11) - before)
