@@ -13,39 +13,17 @@ import sys
 import threading
 import time
 
-import can
 import canopen
 from canopen import objectdictionary as od
 from canopen.objectdictionary import datatypes as dt
 from canopen.profiles.p402 import BaseNode402
-
-CHECKS = 0
-FAILED = []
+from facts import check, conclude, within
 
 
 def counts_per_rad(node):
     """Encoder counts a radian of the link, as the drive states them."""
     encoder = node.sdo[0x608F][1].raw / node.sdo[0x608F][2].raw
     return encoder * node.sdo[0x6091][1].raw / node.sdo[0x6091][2].raw / (2.0 * math.pi)
-
-
-def check(holds, what, seen=None):
-    """One fact that must hold."""
-    global CHECKS
-    CHECKS += 1
-    print(f"{'ok    ' if holds else 'FAILED'} {what}" + ("" if seen is None else f"  [{seen}]"), flush=True)
-    if not holds:
-        FAILED.append(what)
-
-
-def within(limit_s, condition):
-    """Waits for a condition; whether it came true in time."""
-    end = time.monotonic() + limit_s
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.002)
-    return condition()
 
 
 def dictionary():
@@ -534,7 +512,6 @@ def main():
     """All checks, in the order of a commissioning."""
     servosim, settings = sys.argv[1:3]
     interface = sys.argv[3] if len(sys.argv) > 3 else "vcan0"
-    began = time.monotonic()
     bus = Bus(interface)
     simulator = subprocess.Popen(
         [servosim, "--settings", settings, "--link", "socketcan"], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
@@ -567,9 +544,7 @@ def main():
         simulator.terminate()
         status = simulator.wait(10)
     check(status == 0, "the simulator ends orderly", status)
-    if FAILED:
-        sys.exit(f"CANOPEN MASTER: {len(FAILED)} of {CHECKS} checks failed: {'; '.join(FAILED)}")
-    print(f"CANOPEN MASTER OK: {CHECKS} checks, {time.monotonic() - began:.0f} s")
+    conclude("CANOPEN MASTER")
 
 
 if __name__ == "__main__":

@@ -14,28 +14,7 @@ import time
 
 import can
 from damiao_motor import DaMiaoController
-
-CHECKS = 0
-FAILED = []
-
-
-def check(holds, what, seen=None):
-    """One fact that must hold."""
-    global CHECKS
-    CHECKS += 1
-    print(f"{'ok    ' if holds else 'FAILED'} {what}" + ("" if seen is None else f"  [{seen}]"), flush=True)
-    if not holds:
-        FAILED.append(what)
-
-
-def within(limit_s, condition):
-    """Waits for a condition; whether it came true in time."""
-    end = time.monotonic() + limit_s
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return condition()
+from facts import check, conclude, within
 
 
 class Ear:
@@ -83,8 +62,7 @@ def mode(motor, name):
 
 def stream(seconds, send):
     """Commands at 200 Hz; `send(t)` sends one."""
-    began = time.monotonic()
-    sent = 0
+    sent, began = 0, time.monotonic()
     while (t := time.monotonic() - began) < seconds:
         send(t)
         sent += 1
@@ -236,7 +214,6 @@ def main():
     """All checks, in the order of a commissioning."""
     servosim, settings = sys.argv[1:3]
     interface = sys.argv[3] if len(sys.argv) > 3 else "vcan0"
-    began = time.monotonic()
     ear = Ear(interface)
     simulator = subprocess.Popen(
         [servosim, "--settings", settings, "--link", "socketcan"], stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True
@@ -262,9 +239,7 @@ def main():
         code = simulator.wait(10)
         ear.close()
     check(code == 0, "the simulator ends orderly", code)
-    if FAILED:
-        sys.exit(f"DAMIAO MASTER: {len(FAILED)} of {CHECKS} checks failed: {'; '.join(FAILED)}")
-    print(f"DAMIAO MASTER OK: {CHECKS} checks, {time.monotonic() - began:.0f} s")
+    conclude("DAMIAO MASTER")
 
 
 if __name__ == "__main__":
