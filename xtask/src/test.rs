@@ -215,9 +215,15 @@ fn damiao_scenarios_on_vcan(root: &Path, programs: &Path) -> Result<()> {
     let output = workspace::target(root).join("damiao-scenarios");
     let words = machine(programs, &output)?;
     let (program, rest) = words.split_first().context("no program to run")?;
-    let mut command = Command::new(program);
-    command.args(rest).arg(programs.join("damiao-scenarios")).arg("--output").arg(&output).current_dir(root);
-    perform("scenarios of Damiao motors on a real vcan0", &mut command)
+    for (what, further) in [
+        ("scenarios of Damiao motors on a real vcan0", &[][..]),
+        ("Damiao motors over CAN FD on a real vcan0", &["--fd", "--only", "goals"]),
+    ] {
+        let mut command = Command::new(program);
+        command.args(rest).arg(programs.join("damiao-scenarios")).arg("--output").arg(&output).args(further);
+        perform(what, command.current_dir(root))?;
+    }
+    Ok(())
 }
 
 /// What `cargo xtask install` installs, booted with a Debian whose process 1 is systemd, and tried there.

@@ -1,7 +1,7 @@
 //! Runs the scenarios of Damiao motors on a real vcan0 and judges their recordings. Meant to run inside the test machine.
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use taustream_tests::damiao_scenarios::{ALL, Scenario};
@@ -19,6 +19,9 @@ struct Arguments {
     /// Settings of an arm of Damiao motors in MIT mode.
     #[arg(long, default_value = "config/settings/damiao6.toml")]
     settings: PathBuf,
+    /// Puts the arm on a bus of CAN FD, 1 and 5 Mbit/s, which the simulator models.
+    #[arg(long)]
+    fd: bool,
     /// Demo file: start pose and goals.
     #[arg(long, default_value = "config/demo.toml")]
     demo: PathBuf,
@@ -69,7 +72,8 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
     let motors = encodings(&stage.settings).context("not every servo is a Damiao motor in MIT mode")?;
     let period_s = f64::from(stage.settings.cycle.period_us) * 1e-6;
-    let interface = stage.settings.buses.first().context("no bus")?.interface.clone();
+    let bus = stage.settings.buses.first().context("no bus")?.clone();
+    let interface = bus.interface.clone();
     if let Err(error) = (scenario.run)(&mut stage, goals) {
         return Err(Failed { stalled: stage.was_stalled(), error });
     }
@@ -79,7 +83,13 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
         data: record.frame.data().to_vec(),
     };
     let records = candump::parse(&recording)?.into_iter().filter(|record| record.interface == interface);
-    let frames: Vec<BusFrame> = records.map(seen).collect();
+    let records: Vec<candump::Record> = records.collect();
+    let is_fd = bus.kind.data_bitrate_bit_s().is_some();
+    if let Some(other) = records.iter().find(|record| record.frame.is_fd() != is_fd) {
+        let (got, bus) = if is_fd { ("classic", "CAN FD") } else { ("CAN FD", "classic") };
+        return Err(anyhow!("a {got} frame on a {bus} bus: {:?}", other.frame).into());
+    }
+    let frames: Vec<BusFrame> = records.into_iter().map(seen).collect();
     let mut text = std::fs::read_to_string(&log).with_context(|| format!("cannot read {}", log.display()))?;
     if scenario.kills {
         // The last line may be half a line, and the last cycles none.
@@ -96,11 +106,23 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
 
 fn read(arguments: &Arguments) -> Result<(Place, Goals)> {
     let demo = DemoFile::read(&arguments.demo)?;
+    let settings = if arguments.fd { on_fd(&arguments.settings)? } else { arguments.settings.clone() };
     let place = Place {
         programs: programs_beside()?,
-        settings: arguments.settings.clone(),
+        settings,
         start_rad: demo.start_rad,
         output: arguments.output.clone(),
     };
     Ok((place, demo.goals))
+}
+
+/// The same settings with another bus, beside them, where their robot and scene are found.
+fn on_fd(settings: &Path) -> Result<PathBuf> {
+    let text = std::fs::read_to_string(settings)?;
+    let bus = "bitrate_bit_s = 1000000\ndata_bitrate_bit_s = 5000000";
+    let on_fd = text.replace("virtual = true", bus);
+    ensure!(on_fd != text, "{} has no virtual bus to replace", settings.display());
+    let file = settings.with_file_name("damiao6-fd.toml");
+    std::fs::write(&file, on_fd)?;
+    Ok(file)
 }
