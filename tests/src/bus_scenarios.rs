@@ -16,11 +16,15 @@ pub const ALL: &[Scenario] = &[
     scenario("bus_interface_gone_mid_motion_is_reopened_by_clear_fault", interface_gone),
     scenario("bus_off_and_restarted_mid_motion_is_silent_until_cleared", bus_off),
     scenario("bus_error_passive_mid_motion_stops_on_path_and_holds", error_passive),
+    Scenario {
+        settings: Some("dual-bus.toml"),
+        ..scenario("bus_second_down_mid_motion_first_stops_on_path_and_holds", second_down)
+    },
     scenario("bus_unacknowledged_mid_motion_is_silent_until_cleared", unacknowledged),
 ];
 
 const fn scenario(name: &'static str, run: fn(&mut Stage, &Goals) -> Result<()>) -> Scenario {
-    Scenario { name, run, judged: Judged::WithLosses }
+    Scenario { name, run, judged: Judged::WithLosses, settings: None }
 }
 
 /// Under way to the first goal, slowly: joints that lose their drives coast before their brakes hold them.
@@ -154,6 +158,40 @@ fn error_passive(stage: &mut Stage, goals: &Goals) -> Result<()> {
     stage.await_report("the recovered controller", |r, _| r.buses[0].trouble == 0)?;
     stage.cli_done(&["clear-fault"])?;
     stage.await_phase(Phase::Locked)?;
+    move_on(stage, goals)
+}
+
+/// Of two buses one goes down: the joints of the other are stopped on the path and hold; those that hold come first on
+/// the way back.
+fn second_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
+    under_way(stage, goals)?;
+    stage.run("ip", "link set vcan1 down")?;
+    let report = stage.await_phase(Phase::Fault)?;
+    let cause = report.cause();
+    ensure!(
+        cause.is_some_and(|c| c.reason == FaultReason::BusFault && c.bus == Some(1)),
+        "a fault of the second bus was expected, the report says {cause:?}"
+    );
+    ensure!(report.buses[0].trouble == 0 && report.buses[1].silent == 1, "{:?}", report.buses());
+    let status = stage.cli_done(&["status"])?.stdout;
+    ensure!(status.contains("(vcan1)") && status.contains("ip link set vcan1 up"), "no cure in: {status}");
+    let before = report.buses;
+    let report = stage.await_report("setpoints to hold by on the first bus", |r, _| {
+        r.buses[0].frames_sent > before[0].frames_sent + 100
+    })?;
+    ensure!(report.buses[1].frames_sent == before[1].frames_sent, "frames left on the failed bus");
+    stage.cli_refused(&["clear-fault"], "`disable`")?;
+    stage.cli_done(&["disable"])?;
+    let since = Instant::now();
+    while !stage.cli(&["clear-fault"])?.stderr.contains("ip link set vcan1 up") {
+        ensure!(since.elapsed() < PATIENCE, "clear-fault never came to the bus: {}", stage.streamer.said());
+    }
+    stage.run("ip", "link set vcan1 up")?;
+    let since = Instant::now();
+    while !is_ready_to_enable(stage)? {
+        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared: {}", stage.streamer.said());
+        let _asked_again_if_refused = stage.cli(&["clear-fault"])?;
+    }
     move_on(stage, goals)
 }
 

@@ -37,6 +37,8 @@ pub struct Scenario {
     pub run: fn(&mut Stage, &Goals) -> Result<()>,
     /// How its recording is judged.
     pub judged: Judged,
+    /// Settings, beside those of the run, that it needs instead.
+    pub settings: Option<&'static str>,
 }
 
 /// How a recording is judged.
@@ -50,47 +52,65 @@ pub enum Judged {
 
 /// Every scenario, in the order in which they run.
 pub const ALL: &[Scenario] = &[
-    Scenario { name: "three_goals_round_obstacles_reached", run: three_goals, judged: Judged::Exactly },
+    Scenario {
+        name: "three_goals_round_obstacles_reached",
+        run: three_goals,
+        judged: Judged::Exactly,
+        settings: None,
+    },
     Scenario {
         name: "pause_mid_motion_then_resume_reaches_goal",
         run: pause_and_resume,
         judged: Judged::Exactly,
+        settings: None,
     },
-    Scenario { name: "speed_and_stop_mid_motion_hold_on_path", run: speed_and_stop, judged: Judged::Exactly },
+    Scenario {
+        name: "speed_and_stop_mid_motion_hold_on_path",
+        run: speed_and_stop,
+        judged: Judged::Exactly,
+        settings: None,
+    },
     Scenario {
         name: "planner_killed_mid_motion_motion_finishes",
         run: planner_killed,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "servo_silent_mid_motion_fast_stop_names_joint",
         run: servo_silent,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "servo_fault_mid_motion_fast_stop_names_joint",
         run: servo_fault,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "message_hostile_mid_motion_changes_nothing",
         run: hostile_messages,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "streamer_started_twice_second_is_refused",
         run: started_twice,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "interface_missing_or_down_streamer_says_so",
         run: interface_missing_or_down,
         judged: Judged::Exactly,
+        settings: None,
     },
     Scenario {
         name: "commands_out_of_place_are_refused_with_reason",
         run: commands_out_of_place,
         judged: Judged::Exactly,
+        settings: None,
     },
 ];
 

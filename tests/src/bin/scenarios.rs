@@ -90,7 +90,9 @@ fn run(arguments: &Arguments) -> Result<usize> {
 }
 
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
-    let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
+    let other = scenario.settings.map(|file| place.settings.with_file_name(file));
+    let place = Place { settings: other.unwrap_or_else(|| place.settings.clone()), ..place.clone() };
+    let mut stage = Stage::open(&place, &format!("{}-{attempt}", scenario.name))?;
     let settings = stage.settings.clone();
     if let Err(error) = (scenario.run)(&mut stage, goals) {
         let stalled = stage.was_stalled();
