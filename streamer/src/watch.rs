@@ -17,6 +17,8 @@ pub const TRANSPORT_CYCLES: usize = 2;
 const COMMANDS: usize = TRANSPORT_CYCLES + SETPOINT_EVERY_MAX as usize;
 /// Cycles over which speed is measured to tell rest: long enough for coarse encoders.
 const REST_CYCLES: usize = 32;
+/// Most that one cycle adds to the time in which the loop ran: a wake-up that is late by more is a stall.
+const ATTENDED_PERIODS_MAX: f64 = 2.0;
 /// Speed below which a joint rests.
 pub const REST_RAD_S: f64 = 0.05;
 
@@ -24,6 +26,8 @@ pub const REST_RAD_S: f64 = 0.05;
 #[derive(Clone, Copy, Debug)]
 struct Answers {
     received: Option<Nanos>,
+    /// [`Watch::attended_s`] when it was received.
+    attended_s: f64,
     position_rad: f64,
     jump_rad: f64,
     jump_limit_rad: f64,
@@ -38,6 +42,7 @@ struct Answers {
 impl Answers {
     const NONE: Self = Self {
         received: None,
+        attended_s: 0.0,
         position_rad: f64::NAN,
         jump_rad: 0.0,
         jump_limit_rad: f64::INFINITY,
@@ -61,6 +66,10 @@ pub struct Watch {
     commands_rad: [JointArray; COMMANDS],
     answers: [Answers; MAX_JOINTS],
     slot: usize,
+    /// When the last cycle woke.
+    woke: Option<Nanos>,
+    /// Time in which the loop ran. Drives answer SYNC: while none leaves, their silence is no fault of theirs.
+    attended_s: f64,
 }
 
 impl Watch {
@@ -76,6 +85,8 @@ impl Watch {
             commands_rad: [[0.0; MAX_JOINTS]; COMMANDS],
             answers: [Answers::NONE; MAX_JOINTS],
             slot: 0,
+            woke: None,
+            attended_s: 0.0,
         }
     }
 
@@ -87,6 +98,9 @@ impl Watch {
             self.commands_rad.rotate_right(1);
             self.commands_rad[0] = facts.commanded_rad;
         }
+        let elapsed_s = self.woke.map_or(0.0, |woke| facts.tick.woke.since_s(woke));
+        self.woke = Some(facts.tick.woke);
+        self.attended_s += elapsed_s.min(ATTENDED_PERIODS_MAX * self.period_s);
         self.slot = (self.slot + 1) % REST_CYCLES;
         let joints = self.answers.iter_mut().zip(&facts.servos).zip(&self.transport_cycles);
         for (joint, (((answer, servo), transport_cycles), speed_max)) in
@@ -109,6 +123,7 @@ impl Watch {
                 answer.jump_limit_rad = self.rules.position_jump_rad_max + missed_s * speed_max;
             }
             (answer.received, answer.position_rad) = (Some(received), servo.position_rad);
+            answer.attended_s = self.attended_s;
             answer.tracking_rad = (servo.position_rad - command_rad).abs();
             if facts.live {
                 answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
@@ -170,9 +185,9 @@ impl Watch {
     pub fn feedback_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
         let answer = self.answers.get(joint)?;
         let rules = &self.rules;
-        let age_s = self.age_s(facts, joint);
+        let unheard_s = answer.received.map_or(f64::INFINITY, |_| self.attended_s - answer.attended_s);
         let checks = [
-            (FaultReason::FeedbackLate, age_s, rules.feedback_age_s_max),
+            (FaultReason::FeedbackLate, unheard_s, rules.feedback_age_s_max),
             (FaultReason::PositionJump, answer.jump_rad, answer.jump_limit_rad),
             (FaultReason::TrackingError, answer.tracking_rad, rules.tracking_error_rad_max),
         ];

@@ -168,6 +168,22 @@ fn stall_longer_than_allowed_stays_paused_until_resume() {
     assert_on_path(&rig, &trajectory);
 }
 
+/// Drives answer SYNC, and none leaves during a stall; the answer to the first one after it comes a cycle later.
+#[test]
+fn stall_of_the_loop_is_no_silence_of_a_drive() {
+    let mut rig = Rig::new();
+    rig.move_it();
+    rig.run(600);
+    rig.script(|w| w.silent = Some(3));
+    rig.step_after(40);
+    rig.script(|w| w.silent = None);
+    rig.run(50);
+    assert_eq!((rig.phase(), rig.cause()), (Phase::Paused, None));
+    rig.script(|w| w.silent = Some(3));
+    rig.run_until(Phase::Fault, 40);
+    assert_eq!(rig.cause().unwrap().reason, FaultReason::FeedbackLate);
+}
+
 #[test]
 fn stall_longer_than_the_drives_watchdog_is_a_fault() {
     let mut rig = Rig::new();
