@@ -279,7 +279,7 @@ impl Supervisor {
             if servo.warning {
                 return Err(Why::Warns { joint, status_word: servo.status_word });
             }
-            if let Some(cause) = self.watch.feedback_cause(facts, joint) {
+            if let Some(cause) = self.watch.feedback_cause(joint) {
                 return Err(if cause.reason == FaultReason::FeedbackLate {
                     Why::NoFeedback { joint, age_s: cause.value }
                 } else {

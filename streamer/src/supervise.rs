@@ -375,7 +375,7 @@ impl Supervisor {
                 let sag_rad = (servo.position_rad - servo.held_rad).abs();
                 let limit = rules.tracking_error_rad_max;
                 let far = Cause::new(FaultReason::TrackingError).at_joint(joint).amount(sag_rad, limit);
-                let late = self.watch.late_cause(facts, joint);
+                let late = self.watch.late_cause(joint);
                 late.or_else(|| (sag_rad.is_nan() || sag_rad > limit).then_some(far))
             }
             DriveState::Absent

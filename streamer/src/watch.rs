@@ -148,9 +148,8 @@ impl Watch {
     #[must_use]
     pub fn find_cause(&self, facts: &Facts, enabling: bool) -> Option<Cause> {
         self.bus_cause(facts).or_else(|| {
-            (0..self.joints).find_map(|joint| {
-                drive_cause(facts, joint, enabling).or_else(|| self.feedback_cause(facts, joint))
-            })
+            (0..self.joints)
+                .find_map(|joint| drive_cause(facts, joint, enabling).or_else(|| self.feedback_cause(joint)))
         })
     }
 
@@ -182,7 +181,7 @@ impl Watch {
 
     /// Feedback of one joint that is late, jumps, or is far from its command.
     #[must_use]
-    pub fn feedback_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
+    pub fn feedback_cause(&self, joint: usize) -> Option<Cause> {
         let answer = self.answers.get(joint)?;
         let rules = &self.rules;
         let unheard_s = answer.received.map_or(f64::INFINITY, |_| self.attended_s - answer.attended_s);
@@ -198,8 +197,8 @@ impl Watch {
 
     /// Feedback of one joint that is late or jumps; for a drive that follows no commands of ours.
     #[must_use]
-    pub(crate) fn late_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
-        self.feedback_cause(facts, joint).filter(|cause| cause.reason != FaultReason::TrackingError)
+    pub(crate) fn late_cause(&self, joint: usize) -> Option<Cause> {
+        self.feedback_cause(joint).filter(|cause| cause.reason != FaultReason::TrackingError)
     }
 
     /// Why a drive is not where it should be.
