@@ -2,7 +2,6 @@
 use crate::stage::{PATIENCE, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
-use std::process::Command;
 use std::time::{Duration, Instant};
 use taustream_messages::service::{ReceiptSubscriber, TrajectoryPublisher, Wire};
 use taustream_messages::trajectory::Doctored;
@@ -377,9 +376,9 @@ fn interface_missing_or_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let (status, said) = stage.streamer_on("vcan9")?;
     ensure!(status.code() == Some(1), "a missing interface ended the streamer with {status}: {said}");
     ensure!(said.contains("vcan9") && said.contains("ip link"), "no cure in: {said}");
-    let down = Command::new("ip").args(["link", "set", "vcan1", "down"]).status()?;
-    ensure!(down.success(), "vcan1 cannot be set down: {down}");
+    stage.run("ip", "link set vcan1 down")?;
     let (status, said) = stage.streamer_on("vcan1")?;
+    stage.run("ip", "link set vcan1 up")?;
     ensure!(status.code() == Some(1), "an interface that is down ended the streamer with {status}: {said}");
     ensure!(said.contains("vcan1") && said.contains("up"), "no cure in: {said}");
     arrive(stage, goals.rad(0)?)?;
