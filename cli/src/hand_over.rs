@@ -236,7 +236,7 @@ mod tests {
             understood(&text(&["--settings", "vcan6", "speed", "50", "--json"], None)).unwrap().unwrap();
         assert!(matches!(cli.action, Action::Speed(_)) && cli.json);
         assert_eq!(cli.settings.as_deref(), Some(Path::new("vcan6")));
-        let cli = understood(&text(&["run", "/root/secret.json"], Some("{}"))).unwrap().unwrap();
+        let cli = understood(&text(&["run", "/etc/secret.json"], Some("{}"))).unwrap().unwrap();
         let Action::Run(args) = cli.action else { panic!() };
         assert_eq!(args.text.as_deref(), Some("{}"), "the text that came along, not the file");
     }
