@@ -43,6 +43,21 @@ impl ChainJoint {
     }
 }
 
+/// What one rad/s of a joint does to the tip, in base coordinates: a column of the geometric Jacobian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Velocity of the tip's origin, m/s for each rad/s.
+    pub linear_m: Vector3<f64>,
+    /// Angular velocity of the tip: the joint's axis, of unit length.
+    pub angular: Vector3<f64>,
+}
+
+impl Column {
+    /// Of a joint that is not there, or does nothing.
+    pub const ZERO: Self =
+        Self { linear_m: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };
+}
+
 /// A serial chain of up to 8 joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chain {
@@ -91,6 +106,26 @@ impl Chain {
             *slot = tip;
         }
         frames
+    }
+    /// The pose of the tip, and how each joint moves it: the geometric Jacobian in base coordinates, a column a joint;
+    /// those of unused joints are zero.
+    ///
+    /// Real time: no allocation.
+    ///
+    /// Source: Siciliano et al., Robotics: Modelling, Planning and Control, section 3.1.3 (revolute joints).
+    #[must_use]
+    pub fn jacobian(&self, position_rad: &JointArray) -> (Pose, [Column; MAX_JOINTS]) {
+        let frames = self.frames(position_rad);
+        let [.., tip] = frames;
+        let mut columns = [Column::ZERO; MAX_JOINTS];
+        for ((column, joint), parent) in columns.iter_mut().zip(&self.joints).zip(&frames).take(self.count) {
+            // A turn about the axis leaves the axis where it is, so the joint's own angle does not matter.
+            let before = parent * joint.pre;
+            let angular = before.rotation * joint.axis.into_inner();
+            let arm_m = tip.translation.vector - before.translation.vector;
+            *column = Column { linear_m: angular.cross(&arm_m), angular };
+        }
+        (tip, columns)
     }
 }
 
