@@ -8,6 +8,7 @@
 pub mod arguments;
 pub mod collide;
 pub mod cost;
+pub mod kind;
 pub mod leave;
 pub mod optimize;
 pub mod papers;
@@ -26,5 +27,6 @@ pub mod world;
 pub use taustream_arm::draw;
 
 pub use cost::{CostError, CostModel, PaperCost, paper_cost};
-pub use plan::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, StartMargin, plan};
+pub use kind::PlannerKind;
+pub use plan::{Plan, PlanError, PlanOptions, PoseOf, StartMargin, plan};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -4,9 +4,10 @@
 //! proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
+use crate::kind::PlannerKind;
 use crate::leave::Leaving;
-use crate::optimize::Ibfoa;
-use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind};
+use crate::optimize::{Ibfoa, Optimizer, Setup};
+use crate::plan::{Plan, PlanError, PlanOptions};
 use crate::refine::refine;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
@@ -119,10 +120,14 @@ impl<'a> Pipeline<'a> {
                     self.round(&path, SEARCHED);
                 }
             }
-            PlannerKind::Ibfoa => {
-                if let Some(refined) = self.refine(&line, self.budget.refinements, "the straight line") {
-                    self.propose(&refined, "IBFOA");
-                    self.round(&refined, "IBFOA");
+            PlannerKind::Optimiser(method) => {
+                let evaluations = self.budget.refinements;
+                let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
+                let optimizer = (method.make)(setup);
+                if let Some(refined) = self.refine(&line, &*optimizer, evaluations, "the straight line") {
+                    let source = optimizer.name().to_uppercase();
+                    self.propose(&refined, &source);
+                    self.round(&refined, &source);
                 }
             }
         }
@@ -135,8 +140,9 @@ impl<'a> Pipeline<'a> {
         let Some(path) = self.search(line) else { return };
         self.propose(&path, SEARCHED);
         let each = self.budget.refinements / 2;
-        let from_path = self.refine(&path, each, "that");
-        let from_line = self.refine(line, each, "the straight line");
+        let ibfoa = Ibfoa::set_up(Setup { reading: self.options.reading, evaluations: Some(each) });
+        let from_path = self.refine(&path, &ibfoa, each, "that");
+        let from_line = self.refine(line, &ibfoa, each, "the straight line");
         for refined in [from_path, from_line].into_iter().flatten() {
             self.round(&refined, "IBFOA");
         }
@@ -245,13 +251,20 @@ impl<'a> Pipeline<'a> {
             + path.windows(2).map(|p| if let [a, b] = p { segment_s(a, b) } else { 0.0 }).sum::<f64>()
     }
 
-    /// IBFOA around a path; only a path whose every edge is proven comes back.
-    fn refine(&mut self, path: &[JointArray], evaluations_max: usize, from: &str) -> Option<Vec<JointArray>> {
-        let refined = refine(&self.space, path, &Ibfoa::CASE_1, evaluations_max, self.options.seed);
+    /// An optimiser around a path; only a path whose every edge is proven comes back.
+    fn refine(
+        &mut self,
+        path: &[JointArray],
+        optimizer: &dyn Optimizer,
+        evaluations_max: usize,
+        from: &str,
+    ) -> Option<Vec<JointArray>> {
+        let name = optimizer.name().to_uppercase();
+        let refined = refine(&self.space, path, optimizer, evaluations_max, self.options.seed);
         let (mut corners, found) = match refined {
             Ok(refined) => refined?,
             Err(refusal) => {
-                self.tried.push(format!("IBFOA from {from} (not started: {refusal})"));
+                self.tried.push(format!("{name} from {from} (not started: {refusal})"));
                 return None;
             }
         };
@@ -261,7 +274,7 @@ impl<'a> Pipeline<'a> {
         });
         let evaluations = found.progress.evaluations;
         let verdict = if free { "" } else { ", collides" };
-        self.tried.push(format!("IBFOA from {from} ({evaluations} evaluations{verdict})"));
+        self.tried.push(format!("{name} from {from} ({evaluations} evaluations{verdict})"));
         if !free {
             return None;
         }

@@ -1,5 +1,7 @@
 //! From two poses to a verified motion.
+use crate::kind::PlannerKind;
 use crate::leave::{Leaving, Relaxed, is_clear, way_out};
+use crate::optimize::Reading;
 use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
 use crate::work::Work;
@@ -8,42 +10,6 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, Trajectory};
-
-/// Which method looks for the path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum PlannerKind {
-    /// Straight line, then RRT-Connect, then IBFOA refinement of what was found; the shortest verified motion wins.
-    #[default]
-    Auto,
-    /// The straight joint-space line, or nothing.
-    Straight,
-    /// RRT-Connect with shortcuts.
-    RrtConnect,
-    /// IBFOA over three control points, started from the straight line only (the paper's method).
-    Ibfoa,
-}
-
-impl PlannerKind {
-    /// Every kind.
-    pub const ALL: [Self; 4] = [Self::Auto, Self::Straight, Self::RrtConnect, Self::Ibfoa];
-
-    /// The word that users write.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Straight => "straight",
-            Self::RrtConnect => "rrt-connect",
-            Self::Ibfoa => "ibfoa",
-        }
-    }
-
-    /// The kind of a word; `None` for a word that is unknown.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-}
 
 /// How to plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,11 +21,14 @@ pub struct PlanOptions {
     pub deadline: Duration,
     /// Which method.
     pub planner: PlannerKind,
+    /// Which reading of the papers the optimisers follow.
+    pub reading: Reading,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { seed: 0, deadline: Duration::from_millis(2000), planner: PlannerKind::Auto }
+        let (deadline, planner) = (Duration::from_millis(2000), PlannerKind::Auto);
+        Self { seed: 0, deadline, planner, reading: Reading::Corrected }
     }
 }
 
@@ -152,7 +121,7 @@ pub enum PlanError {
     },
     /// Nothing was found.
     #[error(
-        "no path found: {tried}{}; try a longer deadline, another seed or another goal",
+        "no path found: {tried}{}; try a longer deadline, another seed, planner or goal",
         if *cut_short { " (the deadline cut the search short)" } else { "" }
     )]
     NotFound {

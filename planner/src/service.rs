@@ -4,7 +4,8 @@
 //! commanded pose; while a motion runs, `AfterCurrent` plans from its end and waits until it has ended, and `AtOnce`
 //! asks the streamer to cut, whose answer (this version of it: refused) is handed back. A motion whose requester has
 //! gone in the meantime is not sent: nobody waits for the arm to move.
-use crate::plan::{Plan, PlanError, PlanOptions, PlannerKind, StartMargin, Task, plan_until};
+use crate::kind::PlannerKind;
+use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
 use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
 use crate::timing::stand_still;
 use iceoryx2::active_request::ActiveRequest;
@@ -284,16 +285,14 @@ impl Seen {
 fn options(asked: &CheckedPlanRequest) -> Result<PlanOptions, String> {
     let planner = match asked.planner.as_str() {
         "" => PlannerKind::default(),
-        name => PlannerKind::from_name(name).ok_or_else(|| {
-            let known = PlannerKind::ALL.map(PlannerKind::name).join(", ");
-            format!("unknown planner `{name}`; use one of {known}")
-        })?,
+        name => PlannerKind::from_name(name)
+            .ok_or_else(|| format!("unknown planner `{name}`; use one of {}", PlannerKind::names()))?,
     };
     let deadline = match asked.deadline_ms {
         0 => DEADLINE_DEFAULT,
         ms => Duration::from_millis(ms.into()).min(DEADLINE_MAX),
     };
-    Ok(PlanOptions { seed: asked.seed, deadline, planner })
+    Ok(PlanOptions { seed: asked.seed, deadline, planner, ..PlanOptions::default() })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

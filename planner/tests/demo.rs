@@ -26,7 +26,12 @@ fn demo_every_move_goes_round_an_obstacle_and_is_found_in_time() {
     let mut blocked = 0;
     for (i, leg) in poses.windows(2).enumerate() {
         let (start, goal) = (pose(leg[0]), pose(leg[1]));
-        let options = |planner, seed| PlanOptions { planner, seed, deadline: Duration::from_secs(20) };
+        let options = |planner, seed| PlanOptions {
+            planner,
+            seed,
+            deadline: Duration::from_secs(20),
+            ..PlanOptions::default()
+        };
         let line = plan(&settings.robot, &settings.scene, &start, &goal, &options(PlannerKind::Straight, 0));
         blocked += usize::from(line.is_err());
         for seed in 0..2 {

@@ -44,8 +44,8 @@ fn run(method: &dyn Optimizer, problem: &dyn Problem, seed: u64, budget: usize) 
 }
 
 /// Every method in both readings, fitted to a budget.
-fn every(evaluations: usize) -> impl Iterator<Item = (Method, Reading, Box<dyn Optimizer>)> {
-    METHODS.into_iter().flat_map(move |method| {
+fn every(evaluations: usize) -> impl Iterator<Item = (&'static Method, Reading, Box<dyn Optimizer>)> {
+    METHODS.iter().flat_map(move |method| {
         [Reading::Corrected, Reading::Printed].map(|reading| {
             let made = (method.make)(Setup { reading, evaluations: Some(evaluations) });
             (method, reading, made)
@@ -379,7 +379,7 @@ fn optimiser_of_an_unknown_name_is_refused_with_the_names_there_are() {
     let text = unknown.to_string();
     assert!(METHODS.iter().all(|m| text.contains(m.name)), "{text}");
     assert!(by_name(&"x".repeat(1_000_000), Setup::default()).err().is_some_and(|u| u.name.len() == 64));
-    let mut names = METHODS.map(|m| m.name);
+    let mut names: Vec<&str> = METHODS.iter().map(|m| m.name).collect();
     names.sort_unstable();
     assert!(names.windows(2).all(|p| p[0] != p[1]), "a name is there twice: {names:?}");
 }

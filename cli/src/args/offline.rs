@@ -1,17 +1,19 @@
 //! Words of the commands that need no running process.
 use crate::angles::{Angles, Times};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_planner::PlannerKind;
+use taustream_planner::optimize::Reading;
 
 const PLAN_HELP: &str = "\
 Examples:
   taustream plan --robot ur5 --scene pillars \\
       --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
   taustream plan ... --planner ibfoa --seed 7 --deadline-ms 5000 --json
+  taustream plan ... --planner bfoa --reading printed
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
 The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
@@ -36,6 +38,9 @@ pub(crate) struct PlanArgs {
     /// Which planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
+    /// Where a paper cannot be meant as printed: which reading the optimisers follow.
+    #[arg(long, value_name = "READING", default_value = "corrected", value_parser = reading())]
+    pub(crate) reading: Reading,
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -246,8 +251,16 @@ pub(crate) struct CompareArgs {
 
 /// The planners by name; clap lists them in the help and suggests the nearest.
 pub(super) fn planner_kind() -> impl TypedValueParser<Value = PlannerKind> {
-    PossibleValuesParser::new(PlannerKind::ALL.map(PlannerKind::name))
-        .map(|name| PlannerKind::from_name(&name).unwrap_or_default())
+    PossibleValuesParser::new(
+        PlannerKind::all().map(|kind| PossibleValue::new(kind.name()).help(kind.about())),
+    )
+    .map(|name| PlannerKind::from_name(&name).unwrap_or_default())
+}
+
+/// The readings of the papers by name.
+fn reading() -> impl TypedValueParser<Value = Reading> {
+    PossibleValuesParser::new(Reading::ALL.map(|r| PossibleValue::new(r.name()).help(r.about())))
+        .map(|name| Reading::from_name(&name).unwrap_or_default())
 }
 
 /// A time to measure: nothing, or at least what gives a few samples.

@@ -53,6 +53,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         seed: args.seed,
         deadline: Duration::from_millis(args.deadline_ms.into()),
         planner: args.planner,
+        reading: args.reading,
     };
     let found = plan(&robot, &scene, &start_rad, &goal_rad, &options)
         .map_err(|error| explain(&error, args, &robot))?;

@@ -47,7 +47,12 @@ fn words_that_are_wrong_are_refused_by_name() {
             (
                 "plan --robot ur5 --scene open --start HOME --goal HOME --planner magic",
                 2,
-                &["magic", "rrt-connect"],
+                &["magic", "rrt-connect", "ibfoa", "iwo"],
+            ),
+            (
+                "plan --robot ur5 --scene open --start HOME --goal HOME --reading literal",
+                2,
+                &["literal", "printed", "corrected"],
             ),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --deadline-ms 0", 2, &["--deadline-ms"]),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --seed -1", 2, &["--seed"]),

@@ -11,6 +11,35 @@ pub enum Reading {
     Printed,
 }
 
+impl Reading {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Corrected, Self::Printed];
+
+    /// The word that users write.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Printed => "printed",
+        }
+    }
+
+    /// One line for a list.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Corrected => "what must have been meant",
+            Self::Printed => "the letter of the paper",
+        }
+    }
+
+    /// The reading of a word; `None` for a word that is unknown.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|reading| reading.name() == name)
+    }
+}
+
 /// How a method is set up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Setup {
@@ -20,7 +49,7 @@ pub struct Setup {
     pub evaluations: Option<usize>,
 }
 
-/// One registered method.
+/// One registered method; two of one name are the same.
 #[derive(Clone, Copy)]
 pub struct Method {
     /// The word that users write.
@@ -31,6 +60,20 @@ pub struct Method {
     pub make: fn(Setup) -> Box<dyn Optimizer>,
 }
 
+impl std::fmt::Debug for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl PartialEq for Method {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Method {}
+
 macro_rules! method {
     ($name:literal, $about:literal, $make:expr) => {
         Method { name: $name, about: $about, make: |setup| Box::new($make(setup)) }
@@ -38,7 +81,7 @@ macro_rules! method {
 }
 
 /// Every method.
-pub const METHODS: [Method; 14] = [
+pub const METHODS: &[Method] = &[
     method!("ibfoa", "bacterial foraging with decay and elite (seed paper 000)", Ibfoa::set_up),
     method!("bfoa", "bacterial foraging (Passino 2002)", Bfoa::set_up),
     method!("bso", "bacterial foraging along particle velocities (Korani 2008)", Bso::set_up),
@@ -57,10 +100,14 @@ pub const METHODS: [Method; 14] = [
 
 /// A name that nobody has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no optimiser named \"{name}\"; there are {}", METHODS.map(|m| m.name).join(", "))]
+#[error("there is no optimiser named \"{name}\"; there are {}", names())]
 pub struct Unknown {
     /// The name that was asked for.
     pub name: String,
+}
+
+fn names() -> String {
+    METHODS.iter().map(|m| m.name).collect::<Vec<_>>().join(", ")
 }
 
 /// The method of a name.
