@@ -16,6 +16,7 @@ pub mod limits;
 pub mod peaks;
 pub mod profile;
 mod proof;
+pub mod smoothing;
 pub mod spline;
 pub mod stroke;
 pub mod time_scale;

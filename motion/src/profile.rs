@@ -10,7 +10,8 @@
 //! | Tau-J*, k < 1/3 | 0 | 0 | 0 | 0 |
 //! | quintic | 0 | 0 | 60 | 60 |
 //! | septic | 0 | 0 | 0 | 0 |
-//! | clamped spline | 0 | not 0 | not 0 | not 0 |
+//! | clamped cubic spline | 0 | not 0 | not 0 | not 0 |
+//! | not-a-knot cubic spline | not 0 | not 0 | not 0 | not 0 |
 //!
 //! The snap of both tau profiles diverges at s = 1 for k > 1/4, which is why the wire holds n = 1/k >= 4.
 //!
@@ -209,7 +210,7 @@ fn tau(n: f64, x: f64, u: f64, [u1, u2, u3]: [f64; 3]) -> Phi {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spline::ClampedSpline;
+    use crate::spline::{CubicSpline, Ends};
 
     #[test]
     fn profiles_at_their_ends_rest_as_deep_as_the_table_says() {
@@ -217,7 +218,7 @@ mod tests {
         let [start, end] = tau_j.ends();
         assert_eq!((start.d1, start.d2, end), (0.0, 0.0, Phi::AFTER));
         assert!((start.d3 - 60.0).abs() < 1e-12);
-        let spline = ClampedSpline::new(&[(0.0, 0.0), (0.4, 0.7), (1.0, 1.0)]).unwrap();
+        let spline = CubicSpline::new(&[(0.0, 0.0), (0.4, 0.7), (1.0, 1.0)], Ends::Clamped).unwrap();
         let orders = [
             tau_j.rest_order(),
             TauJStar::new(0.1).unwrap().rest_order(),

@@ -1,9 +1,10 @@
-//! A clamped cubic spline through knots: the interpolator that seed paper 000 compares with.
+//! A cubic spline through knots: the interpolator that seed paper 000 compares with.
 //!
-//! Velocity and acceleration are continuous, the velocity is zero at both ends; the acceleration is not, and the
-//! jerk jumps at every knot. It is here for comparison, and never goes to an arm.
+//! Velocity and acceleration are continuous, the jerk jumps at knots. Clamped, the velocity is zero at both ends and the
+//! acceleration is not; not-a-knot, the two pieces at each end are one cubic, and neither is zero. The paper does not say
+//! which it means. A spline is here for comparison and for import; as it is it never goes to an arm.
 //!
-//! Source: de Boor, A Practical Guide to Splines, chapter IV (clamped end conditions).
+//! Source: de Boor, A Practical Guide to Splines, chapter IV (both end conditions).
 use crate::peaks::PeakConstants;
 use crate::profile::Profile;
 use crate::stroke::Phi;
@@ -11,14 +12,24 @@ use crate::stroke::Phi;
 /// Most knots of a spline.
 pub const KNOTS_MAX: usize = 64;
 
-/// A clamped cubic spline: values at increasing times, at rest at both ends.
+/// What holds at the ends of a spline, where its knots leave two conditions open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Zero velocity.
+    Clamped,
+    /// No jump of the third derivative at the first and last inner knot. Three knots make one parabola, two a line.
+    NotAKnot,
+}
+
+/// A cubic spline: values at increasing times.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClampedSpline {
+pub struct CubicSpline {
     time_s: [f64; KNOTS_MAX],
     value: [f64; KNOTS_MAX],
     /// Second derivative by time at each knot.
     bend: [f64; KNOTS_MAX],
     count: usize,
+    ends: Ends,
 }
 
 /// Why knots do not make a spline.
@@ -44,12 +55,12 @@ pub enum SplineError {
     },
 }
 
-impl ClampedSpline {
+impl CubicSpline {
     /// Lays the spline through knots (time in s, value in any unit).
     ///
     /// # Errors
     /// The first fault of the knots.
-    pub fn new(knots: &[(f64, f64)]) -> Result<Self, SplineError> {
+    pub fn new(knots: &[(f64, f64)], ends: Ends) -> Result<Self, SplineError> {
         if !(2..=KNOTS_MAX).contains(&knots.len()) {
             return Err(SplineError::KnotCount { knots: knots.len() });
         }
@@ -58,6 +69,7 @@ impl ClampedSpline {
             value: [0.0; KNOTS_MAX],
             bend: [0.0; KNOTS_MAX],
             count: knots.len(),
+            ends,
         };
         let mut last_s = f64::NEG_INFINITY;
         for (knot, &(time_s, value)) in knots.iter().enumerate() {
@@ -71,7 +83,10 @@ impl ClampedSpline {
             spline.time_s[knot] = time_s;
             spline.value[knot] = value;
         }
-        spline.bend = spline.solve_bend();
+        spline.bend = match ends {
+            Ends::Clamped => spline.solve_clamped(),
+            Ends::NotAKnot => spline.solve_not_a_knot(),
+        };
         Ok(spline)
     }
 
@@ -111,8 +126,14 @@ impl ClampedSpline {
         (h, (self.value[knot] - self.value[knot - 1]) / h)
     }
 
+    /// Highest |second derivative| by time: it is linear between knots, so one of theirs.
+    #[must_use]
+    pub fn bend_max(&self) -> f64 {
+        self.bend.iter().take(self.count).fold(0.0, |most: f64, bend| most.max(bend.abs()))
+    }
+
     /// Second derivatives at the knots: one tridiagonal system, diagonally dominant, so elimination needs no pivot.
-    fn solve_bend(&self) -> [f64; KNOTS_MAX] {
+    fn solve_clamped(&self) -> [f64; KNOTS_MAX] {
         let last = self.count - 1;
         let (mut upper, mut bend) = ([0.0; KNOTS_MAX], [0.0; KNOTS_MAX]);
         for knot in 0..self.count {
@@ -129,20 +150,53 @@ impl ClampedSpline {
         }
         bend
     }
+
+    /// The same for the inner knots alone: the conditions at the ends give the outer second derivatives by those of their
+    /// two neighbours, m0 = m1 + (m1 - m2) h0/h1, and so change the first and the last row. The diagonal still dominates.
+    fn solve_not_a_knot(&self) -> [f64; KNOTS_MAX] {
+        let last = self.count - 1;
+        let (mut upper, mut bend) = ([0.0; KNOTS_MAX], [0.0; KNOTS_MAX]);
+        for knot in 1..last {
+            let ((h0, slope0), (h1, slope1)) = (self.chord(knot), self.chord(knot + 1));
+            let (mut below, mut pivot, mut above) = (h0, 2.0 * (h0 + h1), h1);
+            if last == 2 {
+                (below, pivot, above) = (0.0, 3.0 * (h0 + h1), 0.0); // A parabola: all three are equal.
+            } else if knot == 1 {
+                (below, pivot, above) = (0.0, pivot + h0 * (1.0 + h0 / h1), h1 - h0 * h0 / h1);
+            } else if knot == last - 1 {
+                (below, pivot, above) = (h0 - h1 * h1 / h0, pivot + h1 * (1.0 + h1 / h0), 0.0);
+            }
+            let pivot = pivot - below * upper[knot - 1];
+            upper[knot] = above / pivot;
+            bend[knot] = (6.0 * (slope1 - slope0) - below * bend[knot - 1]) / pivot;
+        }
+        for knot in (1..last).rev().skip(1) {
+            bend[knot] -= upper[knot] * bend[knot + 1];
+        }
+        if last == 2 {
+            (bend[0], bend[2]) = (bend[1], bend[1]);
+        } else if last > 2 {
+            let [h0, h1] = [self.chord(1).0, self.chord(2).0];
+            bend[0] = bend[1] + (bend[1] - bend[2]) * h0 / h1;
+            let [h0, h1] = [self.chord(last).0, self.chord(last - 1).0];
+            bend[last] = bend[last - 1] + (bend[last - 1] - bend[last - 2]) * h0 / h1;
+        }
+        bend
+    }
 }
 
-impl Profile for ClampedSpline {
+impl Profile for CubicSpline {
     /// The spline over its own span: derivatives are by s = (t - first)/(last - first), values are the knots'.
     fn at(&self, s: f64) -> Phi {
         let [first_s, last_s] = self.span_s();
         let span_s = last_s - first_s;
         let s = s.clamp(0.0, 1.0);
-        // The end is met exactly, so that clamped means clamped.
         let phi = self.sample(if s < 1.0 { first_s + s * span_s } else { last_s });
-        let rest = if s > 0.0 && s < 1.0 { phi.d1 * span_s } else { 0.0 };
+        // The end is met exactly, so that clamped means clamped.
+        let at_rest = self.ends == Ends::Clamped && !(s > 0.0 && s < 1.0);
         Phi {
             value: phi.value,
-            d1: rest,
+            d1: if at_rest { 0.0 } else { phi.d1 * span_s },
             d2: phi.d2 * span_s * span_s,
             d3: phi.d3 * span_s * span_s * span_s,
         }
@@ -194,15 +248,87 @@ mod tests {
 
     #[test]
     fn spline_through_figure_1_ends_with_the_published_accelerations() {
-        let spline = ClampedSpline::new(&FIGURE_1).unwrap();
+        let spline = CubicSpline::new(&FIGURE_1, Ends::Clamped).unwrap();
         // Five digits, as our digest of the paper has them.
         assert!((spline.sample(0.0).d2 - 0.131_79).abs() < 5e-6, "{:?}", spline.sample(0.0));
         assert!((spline.sample(400.0).d2 - 0.123_21).abs() < 5e-6, "{:?}", spline.sample(400.0));
     }
 
+    type Knots = &'static [(f64, f64)];
+    type Samples = &'static [(f64, f64, f64, f64, f64)];
+    /// scipy's spline through knots: time, value, three derivatives. Printed by tests/splines.py.
+    #[rustfmt::skip]
+    const NOT_A_KNOT: [(Knots, Samples); 5] = [
+        (&[(0.0, 0.3), (0.8, -0.4)], &[
+            (0.0, 0.3, -0.875, 0.0, 0.0),
+            (0.136, 0.181, -0.875, 0.0, 0.0),
+            (0.36000000000000004, -0.015, -0.875, 0.0, 0.0),
+            (0.664, -0.281, -0.875, 0.0, 0.0),
+            (0.792, -0.393, -0.875, 0.0, 0.0),
+        ]),
+        (&[(0.0, 0.0), (0.4, 0.7), (1.0, 1.0)], &[
+            (0.0, 0.0, 2.25, -2.5, 0.0),
+            (0.17, 0.346375, 1.825, -2.5, 0.0),
+            (0.45, 0.759375, 1.125, -2.5, 0.0),
+            (0.83, 1.006375, 0.175, -2.5, 0.0),
+            (0.99, 1.002375, -0.225, -2.5, 0.0),
+        ]),
+        (&[(0.0, 1.0), (0.5, -1.0), (1.7, 2.0), (2.0, 0.0)], &[
+            (0.0, 1.0, -10.1339869281046, 29.5032679738562, -29.8039215686275),
+            (0.34, -0.935502222222222, -1.82554248366013, 19.3699346405229, -29.8039215686275),
+            (0.9, 0.207058823529412, 4.3483660130719, 2.6797385620915, -29.8039215686275),
+            (1.66, 2.10519111111111, -2.22240522875817, -19.9712418300654, -29.8039215686275),
+            (1.98, 0.208724705882353, -10.1391633986928, -29.5084967320261, -29.8039215686273),
+        ]),
+        (&[(0.0, 0.0), (100.0, 300.0), (200.0, 200.0), (300.0, -300.0), (400.0, -700.0)], &[
+            (0.0, 0.0, 4.58333333333333, -0.0275, -0.000125),
+            (68.0, 241.536, 2.42433333333333, -0.036, -0.000125),
+            (180.0, 258.0, -2.39166666666667, -0.05, -0.000125),
+            (332.0, -468.8, -4.90166666666667, 0.03, 0.000625),
+            (396.0, -693.76, -1.70166666666667, 0.07, 0.000625),
+        ]),
+        (&[(-1.0, 0.3), (-0.1, -1.2), (1.6, 0.8), (2.0, 0.75), (4.2, 2.1), (5.3, -0.4)], &[
+            (-1.0, 0.3, -4.16314985389032, 6.71106371704953, -3.87774433665655),
+            (0.07099999999999995, -1.10375669086925, 0.800433516238294, 2.55799953249037, -3.87774433665654),
+            (1.835, 0.778985376292876, -0.229850788989252, -0.107147518581527, 13.8890384667062),
+            (4.228999999999999, 2.08601527524102, -0.519606604082772, -2.59830875498903, -2.1457391581041),
+            (5.237, -0.124047171494905, -4.22880598508166, -4.76121382635796, -2.1457391581041),
+        ]),
+    ];
+
+    #[test]
+    fn spline_without_knots_at_its_ends_agrees_with_scipy() {
+        let figure = CubicSpline::new(&FIGURE_1, Ends::NotAKnot).unwrap();
+        assert!(
+            (figure.sample(0.0).d2 + 0.0275).abs() < 1e-12
+                && (figure.sample(400.0).d2 - 0.0725).abs() < 1e-12
+        );
+        for (knots, theirs) in NOT_A_KNOT {
+            let spline = CubicSpline::new(knots, Ends::NotAKnot).unwrap();
+            for (t_s, value, d1, d2, d3) in theirs {
+                let ours = spline.sample(*t_s);
+                for (ours, theirs) in
+                    [ours.value, ours.d1, ours.d2, ours.d3].into_iter().zip([value, d1, d2, d3])
+                {
+                    assert!((ours - theirs).abs() < 1e-9, "at {t_s} s: {ours} against {theirs}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn spline_without_knots_at_its_ends_does_not_rest_there() {
+        let spline = CubicSpline::new(&FIGURE_1, Ends::NotAKnot).unwrap();
+        assert_eq!(
+            (spline.rest_order(), CubicSpline::new(&FIGURE_1, Ends::Clamped).unwrap().rest_order()),
+            (0, 1)
+        );
+        assert!((spline.at(1.0).d1 / 400.0 - spline.sample(400.0).d1).abs() < 1e-12);
+    }
+
     #[test]
     fn spline_at_its_knots_meets_values_and_joins_twice_smoothly() {
-        let spline = ClampedSpline::new(&FIGURE_1).unwrap();
+        let spline = CubicSpline::new(&FIGURE_1, Ends::Clamped).unwrap();
         for (knot, &(time_s, value)) in FIGURE_1.iter().enumerate() {
             assert!((spline.sample(time_s).value - value).abs() < 1e-10);
             if (1..FIGURE_1.len() - 1).contains(&knot) {
@@ -216,7 +342,7 @@ mod tests {
 
     #[test]
     fn spline_peaks_are_those_of_a_dense_scan() {
-        let spline = ClampedSpline::new(&FIGURE_1).unwrap();
+        let spline = CubicSpline::new(&FIGURE_1, Ends::Clamped).unwrap();
         let peaks = spline.peaks();
         let mut seen = PeakConstants::default();
         for step in 0..=100_000 {
@@ -232,7 +358,7 @@ mod tests {
 
     #[test]
     fn spline_of_two_knots_is_the_clamped_cubic() {
-        let spline = ClampedSpline::new(&[(0.0, 0.0), (1.0, 1.0)]).unwrap();
+        let spline = CubicSpline::new(&[(0.0, 0.0), (1.0, 1.0)], Ends::Clamped).unwrap();
         for step in 0..=100 {
             let s = f64::from(step) / 100.0;
             assert!((spline.at(s).value - s * s * (3.0 - 2.0 * s)).abs() < 1e-14);
@@ -242,11 +368,12 @@ mod tests {
     #[test]
     fn spline_of_bad_knots_is_refused_with_the_knot() {
         let many = [(0.0, 0.0); KNOTS_MAX + 1];
-        assert_eq!(ClampedSpline::new(&many), Err(SplineError::KnotCount { knots: KNOTS_MAX + 1 }));
-        assert_eq!(ClampedSpline::new(&[(0.0, 0.0)]), Err(SplineError::KnotCount { knots: 1 }));
+        let new = |knots: &[(f64, f64)]| CubicSpline::new(knots, Ends::NotAKnot);
+        assert_eq!(new(&many), Err(SplineError::KnotCount { knots: KNOTS_MAX + 1 }));
+        assert_eq!(new(&[(0.0, 0.0)]), Err(SplineError::KnotCount { knots: 1 }));
         let nan = [(0.0, 0.0), (1.0, f64::NAN)];
-        assert_eq!(ClampedSpline::new(&nan), Err(SplineError::NotFinite { knot: 1 }));
+        assert_eq!(new(&nan), Err(SplineError::NotFinite { knot: 1 }));
         let back = [(0.0, 0.0), (1.0, 1.0), (1.0, 2.0)];
-        assert_eq!(ClampedSpline::new(&back), Err(SplineError::NotIncreasing { knot: 2 }));
+        assert_eq!(new(&back), Err(SplineError::NotIncreasing { knot: 2 }));
     }
 }
