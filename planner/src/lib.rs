@@ -26,7 +26,7 @@ pub mod world;
 
 pub use taustream_arm::draw;
 
-pub use cost::{CostError, CostModel, PaperCost, paper_cost};
+pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
 pub use kind::PlannerKind;
 pub use plan::{Plan, PlanError, PlanOptions, PoseOf, StartMargin, plan};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -11,6 +11,11 @@ pub trait Problem {
     /// The cost of a point inside the bounds. One that is not finite counts as [`super::WORTHLESS`].
     fn cost(&self, x: &[f64]) -> f64;
 
+    /// What is reported for the winner, where [`Self::cost`] is a fast approximation; `None` where it is not one.
+    fn exact_cost(&self, _x: &[f64]) -> Option<f64> {
+        None
+    }
+
     /// How many points [`Self::costs`] likes at once. Cancellation is looked at between two batches.
     fn batch(&self) -> usize {
         1
@@ -43,6 +48,10 @@ impl<P: Problem + Sync + ?Sized> Problem for Parallel<'_, P> {
 
     fn cost(&self, x: &[f64]) -> f64 {
         self.problem.cost(x)
+    }
+
+    fn exact_cost(&self, x: &[f64]) -> Option<f64> {
+        self.problem.exact_cost(x)
     }
 
     fn batch(&self) -> usize {

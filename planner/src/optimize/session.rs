@@ -50,7 +50,7 @@ pub enum End {
 pub struct Found {
     /// The best point ever seen; empty when not one could be evaluated.
     pub x: Vec<f64>,
-    /// Its cost; [`WORTHLESS`] when no cost was finite.
+    /// Its cost, by [`Problem::exact_cost`] where the problem has one; [`WORTHLESS`] when no cost was finite.
     pub cost: f64,
     /// Where the run stood at its end.
     pub progress: Progress,
@@ -208,7 +208,7 @@ impl<'a> Session<'a> {
             let costs = if granted.is_empty() { Vec::new() } else { self.problem.costs(granted) };
             self.evaluations += granted.len();
             for (i, x) in granted.iter().enumerate() {
-                let cost = costs.get(i).copied().filter(|c| c.is_finite()).unwrap_or(WORTHLESS);
+                let cost = costs.get(i).copied().map_or(WORTHLESS, worth);
                 self.remember(x, cost);
                 agents.push(Agent { x: x.clone(), cost });
             }
@@ -243,10 +243,19 @@ impl<'a> Session<'a> {
         Progress { iteration, evaluations, current: self.current, best: self.best.cost }
     }
 
-    pub(super) fn found(self, end: End) -> Found {
+    /// What the run found, with the cost that the problem stands by.
+    pub(super) fn found(mut self, end: End) -> Found {
+        if !self.best.x.is_empty() {
+            self.best.cost = self.problem.exact_cost(&self.best.x).map_or(self.best.cost, worth);
+        }
         let progress = self.progress();
         Found { x: self.best.x, cost: self.best.cost, progress, end }
     }
+}
+
+/// A cost that methods can calculate with.
+fn worth(cost: f64) -> f64 {
+    if cost.is_finite() { cost } else { WORTHLESS }
 }
 
 /// Costs of a population, for [`Session::iterated`].

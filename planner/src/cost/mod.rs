@@ -5,6 +5,11 @@
 //!
 //! Source: seed paper 000, eq. 3.5 to 3.10 in the corrected reading (its eq. 3.9 sums the distances over the links,
 //! so that its penalty never acts). [`Reading::Printed`] selects that sum.
+mod control_points;
+mod phases;
+
+pub use control_points::ControlPointCost;
+
 use crate::optimize::Reading;
 use taustream_arm::scene::Shape;
 use taustream_arm::{Robot, Scene};
@@ -117,7 +122,7 @@ pub fn paper_cost(
     let spheres = spheres(scene)?;
     check_overlap(trajectory)?;
 
-    let mut sum = Sum { model, robot, spheres: &spheres, last: None, cost: PaperCost::default() };
+    let mut sum = Sum::new(model, robot, &spheres);
     for stroke in trajectory.strokes() {
         for step in 0..model.waypoints_per_segment {
             let share = step as f64 / model.waypoints_per_segment as f64;
@@ -184,7 +189,11 @@ struct Sum<'a> {
     cost: PaperCost,
 }
 
-impl Sum<'_> {
+impl<'a> Sum<'a> {
+    fn new(model: &'a CostModel, robot: &'a Robot, spheres: &'a [(Point, f64)]) -> Self {
+        Self { model, robot, spheres, last: None, cost: PaperCost::default() }
+    }
+
     fn add(&mut self, position_rad: &JointArray) {
         let frames = self.robot.chain.frames(position_rad);
         let frames = &frames[..=self.robot.chain.joints()];
