@@ -5,8 +5,8 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 use std::cell::RefCell;
 use taustream_planner::optimize::{
-    Bfoa, Boa, Bso, De, End, Exempt, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, METHODS, Optimizer, Parameters,
-    Problem, Pso, Reading, Run, Schedule, Setup, Sma, Ssa, Swarming,
+    Bfoa, Boa, Bso, BsoStep, De, End, Exempt, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, METHODS, Optimizer,
+    Parameters, Problem, Pso, Reading, Run, Sampling, Schedule, Setup, Sma, Ssa, Swarming,
 };
 
 const WALKS: &str = include_str!("oracles/walks.txt");
@@ -51,10 +51,14 @@ fn tiny(name: &str, reading: Reading) -> Box<dyn Optimizer> {
     };
     let sma = Sma { schedule, restart: 0.15, ..Sma::set_up(setup) };
     match name {
-        "bfoa" => Box::new(Bfoa { parameters }),
+        "bfoa" => Box::new(Bfoa { parameters, ..Bfoa::set_up(setup) }),
+        "bfoa-elite" => Box::new(Bfoa { parameters, exempt: Exempt::Healthiest, greedy: false }),
+        "greedy-bfoa" => Box::new(Bfoa { parameters, ..Bfoa::greedy(setup) }),
         "ibfoa" => Box::new(Ibfoa { parameters, ..Ibfoa::CASE_1 }),
         "ibfoa-best" => Box::new(Ibfoa { parameters, elite: Exempt::Best }),
         "bso" => Box::new(Bso { parameters, ..Bso::set_up(setup) }),
+        "bso-step" => Box::new(BsoStep { parameters, ..BsoStep::set_up(setup) }),
+        "sampling" => Box::new(Sampling { schedule }),
         "sma" => Box::new(sma),
         "isma" => Box::new(Isma { sma, laplace: [0.1, 0.4], ..Isma::set_up(setup) }),
         "boa" => Box::new(Boa { schedule, ..Boa::set_up(setup) }),

@@ -2,7 +2,8 @@
 //!
 //! Bacteria turn, take a step of fixed length (kept even when it is worse) and swim on while it gets better; they
 //! split by accumulated health, and are dispersed at random. What the three methods differ in is what a colony is
-//! given: how a bacterium turns ([`Heading`]), whether survivors and dispersal decay, who is exempt from dispersal.
+//! given: how a bacterium turns and whether it drifts ([`Heading`]), whether survivors and dispersal decay, who is exempt
+//! from dispersal, whether a step that worsens is taken back.
 //!
 //! Source: Passino, "Biomimicry of Bacterial Foraging", IEEE Control Systems Magazine 22(3), 2002, and seed paper
 //! 000, algorithm 1, eq. 3.1 to 3.4. Read as: swarming per bacterium over all bacteria (eq. 3.3 sums over the index
@@ -11,8 +12,8 @@
 //! Bacteria move one after another, each in the field of the others where they are by then, so that this is the one
 //! family that cannot be evaluated as a batch.
 //!
-//! Random numbers: first population; per step of chemotaxis and bacterium the heading's; per bacterium that may be
-//! dispersed one, and a point when it is.
+//! Random numbers: first population; per step of chemotaxis the headings' of all bacteria, then their drifts'; per
+//! bacterium that may be dispersed one, and a point when it is.
 use super::problem::Refusal;
 use super::session::{Agent, End, Session, check_population};
 
@@ -125,7 +126,11 @@ pub(super) trait Heading {
     /// A unit vector, or nothing but zeros.
     fn turn(&self, bacterium: &mut Bacterium<Self::Memory>, session: &mut Session) -> Vec<f64>;
     /// Told after every step.
-    fn moved(&self, bacterium: &mut Bacterium<Self::Memory>);
+    fn moved(&self, _bacterium: &mut Bacterium<Self::Memory>) {}
+    /// Where it drifts after a step of chemotaxis of all; `None` when it stays.
+    fn drift(&self, _bacterium: &mut Bacterium<Self::Memory>, _session: &mut Session) -> Option<Vec<f64>> {
+        None
+    }
 }
 
 /// A unit vector: uniform in the cube, as the paper has it, then normalised.
@@ -160,6 +165,8 @@ pub(super) struct Colony<'p, H: Heading> {
     /// True when survivors and dispersal decay.
     pub(super) decays: bool,
     pub(super) exempt: Exempt,
+    /// True when a step that worsens is taken back.
+    pub(super) greedy: bool,
 }
 
 impl<H: Heading> Colony<'_, H> {
@@ -197,6 +204,12 @@ impl<H: Heading> Colony<'_, H> {
             for i in 0..bacteria.len() {
                 self.tumble_and_swim(session, bacteria, i)?;
             }
+            for bacterium in &mut *bacteria {
+                if let Some(x) = self.heading.drift(bacterium, session) {
+                    bacterium.at = session.weigh_one(x)?;
+                    self.heading.moved(bacterium);
+                }
+            }
             session.iterated(bacteria.iter().map(|b| b.at.cost));
         }
         for i in 0..bacteria.len() {
@@ -214,13 +227,17 @@ impl<H: Heading> Colony<'_, H> {
         let mut last = bacteria[i].at.cost + self.swarming(bacteria, i);
         bacteria[i].health += last;
         let direction = self.heading.turn(&mut bacteria[i], session);
-        let mut now = self.step(session, bacteria, i, &direction)?;
-        for _ in 0..self.parameters.swims {
+        // The step of the tumble, then those of the swim.
+        for _ in 0..=self.parameters.swims {
+            let before = self.greedy.then(|| bacteria[i].at.clone());
+            let now = self.step(session, bacteria, i, &direction)?;
             if now >= last {
+                if let Some(before) = before {
+                    bacteria[i].at = before;
+                }
                 break;
             }
             last = now;
-            now = self.step(session, bacteria, i, &direction)?;
         }
         Ok(())
     }

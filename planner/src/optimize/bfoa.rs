@@ -1,4 +1,10 @@
-//! BFOA: bacterial foraging as Passino has it. The colony is in [`super::bacteria`].
+//! BFOA: bacterial foraging as Passino has it, and a greedy one that takes worsening steps back.
+//!
+//! Passino's bacteria keep a step that is worse, and anybody may be dispersed, the best one too. Greedy ones move only
+//! to where it is better, and the best is exempt: it is lost only to the others' attraction, or to a death for its poor
+//! health of before. It is ours, made to see what seed paper 000's decay and elite are worth; no paper prints it.
+//!
+//! The colony is in [`super::bacteria`].
 use super::bacteria::{Bacterium, Colony, Exempt, Heading, Parameters, tumble};
 use super::problem::Refusal;
 use super::session::{Agent, End, Session};
@@ -9,6 +15,10 @@ use super::{Optimizer, Reading, Setup};
 pub struct Bfoa {
     /// Its numbers.
     pub parameters: Parameters,
+    /// Who is exempt from dispersal; Passino exempts nobody.
+    pub exempt: Exempt,
+    /// True when a step that worsens is taken back.
+    pub greedy: bool,
 }
 
 /// A bacterium turns in a random direction and remembers nothing.
@@ -22,15 +32,19 @@ impl Heading for Tumble {
     fn turn(&self, _bacterium: &mut Bacterium<()>, session: &mut Session) -> Vec<f64> {
         tumble(session)
     }
-
-    fn moved(&self, _bacterium: &mut Bacterium<()>) {}
 }
 
 impl Bfoa {
     /// Case 1 of seed paper 000; a budget does not change the schedule, it cuts it.
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
-        Self { parameters: case_1(setup) }
+        Self { parameters: case_1(setup), exempt: Exempt::Nobody, greedy: false }
+    }
+
+    /// The greedy one, with the same numbers.
+    #[must_use]
+    pub fn greedy(setup: Setup) -> Self {
+        Self { parameters: case_1(setup), exempt: Exempt::Best, greedy: true }
     }
 }
 
@@ -41,7 +55,7 @@ pub(super) fn case_1(setup: Setup) -> Parameters {
 
 impl Optimizer for Bfoa {
     fn name(&self) -> &'static str {
-        "bfoa"
+        if self.greedy { "greedy-bfoa" } else { "bfoa" }
     }
 
     fn check(&self) -> Result<(), Refusal> {
@@ -49,7 +63,7 @@ impl Optimizer for Bfoa {
     }
 
     fn search(&self, session: &mut Session) -> Result<(), End> {
-        let (parameters, exempt) = (&self.parameters, Exempt::Nobody);
-        Colony { parameters, heading: Tumble, decays: false, exempt }.live(session)
+        let &Self { ref parameters, exempt, greedy } = self;
+        Colony { parameters, heading: Tumble, decays: false, exempt, greedy }.live(session)
     }
 }

@@ -6,8 +6,9 @@
 //! Source: seed paper 000 compares with it and gives neither w nor c; `c_1` = 1.2 and `c_2` = 0.5 are those of the
 //! widely copied Matlab program, w = 0.9 is ours. Korani, "Bacterial Foraging Oriented by Particle Swarm
 //! Optimization Strategy for PID Tuning", GECCO 2008. Read as: fresh random numbers for every coordinate; survivors
-//! pass velocity and own best on to their copies; who is dispersed starts anew. Biswas et al. (2007) add a velocity
-//! step after chemotaxis instead; that is not this.
+//! pass velocity and own best on to their copies; who is dispersed starts anew. This is the reading that "bso" means,
+//! since the paper's own reference for BSO (Abd-Elazim and Ali 2013) has it; the other one, of Biswas et al. (2007), is
+//! [`super::bso_step`].
 //!
 //! Random numbers of a turn: `r_1`, `r_2` for each coordinate in turn; then a tumble's if the velocity is nothing.
 use super::bacteria::{Bacterium, Colony, Exempt, Heading, Parameters, normalised, tumble};
@@ -90,6 +91,6 @@ impl Optimizer for Bso {
 
     fn search(&self, session: &mut Session) -> Result<(), End> {
         let (parameters, exempt) = (&self.parameters, Exempt::Nobody);
-        Colony { parameters, heading: Fly(self), decays: false, exempt }.live(session)
+        Colony { parameters, heading: Fly(self), decays: false, exempt, greedy: false }.live(session)
     }
 }

@@ -43,6 +43,6 @@ impl Optimizer for Ibfoa {
 
     fn search(&self, session: &mut Session) -> Result<(), End> {
         let (parameters, exempt) = (&self.parameters, self.elite);
-        Colony { parameters, heading: Tumble, decays: true, exempt }.live(session)
+        Colony { parameters, heading: Tumble, decays: true, exempt, greedy: false }.live(session)
     }
 }

@@ -1,5 +1,5 @@
 //! Which methods there are, by name. A new one is a file beside this one and a line here.
-use super::{Bfoa, Boa, Bso, De, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, Optimizer, Pso, Sma, Ssa};
+use super::{Bfoa, Boa, Bso, BsoStep, De, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, Optimizer, Pso, Sma, Ssa};
 
 /// Where a paper's text cannot be meant as printed: which reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,6 +85,12 @@ pub const METHODS: &[Method] = &[
     method!("ibfoa", "bacterial foraging with decay and elite (seed paper 000)", Ibfoa::set_up),
     method!("bfoa", "bacterial foraging (Passino 2002)", Bfoa::set_up),
     method!("bso", "bacterial foraging along particle velocities (Korani 2008)", Bso::set_up),
+    method!(
+        "bso-step",
+        "bacterial foraging, then a particle's step to the best (Biswas et al. 2007)",
+        BsoStep::set_up
+    ),
+    method!("greedy-bfoa", "bacterial foraging that takes worsening steps back", Bfoa::greedy),
     method!("isma", "slime mould with crossover, bee search, parabolas (seed paper 001)", Isma::set_up),
     method!("sma", "slime mould (Li et al. 2020)", Sma::set_up),
     method!("boa", "butterflies (Arora and Singh 2019)", Boa::set_up),

@@ -1,9 +1,10 @@
-"""BFOA, IBFOA and BSO on a Field, written from seed paper 000 and Passino's article, not from the Rust code."""
+"""The bacteria on a Field, written from seed paper 000 and Passino's and Biswas's articles, not from the Rust code."""
 from math import exp, floor, sqrt
 
 S, NC, NS, NRE, NED, SR, STEP, PED = 4, 3, 2, 1, 3, 3, 0.4, 0.7
 D, WA, H, WR = 0.1, 20.0, 0.3, 100.0
 W, C1, C2 = 0.9, 1.2, 0.5
+W_STEP, C_STEP = 0.729, 1.494
 
 
 def unit_vector(v):
@@ -11,7 +12,7 @@ def unit_vector(v):
     return [a / n for a in v]
 
 
-def colony(field, method, printed, elite="healthiest"):
+def colony(field, method, printed, elite):
     draw = field.draw
     theta = field.crowd(S)
     speed = [[0.0] * len(theta[0][0]) for _ in range(S)]
@@ -35,11 +36,15 @@ def colony(field, method, printed, elite="healthiest"):
                 return unit_vector(speed[i])
         return unit_vector([draw.within(-1.0, 1.0) for _ in x])
 
-    def move(i, delta):
+    def move(i, delta, j_last):
+        here = theta[i]
         theta[i] = field.ask([a + STEP * b for a, b in zip(theta[i][0], delta)])
         if theta[i][1] < own[i][1]:
             own[i] = theta[i]
-        return theta[i][1] + j_ar(i)
+        now = theta[i][1] + j_ar(i)
+        if method == "greedy-bfoa" and not now < j_last:
+            theta[i] = here
+        return now
 
     n, total = 0, NC * NRE * NED
     for ell in range(NED):
@@ -50,12 +55,17 @@ def colony(field, method, printed, elite="healthiest"):
                     j_last = theta[i][1] + j_ar(i)
                     health[i] += j_last
                     delta = heading(i)
-                    now = move(i, delta)
+                    now = move(i, delta, j_last)
                     for m in range(NS):
                         if not now < j_last:
                             break
                         j_last = now
-                        now = move(i, delta)
+                        now = move(i, delta, j_last)
+                for i in range(S) if method == "bso-step" else ():
+                    x = theta[i][0]
+                    speed[i] = [W_STEP * v + C_STEP * draw.unit() * (g - a)
+                                for v, g, a in zip(speed[i], field.best[0], x)]
+                    theta[i] = field.ask([a + v for a, v in zip(x, speed[i])])
                 n += 1
             for i in range(S):
                 health[i] += theta[i][1] + j_ar(i)
@@ -67,10 +77,14 @@ def colony(field, method, printed, elite="healthiest"):
             speed = [list(speed[i]) for i in order]
         if ell == NED - 1 and not printed:
             break
-        exempt = None
-        if method == "ibfoa":
-            exempt = 0 if elite == "healthiest" else min(range(S), key=lambda i: theta[i][1])
+        exempt = {"nobody": None, "healthiest": 0, "best": min(range(S), key=lambda i: theta[i][1])}[elite]
         for i in range(S):
             if i != exempt and draw.unit() < PED * decay:
                 theta[i] = field.ask(field.anywhere())
                 own[i], speed[i] = theta[i], [0.0] * len(theta[i][0])
+
+
+def sampling(field, printed):
+    """Five populations of six."""
+    for _ in range(5):
+        field.crowd(6)

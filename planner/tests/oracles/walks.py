@@ -23,10 +23,18 @@ def walks():
     for name, walk in {**single, **double}.items():
         for printed in (False, True) if name in double else (False,):
             yield name, printed, walk
-    for name in ("bfoa", "ibfoa", "bso"):
+    elites = {"bfoa": "nobody", "ibfoa": "healthiest", "bso": "nobody", "bso-step": "nobody"}
+    for name, elite in elites.items():
         for printed in (False, True):
-            yield name, printed, lambda field, printed, name=name: paper_000.colony(field, name, printed)
-    yield "ibfoa-best", False, lambda field, printed: paper_000.colony(field, "ibfoa", printed, "best")
+            yield name, printed, bacteria(name, elite)
+    yield "ibfoa-best", False, bacteria("ibfoa", "best")
+    yield "bfoa-elite", False, bacteria("bfoa", "healthiest")
+    yield "greedy-bfoa", False, bacteria("greedy-bfoa", "best")
+    yield "sampling", False, paper_000.sampling
+
+
+def bacteria(method, elite):
+    return lambda field, printed: paper_000.colony(field, method, printed, elite)
 
 
 def lines():
