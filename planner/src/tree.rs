@@ -1,8 +1,9 @@
-//! RRT-Connect: two trees of proven edges that grow towards each other.
+//! Trees of free edges: RRT-Connect, with two that grow towards each other, and the plain RRT with one.
 //!
-//! Source: Kuffner and `LaValle`, "RRT-Connect: An Efficient Approach to Single-Query Path Planning", ICRA 2000.
-//! Distances between poses weigh each joint with how far it can move a point of the arm, so that a step means about
-//! the same way in space for every joint.
+//! Source: Kuffner and `LaValle`, "RRT-Connect: An Efficient Approach to Single-Query Path Planning", ICRA 2000;
+//! `LaValle`, "Rapidly-Exploring Random Trees: A New Tool for Path Planning", 1998. What poses, distances and free edges
+//! are is a matter of the [`Field`] that they grow in. In the arm's [`Space`], distances between poses weigh each joint
+//! with how far it can move a point of the arm, so that a step means about the same way in space for every joint.
 use crate::collide::{Motion, StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
 use crate::work::Work;
@@ -15,6 +16,53 @@ const STEP_M: f64 = 0.35;
 const WEIGHT_M_MIN: f64 = 0.1;
 /// Most nodes of both trees; bounds memory and the linear search for the nearest.
 const NODES_MAX: usize = 20_000;
+
+/// What trees grow in.
+pub trait Field {
+    /// Longest edge, in the unit of [`Self::distance`].
+    fn step(&self) -> f64;
+
+    /// Distance of two poses.
+    fn distance(&self, a: &JointArray, b: &JointArray) -> f64;
+
+    /// True when the straight edge between two poses is free.
+    fn is_edge_free(&self, a: &JointArray, b: &JointArray) -> bool;
+
+    /// Poses that were checked so far: the measure of work that every machine agrees on.
+    fn checks(&self) -> usize;
+
+    /// True when the search has to end.
+    fn is_over(&self) -> bool;
+
+    /// A uniform pose.
+    fn draw_pose(&self, draw: &mut Draw) -> JointArray;
+}
+
+impl Field for Space<'_> {
+    fn step(&self) -> f64 {
+        STEP_M
+    }
+
+    fn distance(&self, a: &JointArray, b: &JointArray) -> f64 {
+        self.distance_m(a, b)
+    }
+
+    fn is_edge_free(&self, a: &JointArray, b: &JointArray) -> bool {
+        self.is_edge_free(a, b)
+    }
+
+    fn checks(&self) -> usize {
+        self.checks()
+    }
+
+    fn is_over(&self) -> bool {
+        self.work.is_over()
+    }
+
+    fn draw_pose(&self, draw: &mut Draw) -> JointArray {
+        self.draw_pose(draw)
+    }
+}
 
 /// How the joints count in the distance of two poses, and straight edges that are proven.
 pub struct Space<'a> {
@@ -82,7 +130,7 @@ impl<'a> Space<'a> {
 pub struct Search {
     /// The path, both ends included; `None` when the budget or the clock ended the search.
     pub path: Option<Vec<JointArray>>,
-    /// Nodes of both trees.
+    /// Nodes of all trees.
     pub nodes: usize,
 }
 
@@ -99,29 +147,59 @@ enum Reached {
     Target(usize),
 }
 
-/// Looks for a path between two free poses until `checks_max` poses have been checked.
-pub fn rrt_connect(
-    space: &Space,
+/// Share of the random poses that are the goal, for a single tree; 5 to 10 % are usual.
+const GOAL_BIAS: f64 = 0.05;
+
+/// Looks for a path between two free poses with one tree that grows from the start, until `checks_max` poses have been
+/// checked.
+///
+/// Random numbers: whether the next pose is the goal, and the pose if it is not.
+pub fn rrt(
+    field: &impl Field,
     start_rad: &JointArray,
     goal_rad: &JointArray,
     checks_max: usize,
     draw: &mut Draw,
 ) -> Search {
-    let end = space.checks() + checks_max;
+    let end = field.checks().saturating_add(checks_max);
+    let mut tree = Tree { nodes: vec![(*start_rad, 0)] };
+    loop {
+        let nodes = tree.nodes.len();
+        if field.checks() >= end || nodes >= NODES_MAX || field.is_over() {
+            return Search { path: None, nodes };
+        }
+        let is_goal = draw.unit() < GOAL_BIAS;
+        let target = if is_goal { *goal_rad } else { field.draw_pose(draw) };
+        let grown = tree.extend(field, &target);
+        if let (true, Reached::Target(new)) = (is_goal, grown) {
+            return Search { path: Some(tree.path_to(new)), nodes: tree.nodes.len() };
+        }
+    }
+}
+
+/// Looks for a path between two free poses with two trees until `checks_max` poses have been checked.
+pub fn rrt_connect(
+    field: &impl Field,
+    start_rad: &JointArray,
+    goal_rad: &JointArray,
+    checks_max: usize,
+    draw: &mut Draw,
+) -> Search {
+    let end = field.checks().saturating_add(checks_max);
     let mut from_start = Tree { nodes: vec![(*start_rad, 0)] };
     let mut from_goal = Tree { nodes: vec![(*goal_rad, 0)] };
     let mut swapped = false;
     loop {
         let nodes = from_start.nodes.len() + from_goal.nodes.len();
-        if space.checks() >= end || nodes >= NODES_MAX || space.work.is_over() {
+        if field.checks() >= end || nodes >= NODES_MAX || field.is_over() {
             return Search { path: None, nodes };
         }
         let (growing, other) =
             if swapped { (&mut from_goal, &mut from_start) } else { (&mut from_start, &mut from_goal) };
-        let target = space.draw_pose(draw);
-        if let Reached::Advanced(new) | Reached::Target(new) = growing.extend(space, &target) {
+        let target = field.draw_pose(draw);
+        if let Reached::Advanced(new) | Reached::Target(new) = growing.extend(field, &target) {
             let meeting = growing.nodes[new].0;
-            if let Some(there) = other.connect(space, &meeting, end) {
+            if let Some(there) = other.connect(field, &meeting, end) {
                 let (mut path, mut rest) = (growing.path_to(new), other.path_to(there));
                 if swapped {
                     std::mem::swap(&mut path, &mut rest);
@@ -136,16 +214,16 @@ pub fn rrt_connect(
 
 impl Tree {
     /// One step from the nearest node towards a pose.
-    fn extend(&mut self, space: &Space, target: &JointArray) -> Reached {
-        let (nearest, distance_m) = self.nearest(space, target);
-        self.step(space, nearest, target, distance_m)
+    fn extend(&mut self, field: &impl Field, target: &JointArray) -> Reached {
+        let (nearest, distance) = self.nearest(field, target);
+        self.step(field, nearest, target, distance)
     }
 
-    fn step(&mut self, space: &Space, from: usize, target: &JointArray, distance_m: f64) -> Reached {
-        let reaches = distance_m <= STEP_M;
+    fn step(&mut self, field: &impl Field, from: usize, target: &JointArray, distance: f64) -> Reached {
+        let reaches = distance <= field.step();
         let base = self.nodes[from].0;
-        let pose = if reaches { *target } else { Space::between(&base, target, STEP_M / distance_m) };
-        if !space.is_edge_free(&base, &pose) {
+        let pose = if reaches { *target } else { Space::between(&base, target, field.step() / distance) };
+        if !field.is_edge_free(&base, &pose) {
             return Reached::Trapped;
         }
         self.nodes.push((pose, from));
@@ -154,11 +232,11 @@ impl Tree {
     }
 
     /// Steps towards a pose until it is reached or the way is blocked.
-    fn connect(&mut self, space: &Space, target: &JointArray, checks_end: usize) -> Option<usize> {
-        let (mut from, _) = self.nearest(space, target);
-        while space.checks() < checks_end && self.nodes.len() < NODES_MAX && !space.work.is_over() {
-            let distance_m = space.distance_m(&self.nodes[from].0, target);
-            match self.step(space, from, target, distance_m) {
+    fn connect(&mut self, field: &impl Field, target: &JointArray, checks_end: usize) -> Option<usize> {
+        let (mut from, _) = self.nearest(field, target);
+        while field.checks() < checks_end && self.nodes.len() < NODES_MAX && !field.is_over() {
+            let distance = field.distance(&self.nodes[from].0, target);
+            match self.step(field, from, target, distance) {
                 Reached::Trapped => return None,
                 Reached::Advanced(new) => from = new,
                 Reached::Target(new) => return Some(new),
@@ -167,12 +245,12 @@ impl Tree {
         None
     }
 
-    fn nearest(&self, space: &Space, target: &JointArray) -> (usize, f64) {
+    fn nearest(&self, field: &impl Field, target: &JointArray) -> (usize, f64) {
         let mut best = (0, f64::INFINITY);
         for (i, (pose, _)) in self.nodes.iter().enumerate() {
-            let distance_m = space.distance_m(pose, target);
-            if distance_m < best.1 {
-                best = (i, distance_m);
+            let distance = field.distance(pose, target);
+            if distance < best.1 {
+                best = (i, distance);
             }
         }
         best

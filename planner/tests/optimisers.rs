@@ -399,7 +399,8 @@ fn greedy_bacteria_lose_their_best_to_attraction_and_to_death_only() {
     let with = |swarming, survivors| Parameters { swarming, survivors, ..greedy.parameters };
     let alone = Bfoa { parameters: with(None, 12), ..greedy };
     assert_eq!(rises(&alone), 0);
-    let drawn = Bfoa { parameters: with(Some(Swarming::PAPER), 12), ..greedy };
+    let far = Swarming { attraction: [1e3, 1e-3], repulsion: [0.0, 1.0] };
+    let drawn = Bfoa { parameters: with(Some(far), 12), ..greedy };
     let mortal = Bfoa { parameters: with(None, 6), ..greedy };
     for other in [drawn, mortal, Bfoa { greedy: false, ..alone }, Bfoa { exempt: Exempt::Nobody, ..alone }] {
         assert!(rises(&other) > 0, "{other:?}");
