@@ -11,6 +11,8 @@ pub enum PlannerKind {
     Straight,
     /// RRT-Connect with shortcuts.
     RrtConnect,
+    /// The plain RRT with shortcuts: one tree, from the start.
+    Rrt,
     /// A metaheuristic over three control points, started from the straight line only (the papers' way). Its best
     /// path counts only when every edge of it is proven free; otherwise there is no plan.
     Optimiser(&'static Method),
@@ -19,7 +21,7 @@ pub enum PlannerKind {
 impl PlannerKind {
     /// Every kind; each method of the registry is one.
     pub fn all() -> impl Iterator<Item = Self> {
-        let own = [Self::Auto, Self::Straight, Self::RrtConnect];
+        let own = [Self::Auto, Self::Straight, Self::RrtConnect, Self::Rrt];
         own.into_iter().chain(METHODS.iter().map(Self::Optimiser))
     }
 
@@ -30,6 +32,7 @@ impl PlannerKind {
             Self::Auto => "auto",
             Self::Straight => "straight",
             Self::RrtConnect => "rrt-connect",
+            Self::Rrt => "rrt",
             Self::Optimiser(method) => method.name,
         }
     }
@@ -41,6 +44,7 @@ impl PlannerKind {
             Self::Auto => "straight line, else search, shortcuts and refinement; the best motion wins",
             Self::Straight => "straight joint-space line, or nothing",
             Self::RrtConnect => "two random trees that grow towards each other, with shortcuts",
+            Self::Rrt => "one random tree from the start (LaValle 1998), with shortcuts",
             Self::Optimiser(method) => method.about,
         }
     }

@@ -11,7 +11,7 @@ use crate::plan::{Plan, PlanError, PlanOptions};
 use crate::refine::refine;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
-use crate::tree::{Space, rrt_connect};
+use crate::tree::{Search, Space, rrt, rrt_connect};
 use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
 use crate::work::Work;
 use crate::world::World;
@@ -21,8 +21,28 @@ use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 const SAME_RAD: f64 = 1e-12;
 /// Independent searches; the best path of them is kept.
 const SEARCHES: u64 = 3;
-/// Where a searched path comes from, for users.
-const SEARCHED: &str = "RRT-Connect with shortcuts";
+
+/// A search with trees.
+struct Trees {
+    /// Its name, for users.
+    name: &'static str,
+    /// Where a path of it with shortcuts comes from, for users.
+    searched: &'static str,
+    /// From a start to a goal, with so many poses checked.
+    grow: fn(&Space, [&JointArray; 2], usize, &mut Draw) -> Search,
+}
+
+const RRT_CONNECT: Trees = Trees {
+    name: "RRT-Connect",
+    searched: "RRT-Connect with shortcuts",
+    grow: |space, [start, goal], checks, draw| rrt_connect(space, start, goal, checks, draw),
+};
+const RRT: Trees = Trees {
+    name: "RRT",
+    searched: "RRT with shortcuts",
+    grow: |space, [start, goal], checks, draw| rrt(space, start, goal, checks, draw),
+};
+
 /// What a corner costs in comparing paths: about what a stop there would (s).
 const CORNER_S: f64 = 0.3;
 
@@ -114,12 +134,8 @@ impl<'a> Pipeline<'a> {
                     self.around(&line);
                 }
             }
-            PlannerKind::RrtConnect => {
-                if let Some(path) = self.search(&line) {
-                    self.propose(&path, SEARCHED);
-                    self.round(&path, SEARCHED);
-                }
-            }
+            PlannerKind::RrtConnect => self.through(&line, &RRT_CONNECT),
+            PlannerKind::Rrt => self.through(&line, &RRT),
             PlannerKind::Optimiser(method) => {
                 let evaluations = self.budget.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
@@ -134,11 +150,19 @@ impl<'a> Pipeline<'a> {
         self.finish()
     }
 
+    /// A searched path, wherever the straight line leads.
+    fn through(&mut self, line: &[JointArray], trees: &Trees) {
+        if let Some(path) = self.search(line, trees) {
+            self.propose(&path, trees.searched);
+            self.round(&path, trees.searched);
+        }
+    }
+
     /// A path round what blocks the straight line: searched, and refined from both, since a refinement stays near
     /// where it starts.
     fn around(&mut self, line: &[JointArray]) {
-        let Some(path) = self.search(line) else { return };
-        self.propose(&path, SEARCHED);
+        let Some(path) = self.search(line, &RRT_CONNECT) else { return };
+        self.propose(&path, RRT_CONNECT.searched);
         let each = self.budget.refinements / 2;
         let ibfoa = Ibfoa::set_up(Setup { reading: self.options.reading, evaluations: Some(each) });
         let from_path = self.refine(&path, &ibfoa, each, "that");
@@ -146,7 +170,7 @@ impl<'a> Pipeline<'a> {
         for refined in [from_path, from_line].into_iter().flatten() {
             self.round(&refined, "IBFOA");
         }
-        self.round(&path, SEARCHED);
+        self.round(&path, RRT_CONNECT.searched);
     }
 
     fn path<'p>(&'p self, corners_rad: &'p [JointArray]) -> Path<'p> {
@@ -214,7 +238,7 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Several searches with shortcuts; the path that is estimated to be fastest.
-    fn search(&mut self, line: &[JointArray]) -> Option<Vec<JointArray>> {
+    fn search(&mut self, line: &[JointArray], trees: &Trees) -> Option<Vec<JointArray>> {
         let [start, goal] = line else { return None };
         let mut best: Option<(f64, Vec<JointArray>)> = None;
         let (mut nodes, mut found) = (0, 0);
@@ -222,13 +246,13 @@ impl<'a> Pipeline<'a> {
         for stream in 0..SEARCHES {
             let mut draw = Draw::new(self.options.seed, 10 + stream);
             let left = end.saturating_sub(self.space.checks());
-            let search = rrt_connect(&self.space, start, goal, left, &mut draw);
+            let search = (trees.grow)(&self.space, [start, goal], left, &mut draw);
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
             if found == 1 {
                 // An answer, before time is spent on better ones.
-                self.propose(&path, "RRT-Connect");
+                self.propose(&path, trees.name);
             }
             shorten(&self.space, &mut path, self.budget.shortcuts, &mut draw);
             let estimate_s = self.estimate_s(&path);
@@ -236,7 +260,7 @@ impl<'a> Pipeline<'a> {
                 best = Some((estimate_s, path));
             }
         }
-        self.tried.push(format!("RRT-Connect ({nodes} nodes, {found} of {SEARCHES} searches)"));
+        self.tried.push(format!("{} ({nodes} nodes, {found} of {SEARCHES} searches)", trees.name));
         best.map(|(_, path)| path)
     }
 

@@ -23,7 +23,7 @@ fn every_registered_method_is_a_planner_and_words_are_unique() {
     let count = names.len();
     names.sort_unstable();
     names.dedup();
-    assert_eq!((names.len(), count), (count, METHODS.len() + 3));
+    assert_eq!((names.len(), count), (count, METHODS.len() + 4));
     for reading in Reading::ALL {
         assert_eq!(Reading::from_name(reading.name()), Some(reading));
     }

@@ -33,13 +33,14 @@ fn free_pose(robot: &Robot, scene: &Scene, draw: &mut Draw) -> JointArray {
 fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
     let robot = ur5();
     let (mut found, mut round) = (0, 0);
-    for seed in 0..24 {
+    for seed in 0..25 {
         let mut draw = Draw::new(seed, 100);
         let scene = random_spheres(&mut draw);
         let (start, goal) = (free_pose(&robot, &scene, &mut draw), free_pose(&robot, &scene, &mut draw));
         let ibfoa = PlannerKind::from_name("ibfoa").expect("registered");
-        let kinds = [PlannerKind::Auto, PlannerKind::Straight, PlannerKind::RrtConnect, ibfoa];
-        let kind = kinds[usize::try_from(seed).expect("small") % 4];
+        let kinds =
+            [PlannerKind::Auto, PlannerKind::Straight, PlannerKind::RrtConnect, ibfoa, PlannerKind::Rrt];
+        let kind = kinds[usize::try_from(seed).expect("small") % 5];
         let Ok(plan) = plan(&robot, &scene, &start, &goal, &options(seed, 600, kind)) else { continue };
         found += 1;
         round += usize::from(!plan.how.starts_with("straight"));
@@ -111,6 +112,18 @@ fn planning_one_seed_gives_one_answer_on_any_thread() {
     }
     let other_seed = plan(&robot, &scene, &start, &goal, &options(8, 700, PlannerKind::RrtConnect));
     assert_ne!(first.trajectory, other_seed.expect("found").trajectory, "another seed, another motion");
+}
+
+/// Goal: the plain tree, chosen by name, finds its way round pillars with one tree, and says that it was the one.
+#[test]
+fn planning_with_the_plain_tree_by_name_goes_round_pillars() {
+    let (robot, scene) = (ur5(), scene("pillars"));
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    let rrt = PlannerKind::from_name("rrt").expect("a planner");
+    let plan = plan(&robot, &scene, &start, &goal, &options(2, 4_000, rrt)).expect("found");
+    assert_eq!(verify(&robot, &scene, &plan.trajectory).as_ref(), Ok(&plan.proof));
+    assert!(plan.how.contains("RRT (") && !plan.how.contains("Connect"), "{}", plan.how);
 }
 
 /// A goal inside a cage of spheres: every way in is shut, the goal itself is free.

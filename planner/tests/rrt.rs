@@ -1,5 +1,4 @@
 //! The plain tree of seed paper 000's third contender, against a program written from its report.
-#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use std::cell::Cell;
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::draw::Draw;
