@@ -1,6 +1,7 @@
 //! The words of the command line. Units stand in every name; every default stands in the help.
 mod live;
 mod offline;
+mod papers;
 
 pub(crate) use live::{
     CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
@@ -9,6 +10,8 @@ pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs,
     PlotArgs, SampleArgs,
 };
+
+pub(crate) use papers::PapersArgs;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;

@@ -227,6 +227,8 @@ pub(crate) enum BenchName {
     ///
     /// As with `cycle`, no servos are needed, and real ones on the bus would get setpoints.
     Compare(CompareArgs),
+    /// Judge the claims of the five seed papers: their tables beside ours, claim by claim.
+    Papers(super::PapersArgs),
 }
 
 /// What `taustream bench compare` takes.

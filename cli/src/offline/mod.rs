@@ -5,6 +5,7 @@ pub(crate) mod check;
 mod checked_robot;
 mod compare;
 pub(crate) mod cost;
+mod papers;
 pub(crate) mod plan;
 pub(crate) mod plot;
 mod protocol_line;

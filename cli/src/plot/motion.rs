@@ -1,11 +1,12 @@
 //! A trajectory: position, velocity, acceleration and jerk of every joint, beside its limits where the robot is known,
 //! and the arm in three views.
-use super::panel::{Area, Curve, Drawn, JOINT_COLOURS, LimitLine, draw_panels, thinned, undrawable};
+use super::panel::{JOINT_COLOURS, draw_panels, undrawable};
 use super::views::Stage;
 use crate::failure::Failure;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::Path;
 use taustream_arm::{Robot, RobotJoint, Scene, TrajectoryFile};
+use taustream_claims::chart::{Area, Curve, Drawn, LimitLine, thinned};
 use taustream_motion::trajectory::Cursor;
 
 /// Samples of each curve.

@@ -2,10 +2,10 @@
 //!
 //! All shapes but meshes are convex, and a projection of a convex body is convex: it is the hull of the projected
 //! corners, or of points on the rims. A mesh of a scene is drawn as its hull.
-use super::panel::Point;
 use nalgebra::Point3;
 use std::f64::consts::TAU;
 use taustream_arm::scene::Shape;
+use taustream_claims::chart::Point;
 use taustream_motion::chain::Pose;
 
 /// Points on a circle: enough to look round at any size on a page.

@@ -3,11 +3,12 @@
 //! Commanded derivatives are the streamer's own. Drives send positions only, so measured derivatives are those of a
 //! cubic fitted to the measured positions around each instant (Savitzky and Golay, Analytical Chemistry 36, 1964, for
 //! uneven times); the pictures say so. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
-use super::panel::{Area, Curve, Drawn, JOINT_COLOURS, PANELS, Point, draw_panels, thinned, undrawable};
+use super::panel::{JOINT_COLOURS, PANELS, draw_panels, undrawable};
 use crate::failure::Failure;
 use crate::output::write_whole;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::{Path, PathBuf};
+use taustream_claims::chart::{Area, Curve, Drawn, Point, thinned};
 use taustream_motion::{JointArray, Setpoint};
 
 /// One instant of a recording.

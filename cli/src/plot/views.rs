@@ -1,10 +1,10 @@
 //! The arm among its obstacles, from above, from the front and from the side, all at one scale.
 use super::outline::{View, clipped, outline};
-use super::panel::{Area, Drawn, Point, span};
 use nalgebra::Point3;
 use plotters::prelude::{ChartBuilder, Circle, Color, IntoFont, LineSeries, Polygon, RGBColor, Text};
 use std::ops::Range;
 use taustream_arm::{Robot, Scene};
+use taustream_claims::chart::{Area, Drawn, Point, span};
 use taustream_motion::{JointArray, Trajectory};
 
 /// Poses of the arm from start to end; more run together.

@@ -1,0 +1,226 @@
+//! One panel of curves. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
+use plotters::coord::Shift;
+use plotters::prelude::{
+    ChartBuilder, Color, DashedLineSeries, DrawingArea, LineSeries, PathElement, Polygon, RGBColor,
+    SVGBackend, SeriesLabelPosition, ShapeStyle, WHITE,
+};
+use std::ops::Range;
+
+/// Most points of one curve; more cannot be seen and make the file heavy.
+const POINTS_MAX: usize = 1200;
+/// Share of the horizontal axis that is left to the legend.
+const LEGEND_SHARE: f64 = 0.16;
+/// Least value that a logarithmic axis shows: what is below is rounding.
+const LOG_LEAST: f64 = 1e-16;
+/// Colours told apart by colour-blind eyes too (Okabe and Ito).
+pub const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(213, 94, 0),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(150, 150, 0),
+    RGBColor(0, 0, 0),
+];
+
+/// The colour of curve number `i`; they repeat after eight.
+#[must_use]
+pub fn palette(i: usize) -> RGBColor {
+    COLOURS.iter().copied().cycle().nth(i % COLOURS.len()).unwrap_or(RGBColor(0, 0, 0))
+}
+
+/// What is drawn on.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A point of a panel.
+pub type Point = (f64, f64);
+/// plotters' errors have a type for every backend; nobody tells them apart.
+pub type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+/// A curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Stands in the legend; empty does not.
+    pub label: String,
+    /// Its colour.
+    pub colour: RGBColor,
+    /// Its width.
+    pub width_px: u32,
+    /// From 0 to 1.
+    pub opacity: f64,
+    /// Its points.
+    pub points: Vec<Point>,
+}
+
+/// A value that curves must keep to, drawn across the panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitLine {
+    /// The value.
+    pub value: f64,
+    /// Its colour.
+    pub colour: RGBColor,
+    /// Stands in the legend; empty does not.
+    pub label: String,
+}
+
+/// A filled outline: a spread, an obstacle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filled {
+    /// Its corners.
+    pub points: Vec<Point>,
+    /// Its colour.
+    pub colour: RGBColor,
+    /// From 0 to 1.
+    pub opacity: f64,
+}
+
+/// Curves over one pair of axes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Panel {
+    /// Name of the horizontal axis.
+    pub x: String,
+    /// Name of the vertical axis.
+    pub y: String,
+    /// The vertical axis is logarithmic.
+    pub is_log: bool,
+    /// A length is the same in both directions, as on a map.
+    pub is_map: bool,
+    /// Curves.
+    pub curves: Vec<Curve>,
+    /// Limits.
+    pub limits: Vec<LimitLine>,
+    /// Filled outlines, below the curves.
+    pub filled: Vec<Filled>,
+}
+
+impl Panel {
+    /// An empty panel.
+    #[must_use]
+    pub fn new(x: &str, y: &str) -> Self {
+        Self { x: x.to_owned(), y: y.to_owned(), ..Self::default() }
+    }
+
+    /// Adds a curve in the next colour.
+    pub fn line(&mut self, label: &str, points: Vec<Point>) {
+        let colour = palette(self.curves.len());
+        self.curves.push(Curve { label: label.to_owned(), colour, width_px: 2, opacity: 1.0, points });
+    }
+
+    /// The same panel with its values as the vertical axis has them.
+    fn scaled(&self) -> Self {
+        let mut scaled = self.clone();
+        if self.is_log {
+            let curves = scaled.curves.iter_mut().flat_map(|c| c.points.iter_mut());
+            for (_, y) in curves.chain(scaled.filled.iter_mut().flat_map(|f| f.points.iter_mut())) {
+                *y = y.max(LOG_LEAST).log10();
+            }
+            for limit in &mut scaled.limits {
+                limit.value = limit.value.max(LOG_LEAST).log10();
+            }
+        }
+        scaled
+    }
+}
+
+/// Draws a panel with its legend on the right.
+///
+/// # Errors
+/// When plotters cannot draw it.
+pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
+    let scaled = panel.scaled();
+    let Panel { curves, limits, filled, is_log, .. } = &scaled;
+    let (across, values) = ranges(area, &scaled);
+    let ends = [across.start, across.end - (across.end - across.start) * LEGEND_SHARE / (1.0 + LEGEND_SHARE)];
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(14)
+        .margin_right(16)
+        .x_label_area_size(34)
+        .y_label_area_size(74)
+        .build_cartesian_2d(across, values)?;
+    let exponent = |y: &f64| format!("1e{y:.1}");
+    let plain = |y: &f64| crate::number::figures(*y);
+    chart
+        .configure_mesh()
+        .x_desc(&panel.x)
+        .y_desc(&panel.y)
+        .x_labels(12)
+        .y_labels(6)
+        .x_label_formatter(&plain)
+        .y_label_formatter(if *is_log { &exponent } else { &plain })
+        .label_style(("sans-serif", 14))
+        .light_line_style(RGBColor(245, 245, 245))
+        .draw()?;
+    for limit in limits {
+        let style = limit.colour.mix(0.8).stroke_width(1);
+        let points = ends.map(|x| (x, limit.value));
+        let series = chart.draw_series(DashedLineSeries::new(points, 7, 5, style))?;
+        if !limit.label.is_empty() {
+            series
+                .label(limit.label.clone())
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 6, y)], style));
+        }
+    }
+    chart.draw_series(filled.iter().map(|f| Polygon::new(f.points.clone(), f.colour.mix(f.opacity))))?;
+    for curve in curves {
+        let style: ShapeStyle = curve.colour.mix(curve.opacity).stroke_width(curve.width_px);
+        let series = chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
+        if !curve.label.is_empty() {
+            series
+                .label(curve.label.clone())
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style.stroke_width(2)));
+        }
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    Ok(())
+}
+
+/// The axes: all points and limits, with a little room above and below.
+fn ranges(area: &Area<'_>, panel: &Panel) -> (Range<f64>, Range<f64>) {
+    let outlines = || panel.filled.iter().flat_map(|f| &f.points);
+    let points = || panel.curves.iter().flat_map(|c| &c.points).chain(outlines());
+    let across = span(points().map(|p| p.0));
+    let values = span(points().map(|p| p.1).chain(panel.limits.iter().map(|l| l.value)));
+    let room = 0.06 * (values.end - values.start);
+    let mut values = values.start - room..values.end + room;
+    // The legend stands right of the curves, where it hides none.
+    let mut across = across.start..across.end + LEGEND_SHARE * (across.end - across.start);
+    if panel.is_map {
+        let (width_px, height_px) = area.dim_in_pixel();
+        let [wide, high] = [width_px, height_px].map(f64::from);
+        let scale = ((across.end - across.start) / wide).max((values.end - values.start) / high);
+        across.end = across.start + scale * wide;
+        values.end = values.start + scale * high;
+    }
+    (across, values)
+}
+
+/// Least and largest value; never empty, so that an axis can be drawn.
+#[must_use]
+pub fn span(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    if low < high {
+        low..high
+    } else if low.is_finite() {
+        low - 0.5..low + 0.5
+    } else {
+        0.0..1.0
+    }
+}
+
+/// Finite points, evenly thinned; the last one stays.
+#[must_use]
+pub fn thinned(points: Vec<Point>) -> Vec<Point> {
+    let points: Vec<Point> = points.into_iter().filter(|(t, y)| t.is_finite() && y.is_finite()).collect();
+    let step = points.len().div_ceil(POINTS_MAX).max(1);
+    let last = points.last().copied();
+    let mut kept: Vec<Point> = points.into_iter().step_by(step).collect();
+    if kept.last().copied() != last {
+        kept.extend(last);
+    }
+    kept
+}

@@ -1,0 +1,180 @@
+//! How much work an experiment may do, and how its runs are spread over threads.
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use taustream_planner::optimize::Refusal;
+use taustream_planner::papers::spline::SplineError;
+
+/// How much work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Effort {
+    /// Runs of everything random; `None` is each experiment's own number (the paper's in a full run).
+    pub runs: Option<usize>,
+    /// Few and short runs: shows that everything works, and proves nothing.
+    pub quick: bool,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Threads; the answer does not depend on them.
+    pub jobs: usize,
+}
+
+/// Most runs and threads; bounds against absurd arguments.
+pub(crate) const RUNS_MAX: usize = 100_000;
+const JOBS_MAX: usize = 256;
+
+/// Why an experiment has no outcome.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Stop {
+    /// The user ended it.
+    #[error("the experiments were ended before they were done")]
+    Interrupted,
+    /// A method or a problem did not take its numbers.
+    #[error("an experiment's numbers were refused: {0}")]
+    Refused(String),
+}
+
+impl From<Refusal> for Stop {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal.to_string())
+    }
+}
+
+impl From<SplineError> for Stop {
+    fn from(refusal: SplineError) -> Self {
+        Self::Refused(refusal.to_string())
+    }
+}
+
+/// What experiments run in.
+pub struct Lab<'a> {
+    effort: Effort,
+    /// Told what is going on, a sentence at a time.
+    say: &'a (dyn Fn(&str) + Sync),
+    /// Asked before every batch of evaluations; true ends everything.
+    is_over: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl<'a> Lab<'a> {
+    /// A lab that reports with `say` and works until `is_over`.
+    #[must_use]
+    pub fn new(
+        effort: Effort,
+        say: &'a (dyn Fn(&str) + Sync),
+        is_over: &'a (dyn Fn() -> bool + Sync),
+    ) -> Self {
+        Self { effort, say, is_over }
+    }
+
+    /// True when few and short runs are asked for.
+    #[must_use]
+    pub fn is_quick(&self) -> bool {
+        self.effort.quick
+    }
+
+    /// The first of two choices in a full run, the other one in a quick one.
+    #[must_use]
+    pub fn choose<T>(&self, full: T, quick: T) -> T {
+        if self.effort.quick { quick } else { full }
+    }
+
+    /// How many runs: what the user asked for, else `full` or `quick`.
+    #[must_use]
+    pub fn runs(&self, full: usize, quick: usize) -> usize {
+        self.effort.runs.unwrap_or_else(|| self.choose(full, quick)).clamp(1, RUNS_MAX)
+    }
+
+    /// The seed of a run. All methods get the same one for the same run, so that they begin with the same random
+    /// numbers and are compared pair by pair.
+    #[must_use]
+    pub fn seed(&self, run: usize) -> u64 {
+        // Neighbouring seeds and runs must not meet: spread by the odd constant of Steele, Lea and Flood's SplitMix.
+        self.effort.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(run as u64)
+    }
+
+    /// Says what is going on.
+    pub fn say(&self, text: &str) {
+        (self.say)(text);
+    }
+
+    /// True when everything has to end.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        (self.is_over)()
+    }
+
+    /// Does `one` for every number below `count`, on all threads; the answers in the order of the numbers.
+    ///
+    /// # Errors
+    /// When the user ended it; else the first refusal, by number.
+    pub fn each<T: Send>(
+        &self,
+        count: usize,
+        one: impl Fn(usize) -> Result<T, Stop> + Sync,
+    ) -> Result<Vec<T>, Stop> {
+        let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let work = || {
+            let mut done = Vec::new();
+            loop {
+                let i = next.fetch_add(1, Ordering::Relaxed);
+                if i >= count || failed.load(Ordering::Relaxed) {
+                    return done;
+                }
+                let answer = if self.is_over() { Err(Stop::Interrupted) } else { one(i) };
+                failed.fetch_or(answer.is_err(), Ordering::Relaxed);
+                done.push((i, answer));
+            }
+        };
+        let helpers = self.effort.jobs.clamp(1, JOBS_MAX).min(count.max(1)) - 1;
+        let mut all = std::thread::scope(|scope| {
+            let helpers: Vec<_> = (0..helpers).map(|_| scope.spawn(work)).collect();
+            let mut all = work();
+            for helper in helpers {
+                match helper.join() {
+                    Ok(done) => all.extend(done),
+                    Err(panic) => std::panic::resume_unwind(panic),
+                }
+            }
+            all
+        });
+        all.sort_by_key(|(i, _)| *i);
+        all.into_iter().map(|(_, answer)| answer).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn effort(jobs: usize) -> Effort {
+        Effort { runs: None, quick: true, seed: 1, jobs }
+    }
+
+    #[test]
+    fn answers_keep_their_order_on_any_number_of_threads() {
+        for jobs in [0, 1, 2, 7, 300] {
+            let lab = Lab::new(effort(jobs), &|_| (), &|| false);
+            let squares = lab.each(100, |i| Ok(i * i)).unwrap();
+            assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i), "{jobs} jobs");
+            assert_eq!(lab.each(0, |_| Ok(())), Ok(Vec::new()));
+        }
+    }
+
+    #[test]
+    fn refusal_and_interruption_end_the_runs() {
+        let lab = Lab::new(effort(2), &|_| (), &|| false);
+        let refused = |i| if i == 3 { Err(Stop::Refused("three".to_owned())) } else { Ok(i) };
+        assert_eq!(lab.each(1000, refused), Err(Stop::Refused("three".to_owned())));
+        let over = Lab::new(effort(2), &|_| (), &|| true);
+        assert_eq!(over.each(1, |_| Ok(())), Err(Stop::Interrupted));
+    }
+
+    #[test]
+    fn seeds_of_neighbouring_efforts_and_runs_do_not_meet() {
+        let seeds = |seed: u64| {
+            let lab = Lab::new(Effort { seed, ..effort(1) }, &|_| (), &|| false);
+            (0..1000).map(|run| lab.seed(run)).collect::<Vec<_>>()
+        };
+        let mut all: Vec<u64> = (0..50).flat_map(seeds).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 50_000);
+    }
+}

@@ -1,0 +1,31 @@
+//! The experiments that judge what the seed papers claim, beside what the papers print.
+//!
+//! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_planner::papers`]) and answers
+//! with tables, pictures and claims. The papers' own values are the only constants in them ([`Cell::Paper`]);
+//! everything else was measured in this run, and a verdict follows from those numbers by a rule that stands beside
+//! it. One seed gives one answer on any number of threads. Nothing here plans for metal, and no time is measured
+//! but as a ratio.
+//!
+//! `taustream bench papers` runs them; docs/papers.md holds what a full run said.
+#![forbid(unsafe_code)]
+
+pub mod chart;
+mod claim;
+mod figure;
+mod lab;
+mod number;
+mod paper_001;
+mod registry;
+mod report;
+pub mod statistics;
+mod table;
+mod trial;
+
+pub use claim::{Claim, Verdict, agrees, better};
+pub use figure::Figure;
+pub use lab::{Effort, Lab, Stop};
+pub use number::figures;
+pub use registry::{EXPERIMENTS, Experiment, Outcome, PAPERS, Paper};
+pub use report::{Chapter, Report, run};
+pub use table::{Cell, Row, Table};
+pub use trial::{Sample, Trial, convergence, minimise};

@@ -1,0 +1,2 @@
+//! Seed paper 001: ISMA on benchmark functions, and splines of degree seven.
+pub(crate) mod benchmarks;

@@ -1,0 +1,54 @@
+//! Which experiments there are. A new one is a function and a line here.
+use crate::claim::Claim;
+use crate::figure::Figure;
+use crate::lab::{Lab, Stop};
+use crate::paper_001;
+use crate::table::Table;
+
+/// A seed paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Paper {
+    /// Its number.
+    pub number: u8,
+    /// Its file.
+    pub file: &'static str,
+    /// What it proposes.
+    pub about: &'static str,
+}
+
+/// The five.
+pub const PAPERS: [Paper; 5] = [
+    Paper { number: 0, file: "000_518aefc8cd38e163", about: "IBFOA over control points, Tau-J* strokes" },
+    Paper { number: 1, file: "001_5e4af5ebec08e134", about: "ISMA, degree-7 B-splines, time and impact" },
+    Paper { number: 2, file: "002_3862cf3632de683b", about: "virtual obstacles against traps in the plane" },
+    Paper { number: 3, file: "003_b15e0e655e3bf4df", about: "IEPSO, reward and punishment" },
+    Paper { number: 4, file: "004_e19ad8423bd62d7d", about: "IWO, via points and least-energy cubics" },
+];
+
+/// What an experiment brought.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Outcome {
+    /// Parameters that the paper does not give, and ours.
+    pub ours: Vec<String>,
+    /// Tables.
+    pub tables: Vec<Table>,
+    /// Pictures.
+    pub figures: Vec<Figure>,
+    /// Claims, judged.
+    pub claims: Vec<Claim>,
+}
+
+/// An experiment.
+#[derive(Clone, Copy)]
+pub struct Experiment {
+    /// Number of the paper whose claims it judges.
+    pub paper: u8,
+    /// What it looks at.
+    pub name: &'static str,
+    /// Does it.
+    pub run: fn(&Lab) -> Result<Outcome, Stop>,
+}
+
+/// Every experiment, in the order of the papers.
+pub const EXPERIMENTS: &[Experiment] =
+    &[Experiment { paper: 1, name: "benchmark functions", run: paper_001::benchmarks::run }];

@@ -1,0 +1,70 @@
+//! The tests of significance against scipy (oracles/statistics.py prints the numbers).
+use taustream_claims::statistics::{Moments, Summary, mann_whitney, welch, wilcoxon};
+
+const A: [f64; 12] = [0.31, 1.42, -0.77, 2.05, 0.11, 0.93, -1.18, 0.46, 1.71, -0.29, 0.64, 1.09];
+const B: [f64; 12] = [0.52, 0.37, -0.91, 1.14, 0.83, -0.46, -1.97, 0.05, 0.22, -0.33, 1.51, -0.72];
+const TIED: [f64; 10] = [1.0, 2.0, 2.0, 3.0, 5.0, 5.0, 5.0, 8.0, 8.0, 9.0];
+const OTHER: [f64; 10] = [1.0, 1.0, 3.0, 1.0, 4.0, 3.0, 7.0, 5.0, 8.0, 4.0];
+
+fn long() -> (Vec<f64>, Vec<f64>) {
+    let i = (0..60).map(f64::from);
+    (i.clone().map(|i| (1.7 * i).sin() + 0.2).collect(), i.map(|i| (2.3 * i).cos()).collect())
+}
+
+#[track_caller]
+fn near(ours: f64, scipy: f64, tolerance: f64) {
+    assert!((ours - scipy).abs() <= tolerance * scipy, "{ours} against {scipy}");
+}
+
+#[test]
+fn signed_ranks_without_ties_are_counted_exactly() {
+    near(wilcoxon(&A, &B).p, 0.063_964_843_75, 1e-14);
+    near(wilcoxon(&B, &A).p, 0.063_964_843_75, 1e-14);
+}
+
+#[test]
+fn signed_ranks_with_ties_and_equal_pairs_are_corrected() {
+    let paired = wilcoxon(&TIED, &OTHER);
+    assert_eq!((paired.less, paired.more, paired.equal), (2, 6, 2));
+    near(paired.p, 0.137_563_893_909_903_28, 1e-12);
+}
+
+#[test]
+fn signed_ranks_of_many_pairs_are_normal() {
+    let (a, b) = long();
+    near(wilcoxon(&a, &b).p, 0.231_594_922_770_157_47, 1e-12);
+}
+
+#[test]
+fn tests_without_pairs_agree_too() {
+    let (a, b) = long();
+    near(mann_whitney(&A, &B).unwrap(), 0.241_523_787_828_808_73, 1e-12);
+    near(mann_whitney(&a, &b).unwrap(), 0.068_166_891_275_851_24, 1e-9);
+    let boa = Moments { n: 30, mean: 28.9127, sd: 0.023 };
+    let gwo = Moments { n: 12, mean: 27.9115, sd: 0.89 };
+    near(welch(boa, gwo).unwrap(), 0.002_489_508_426_946_215_4, 1e-9);
+}
+
+#[test]
+fn summary_has_the_quartiles_of_numpy() {
+    let s = Summary::of(&A);
+    for (ours, numpy) in [(s.q1, 0.01), (s.median, 0.55), (s.q3, 1.1725), (s.mean, 0.54)] {
+        assert!((ours - numpy).abs() < 1e-14, "{ours} against {numpy}");
+    }
+    near(s.sd, 0.976_803_692_941_916_6, 1e-14);
+}
+
+#[test]
+fn samples_that_say_nothing_have_no_difference() {
+    let nothing = wilcoxon(&[], &[]);
+    assert_eq!((nothing.p, nothing.is_less()), (1.0, false));
+    assert_eq!(wilcoxon(&[1.0; 40], &[1.0; 40]).p, 1.0);
+    let infinite = wilcoxon(&[f64::INFINITY, 1.0], &[f64::INFINITY, f64::NAN]);
+    assert_eq!((infinite.equal, infinite.p), (1, 1.0));
+    assert_eq!(mann_whitney(&[], &[1.0]), None);
+    assert_eq!(mann_whitney(&[f64::NAN], &[1.0]), None);
+    let single = Moments { n: 1, mean: 0.0, sd: 0.0 };
+    assert_eq!(welch(single, single), None);
+    let still = |mean| Moments { n: 5, mean, sd: 0.0 };
+    assert_eq!((welch(still(1.0), still(1.0)), welch(still(1.0), still(2.0))), (Some(1.0), Some(0.0)));
+}

@@ -1,0 +1,98 @@
+//! Words of `taustream bench papers`.
+use clap::Args;
+use std::path::PathBuf;
+use taustream_claims::{Effort, PAPERS};
+
+const PAPERS_HELP: &str = "\
+Examples:
+  taustream bench papers --quick                        all five papers in under a minute; proves nothing
+  taustream bench papers --paper 3 -o paper-003         report.md, tables.json and pictures in that directory
+  taustream bench papers --paper 1 --runs 5 --jobs 2    fewer runs than the paper's 30
+  taustream bench papers --quick --json | jq '.chapters[].claims[] | {says, verdict}'
+
+Papers: 0 or 000_518aefc8cd38e163 (IBFOA, Tau-J*), 1 or 001_5e4af5ebec08e134 (ISMA, B-splines), 2 or
+002_3862cf3632de683b (virtual obstacles), 3 or 003_b15e0e655e3bf4df (IEPSO, reward), 4 or 004_e19ad8423bd62d7d (IWO).
+
+A table has the paper's printed value, ours by the letter of the paper (printed) and ours with its errors mended
+(corrected), and a signed-rank test pair by pair at equal evaluations where two methods are compared. A verdict
+(holds, does not hold, cannot be checked) follows from the numbers by the rule beside it. The papers' own values are
+the only constants; one seed gives one answer, whatever --jobs is. Ctrl-C ends it; nothing is written then.
+A full run takes an hour or more, mostly papers 0 and 1; a build with --release is several times faster.";
+
+/// `taustream bench papers`
+#[derive(Args, Debug)]
+#[command(after_help = PAPERS_HELP)]
+pub(crate) struct PapersArgs {
+    /// One paper only, by its number or its file's name; without it all five.
+    #[arg(long, value_name = "N", value_parser = paper)]
+    pub(crate) paper: Option<u8>,
+    /// Runs of everything random; without it the papers' own numbers (or, with --quick, few).
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = runs)]
+    pub(crate) runs: Option<usize>,
+    /// Few and short runs.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Seed of every random choice.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads.
+    #[arg(long, value_name = "J", allow_negative_numbers = true, default_value_t = 1, value_parser = jobs)]
+    pub(crate) jobs: usize,
+    /// Directory to write report.md, tables.json and the pictures into; made when it is missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+impl PapersArgs {
+    /// How much work that is.
+    pub(crate) fn effort(&self) -> Effort {
+        Effort { runs: self.runs, quick: self.quick, seed: self.seed, jobs: self.jobs }
+    }
+}
+
+/// A paper by number, or by the name of its file with or without an ending.
+fn paper(text: &str) -> Result<u8, String> {
+    let word = text.rsplit('/').next().unwrap_or(text);
+    let word = word.strip_suffix(".txt").unwrap_or(word);
+    let is_meant = |p: &&taustream_claims::Paper| p.file == word || word.parse() == Ok(p.number);
+    PAPERS.iter().find(is_meant).map(|p| p.number).ok_or_else(|| {
+        let all: Vec<String> = PAPERS.iter().map(|p| format!("{} ({})", p.number, p.file)).collect();
+        format!("there is no such paper; there are {}", all.join(", "))
+    })
+}
+
+fn runs(text: &str) -> Result<usize, String> {
+    whole(text, 100_000)
+}
+
+fn jobs(text: &str) -> Result<usize, String> {
+    whole(text, 256)
+}
+
+fn whole(text: &str, most: usize) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number) if (1..=most).contains(&number) => Ok(number),
+        _ => Err(format!("expected a whole number from 1 to {most}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paper_is_known_by_number_and_by_file() {
+        for (text, number) in [
+            ("0", 0),
+            ("003", 3),
+            ("4", 4),
+            ("001_5e4af5ebec08e134", 1),
+            ("seeds/002_3862cf3632de683b.txt", 2),
+        ] {
+            assert_eq!(paper(text), Ok(number), "{text}");
+        }
+        for text in ["", "5", "-1", "one", "003_", "999999999999999999999"] {
+            assert!(paper(text).is_err(), "{text}");
+        }
+    }
+}
