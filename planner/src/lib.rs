@@ -9,6 +9,7 @@ pub mod arguments;
 pub mod collide;
 pub mod cost;
 pub mod kind;
+pub mod foraging;
 pub mod leave;
 pub mod optimize;
 pub mod papers;

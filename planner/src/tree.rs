@@ -108,6 +108,17 @@ impl<'a> Space<'a> {
         self.checks.get()
     }
 
+    /// Counts poses that somebody else has checked.
+    pub fn note_checks(&self, checks: usize) {
+        self.checks.set(self.checks.get() + checks);
+    }
+
+    /// Weight of each joint in the distance of two poses, m/rad: never below [`WEIGHT_M_MIN`].
+    #[must_use]
+    pub fn weights_m(&self) -> &JointArray {
+        &self.weight_m
+    }
+
     /// A pose on the straight line, at a share of the way.
     #[must_use]
     pub fn between(a: &JointArray, b: &JointArray, share: f64) -> JointArray {
