@@ -8,14 +8,15 @@
 pub mod arguments;
 pub mod collide;
 pub mod cost;
-pub mod kind;
 pub mod foraging;
+pub mod kind;
 pub mod leave;
 pub mod optimize;
 pub mod papers;
 pub mod pipeline;
 pub mod plan;
 pub mod refine;
+pub mod search;
 pub mod send;
 pub mod service;
 pub mod shortcut;
@@ -28,6 +29,6 @@ pub mod world;
 pub use taustream_arm::draw;
 
 pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
-pub use kind::PlannerKind;
+pub use kind::{Improvement, PlannerKind};
 pub use plan::{Plan, PlanError, PlanOptions, PoseOf, StartMargin, plan};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -1,48 +1,30 @@
 //! The stages of planning, one after the other, each on a budget of evaluations.
 //!
-//! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> IBFOA -> timing with rounded corners ->
-//! proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
+//! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> improvement -> timing with rounded corners
+//! -> proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
-use crate::kind::PlannerKind;
+use crate::kind::{Improvement, PlannerKind};
 use crate::leave::Leaving;
-use crate::optimize::{Ibfoa, Optimizer, Setup};
+use crate::optimize::{Method, Optimizer, Setup};
 use crate::plan::{Plan, PlanError, PlanOptions};
-use crate::refine::refine;
+use crate::refine::{self, refine};
+use crate::search::Searcher;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
-use crate::tree::{Search, Space, rrt, rrt_connect};
+use crate::tree::Space;
 use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
 use crate::work::Work;
 use crate::world::World;
+use std::ops::Range;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 
 /// Poses that differ by less are one: far below a count of any encoder.
 const SAME_RAD: f64 = 1e-12;
 /// Independent searches; the best path of them is kept.
 const SEARCHES: u64 = 3;
-
-/// A search with trees.
-struct Trees {
-    /// Its name, for users.
-    name: &'static str,
-    /// Where a path of it with shortcuts comes from, for users.
-    searched: &'static str,
-    /// From a start to a goal, with so many poses checked.
-    grow: fn(&Space, [&JointArray; 2], usize, &mut Draw) -> Search,
-}
-
-const RRT_CONNECT: Trees = Trees {
-    name: "RRT-Connect",
-    searched: "RRT-Connect with shortcuts",
-    grow: |space, [start, goal], checks, draw| rrt_connect(space, start, goal, checks, draw),
-};
-const RRT: Trees = Trees {
-    name: "RRT",
-    searched: "RRT with shortcuts",
-    grow: |space, [start, goal], checks, draw| rrt(space, start, goal, checks, draw),
-};
-
+/// Most searches of an improvement by more of them.
+const MORE_SEARCHES: u64 = 60;
 /// What a corner costs in comparing paths: about what a stop there would (s).
 const CORNER_S: f64 = 0.3;
 
@@ -71,6 +53,11 @@ impl Budget {
             timings: (ms / 50).clamp(6, 40),
         }
     }
+}
+
+/// Where a searched path comes from, for users.
+fn searched(searcher: Searcher) -> String {
+    format!("{} with shortcuts", searcher.title())
 }
 
 /// One planning run.
@@ -134,8 +121,10 @@ impl<'a> Pipeline<'a> {
                     self.around(&line);
                 }
             }
-            PlannerKind::RrtConnect => self.through(&line, &RRT_CONNECT),
-            PlannerKind::Rrt => self.through(&line, &RRT),
+            PlannerKind::RrtConnect => self.search_alone(Searcher::RrtConnect, &line),
+            PlannerKind::Rrt => self.search_alone(Searcher::Rrt, &line),
+            PlannerKind::Rbf => self.search_alone(Searcher::Rbf, &line),
+            PlannerKind::Bfo => self.search_alone(Searcher::Bfo, &line),
             PlannerKind::Optimiser(method) => {
                 let evaluations = self.budget.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
@@ -150,27 +139,47 @@ impl<'a> Pipeline<'a> {
         self.finish()
     }
 
-    /// A searched path, wherever the straight line leads.
-    fn through(&mut self, line: &[JointArray], trees: &Trees) {
-        if let Some(path) = self.search(line, trees) {
-            self.propose(&path, trees.searched);
-            self.round(&path, trees.searched);
+    /// What one searcher finds, with rounded corners.
+    fn search_alone(&mut self, searcher: Searcher, line: &[JointArray]) {
+        if let Some((_, path)) = self.search(searcher, line, 0..SEARCHES, self.budget.search_checks) {
+            let source = searched(searcher);
+            self.propose(&path, &source);
+            self.round(&path, &source);
         }
     }
 
-    /// A path round what blocks the straight line: searched, and refined from both, since a refinement stays near
-    /// where it starts.
+    /// A path round what blocks the straight line: searched, and improved.
     fn around(&mut self, line: &[JointArray]) {
-        let Some(path) = self.search(line, &RRT_CONNECT) else { return };
-        self.propose(&path, RRT_CONNECT.searched);
-        let each = self.budget.refinements / 2;
-        let ibfoa = Ibfoa::set_up(Setup { reading: self.options.reading, evaluations: Some(each) });
-        let from_path = self.refine(&path, &ibfoa, each, "that");
-        let from_line = self.refine(line, &ibfoa, each, "the straight line");
-        for refined in [from_path, from_line].into_iter().flatten() {
-            self.round(&refined, "IBFOA");
+        let searcher = Searcher::RrtConnect;
+        let first = self.search(searcher, line, 0..SEARCHES, self.budget.search_checks);
+        let Some((estimate_s, path)) = first else { return };
+        let source = searched(searcher);
+        self.propose(&path, &source);
+        match self.options.improvement {
+            Improvement::Nothing => {}
+            Improvement::Searches => {
+                let more = SEARCHES..SEARCHES + MORE_SEARCHES;
+                let found = self.search(searcher, line, more, self.budget.refinements * refine::POSES);
+                if let Some((_, better)) = found.filter(|(s, _)| *s < estimate_s) {
+                    self.round(&better, &source);
+                }
+            }
+            Improvement::Method(method) => self.refine_around(method, [&path, line]),
         }
-        self.round(&path, RRT_CONNECT.searched);
+        self.round(&path, &source);
+    }
+
+    /// Refinements from the path and from the straight line, since each stays near where it starts.
+    fn refine_around(&mut self, method: &Method, from: [&[JointArray]; 2]) {
+        let each = self.budget.refinements / 2;
+        let optimizer = (method.make)(Setup { reading: self.options.reading, evaluations: Some(each) });
+        let source = optimizer.name().to_uppercase();
+        let [path, line] = from;
+        let from_path = self.refine(path, &*optimizer, each, "that");
+        let from_line = self.refine(line, &*optimizer, each, "the straight line");
+        for refined in [from_path, from_line].into_iter().flatten() {
+            self.round(&refined, &source);
+        }
     }
 
     fn path<'p>(&'p self, corners_rad: &'p [JointArray]) -> Path<'p> {
@@ -237,22 +246,33 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Several searches with shortcuts; the path that is estimated to be fastest.
-    fn search(&mut self, line: &[JointArray], trees: &Trees) -> Option<Vec<JointArray>> {
+    /// Several searches with shortcuts, until `checks_max` poses have been checked; the path that is estimated to be
+    /// fastest, with the estimate.
+    fn search(
+        &mut self,
+        searcher: Searcher,
+        line: &[JointArray],
+        streams: Range<u64>,
+        checks_max: usize,
+    ) -> Option<(f64, Vec<JointArray>)> {
         let [start, goal] = line else { return None };
         let mut best: Option<(f64, Vec<JointArray>)> = None;
-        let (mut nodes, mut found) = (0, 0);
-        let end = self.space.checks() + self.budget.search_checks;
-        for stream in 0..SEARCHES {
-            let mut draw = Draw::new(self.options.seed, 10 + stream);
+        let (mut nodes, mut found, mut made) = (0, 0, 0);
+        let end = self.space.checks().saturating_add(checks_max);
+        for stream in streams {
             let left = end.saturating_sub(self.space.checks());
-            let search = (trees.grow)(&self.space, [start, goal], left, &mut draw);
+            if made > 0 && (left == 0 || self.space.work.is_over()) {
+                break;
+            }
+            made += 1;
+            let mut draw = Draw::new(self.options.seed, 10 + stream);
+            let search = searcher.search(&self.space, [start, goal], left, &mut draw);
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
-            if found == 1 {
+            if self.best.is_none() {
                 // An answer, before time is spent on better ones.
-                self.propose(&path, trees.name);
+                self.propose(&path, searcher.title());
             }
             shorten(&self.space, &mut path, self.budget.shortcuts, &mut draw);
             let estimate_s = self.estimate_s(&path);
@@ -260,8 +280,9 @@ impl<'a> Pipeline<'a> {
                 best = Some((estimate_s, path));
             }
         }
-        self.tried.push(format!("{} ({nodes} nodes, {found} of {SEARCHES} searches)", trees.name));
-        best.map(|(_, path)| path)
+        let (title, unit) = (searcher.title(), searcher.unit());
+        self.tried.push(format!("{title} ({nodes} {unit}, {found} of {made} searches)"));
+        best
     }
 
     /// Time at full speed plus a toll for each corner.

@@ -1,5 +1,5 @@
 //! From two poses to a verified motion.
-use crate::kind::PlannerKind;
+use crate::kind::{Improvement, PlannerKind};
 use crate::leave::{Leaving, Relaxed, is_clear, way_out};
 use crate::optimize::Reading;
 use crate::pipeline::Pipeline;
@@ -23,12 +23,15 @@ pub struct PlanOptions {
     pub planner: PlannerKind,
     /// Which reading of the papers the optimisers follow.
     pub reading: Reading,
+    /// How the default planner improves what it found.
+    pub improvement: Improvement,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
         let (deadline, planner) = (Duration::from_millis(2000), PlannerKind::Auto);
-        Self { seed: 0, deadline, planner, reading: Reading::Corrected }
+        let (reading, improvement) = (Reading::Corrected, Improvement::default());
+        Self { seed: 0, deadline, planner, reading, improvement }
     }
 }
 

@@ -11,7 +11,13 @@ use taustream_planner::{PlanError, PlanOptions, PlannerKind, plan, verify};
 const DEADLINE_MS: u64 = 1_000;
 
 fn options(planner: PlannerKind, reading: Reading) -> PlanOptions {
-    PlanOptions { seed: 3, deadline: Duration::from_millis(DEADLINE_MS), planner, reading }
+    PlanOptions {
+        seed: 3,
+        deadline: Duration::from_millis(DEADLINE_MS),
+        planner,
+        reading,
+        ..PlanOptions::default()
+    }
 }
 
 #[test]
@@ -23,7 +29,7 @@ fn every_registered_method_is_a_planner_and_words_are_unique() {
     let count = names.len();
     names.sort_unstable();
     names.dedup();
-    assert_eq!((names.len(), count), (count, METHODS.len() + 4));
+    assert_eq!((names.len(), count), (count, METHODS.len() + 6));
     for reading in Reading::ALL {
         assert_eq!(Reading::from_name(reading.name()), Some(reading));
     }

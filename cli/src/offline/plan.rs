@@ -54,6 +54,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         deadline: Duration::from_millis(args.deadline_ms.into()),
         planner: args.planner,
         reading: args.reading,
+        ..PlanOptions::default()
     };
     let found = plan(&robot, &scene, &start_rad, &goal_rad, &options)
         .map_err(|error| explain(&error, args, &robot))?;

@@ -139,7 +139,8 @@ impl<'a> Forager<'a> {
     fn tumble(&self, here: &JointArray, draw: &mut Draw) -> JointArray {
         let joints = self.space.world.joints();
         let mut pose = *here;
-        let direction: [f64; MAX_JOINTS] = std::array::from_fn(|j| if j < joints { draw.normal() } else { 0.0 });
+        let direction: [f64; MAX_JOINTS] =
+            std::array::from_fn(|j| if j < joints { draw.normal() } else { 0.0 });
         let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
         let step_m = if length > 0.0 { self.numbers.step_m / length } else { 0.0 };
         let weights_m = self.space.weights_m();
@@ -209,4 +210,114 @@ impl<'a> Forager<'a> {
 
 fn gaussian([height, width]: [f64; 2], away_m: f64) -> f64 {
     height * (-width * away_m * away_m).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::work::Work;
+    use crate::world::World;
+    use std::path::Path;
+    use taustream_arm::{Robot, Scene};
+
+    /// A UR5 alone in the world, and what a forager does there.
+    fn with_forager(numbers: &Numbers, check: impl Fn(&mut Forager, &Space)) {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
+        let robot = Robot::load(&file).unwrap();
+        let world = World::new(&robot, &Scene::default()).unwrap();
+        let work = Work::unbounded();
+        let space = Space::new(&world, &work);
+        let ends = [pose(0.0), pose(1.0)];
+        check(&mut Forager::new(&space, ends, numbers), &space);
+    }
+
+    /// Stretched out and turned about the first joint, so that nothing is near anything.
+    fn pose(pan_rad: f64) -> JointArray {
+        let mut pose = [0.0; MAX_JOINTS];
+        pose[0] = pan_rad;
+        pose[1] = -1.0;
+        pose
+    }
+
+    /// The formula with the numbers put in by hand: half the way is left, and the virtual obstacle is a quarter of it
+    /// away. The way is as long as the first joint's weight, which is the only one that turns.
+    #[test]
+    fn cost_is_the_goal_and_the_virtual_obstacles() {
+        let numbers = Numbers { goal_depth: 20.0, virtual_obstacle: [3.0, 4.0], ..Numbers::ROBUST };
+        with_forager(&numbers, |forager, space| {
+            let way_m = space.weights_m()[0];
+            let goal = -20.0 * (-0.25_f64).exp();
+            assert!((forager.cost(&pose(0.5)) - goal).abs() < 1e-12);
+            forager.found.virtuals.push(pose(0.25));
+            let added = 3.0 * (-4.0 * (0.25 * way_m).powi(2)).exp();
+            assert!((forager.cost(&pose(0.5)) - goal - added).abs() < 1e-12);
+            forager.forgotten = 1;
+            assert!((forager.cost(&pose(0.5)) - goal).abs() < 1e-12, "forgotten");
+        });
+    }
+
+    #[test]
+    fn retreat_ends_at_the_last_pose_that_is_far_enough_and_marks_the_trap() {
+        let numbers = Numbers { retreat_m: 0.5, virtual_max: 1, ..Numbers::ROBUST };
+        with_forager(&numbers, |forager, space| {
+            let step_rad = 0.2 / space.weights_m()[0];
+            let trace: Vec<JointArray> = (0..6).map(|i| pose(f64::from(i) * step_rad)).collect();
+            forager.trace.clone_from(&trace);
+            forager.escape();
+            // 1.0 m from the start: 0.4 m and 0.2 m back are too near, 0.6 m is far enough.
+            assert_eq!(forager.trace, trace[..3]);
+            assert_eq!((forager.found.virtuals.as_slice(), forager.found.restarts), (&trace[5..], 0));
+            // No further one may be set: from the start again, and nothing is in the way any more.
+            forager.escape();
+            assert_eq!((forager.trace.as_slice(), forager.found.restarts), (&trace[..1], 1));
+            assert_eq!((forager.forgotten, forager.found.virtuals.len()), (1, 1));
+        });
+    }
+
+    /// A trap of which no pose of the trace is far enough, as at the very start.
+    #[test]
+    fn retreat_near_the_start_ends_at_the_start() {
+        with_forager(&Numbers::ROBUST, |forager, _| {
+            forager.trace.push(pose(0.01));
+            forager.escape();
+            assert_eq!(forager.trace, [pose(0.0)]);
+        });
+    }
+
+    #[test]
+    fn trapped_is_who_stays_within_a_step_for_the_observed_number_of_steps() {
+        let numbers = Numbers { observed: 3, step_m: 0.3, ..Numbers::ROBUST };
+        with_forager(&numbers, |forager, space| {
+            let metre_rad = 1.0 / space.weights_m()[0];
+            let mut walk = |ways_m: &[f64]| {
+                forager.observed = ways_m.iter().map(|m| pose(m * metre_rad)).collect();
+                forager.is_trapped()
+            };
+            assert!(!walk(&[0.0, 0.0, 0.0]), "not observed for long enough");
+            assert!(walk(&[0.0, 0.0, 0.0, 0.0]) && walk(&[0.0, 0.3, 0.3, 0.1]));
+            assert!(!walk(&[0.0, 0.3, 0.3, 0.31]));
+        });
+    }
+
+    #[test]
+    fn tumble_is_a_step_long_in_any_direction_and_stays_inside_the_ranges() {
+        with_forager(&Numbers::ROBUST, |forager, space| {
+            let mut draw = Draw::new(5, 0);
+            let here = pose(0.0);
+            let mut sum = [0.0; MAX_JOINTS];
+            for _ in 0..1_000 {
+                let there = forager.tumble(&here, &mut draw);
+                assert!((space.distance_m(&here, &there) - Numbers::ROBUST.step_m).abs() < 1e-12);
+                for (j, s) in sum.iter_mut().enumerate() {
+                    *s += (there[j] - here[j]) * space.weights_m()[j] / Numbers::ROBUST.step_m;
+                }
+            }
+            // A thousand directions cancel: their mean is about 1/sqrt(6 * 1000) long in each coordinate.
+            assert!(sum.iter().all(|s| s.abs() < 70.0), "{sum:?}");
+            let edge = std::array::from_fn(|j| if j < 6 { 3.14 } else { 0.0 });
+            let ranges = space.world.robot().joints.iter().map(|j| j.limits.position_rad);
+            let there = forager.tumble(&edge, &mut draw);
+            assert!(there.iter().zip(ranges).all(|(q, [low, high])| (low..=high).contains(q)));
+        });
+    }
 }

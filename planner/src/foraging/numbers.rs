@@ -30,16 +30,16 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Robust foraging. The paper prints none of these numbers for an arm; they were chosen on problems that no table
-    /// of ours shows.
+    /// Robust foraging. The paper prints none of these numbers for an arm; ours were chosen on other problems than
+    /// those of docs/planner.md.
     pub const ROBUST: Self = Self {
-        bacteria: 30,
-        step_m: 0.1,
+        bacteria: 16,
+        step_m: 0.3,
         range_m: 0.1,
-        obstacle: [0.5, 400.0],
+        obstacle: [0.1, 400.0],
         goal_depth: 20.0,
-        virtual_obstacle: [3.0, 4.0],
-        arrived_m: 0.5,
+        virtual_obstacle: [1.0, 4.0],
+        arrived_m: 1.0,
         retreat_m: 0.75,
         observed: 10,
         virtual_max: 200,
@@ -60,7 +60,13 @@ impl Numbers {
         ] {
             within(method, what, count as f64, [1.0, 1e5], most)?;
         }
-        within(method, "the virtual obstacles", self.virtual_max as f64, [0.0, 1e5], "at most 100000 are possible")?;
+        within(
+            method,
+            "the virtual obstacles",
+            self.virtual_max as f64,
+            [0.0, 1e5],
+            "at most 100000 are possible",
+        )?;
         within(method, "the step", self.step_m, [1e-3, 1e3], "from 1 mm to 1 km is possible")?;
         let [(a, b), (c, d)] = [self.obstacle, self.virtual_obstacle].map(|[height, width]| (height, width));
         let rest = [a, b, c, d, self.goal_depth, self.range_m, self.arrived_m, self.retreat_m];
