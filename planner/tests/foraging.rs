@@ -1,4 +1,5 @@
 //! Foraging in joint space: what comes back is a path of proven edges, and virtual obstacles lead out of traps.
+#![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{config, pose, scene, ur5};
 use std::sync::atomic::AtomicBool;

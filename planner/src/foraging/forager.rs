@@ -314,7 +314,7 @@ mod tests {
             }
             // A thousand directions cancel: their mean is about 1/sqrt(6 * 1000) long in each coordinate.
             assert!(sum.iter().all(|s| s.abs() < 70.0), "{sum:?}");
-            let edge = std::array::from_fn(|j| if j < 6 { 3.14 } else { 0.0 });
+            let edge = std::array::from_fn(|j| if j < 6 { 3.1 } else { 0.0 });
             let ranges = space.world.robot().joints.iter().map(|j| j.limits.position_rad);
             let there = forager.tumble(&edge, &mut draw);
             assert!(there.iter().zip(ranges).all(|(q, [low, high])| (low..=high).contains(q)));
