@@ -104,6 +104,27 @@ impl Angles {
     }
 }
 
+/// A point of `plan --to-position`: three finite numbers of metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Position(pub(crate) [f64; 3]);
+
+impl FromStr for Position {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |(axis, word): (char, &str)| match word.trim().parse::<f64>() {
+            Ok(value_m) if value_m.is_finite() => Ok(value_m),
+            Ok(value_m) => Err(format!("{axis} is {value_m}; it must be finite (m)")),
+            Err(_) => Err(format!("{axis} is `{}`, which is no number of metres", word.trim())),
+        };
+        let words: Vec<&str> = text.split(',').collect();
+        let [x, y, z] = words.as_slice() else {
+            return Err(format!("{} values; a position is three: \"0.4,-0.2,0.3\" (m)", words.len()));
+        };
+        Ok(Self([parse(('x', x))?, parse(('y', y))?, parse(('z', z))?]))
+    }
+}
+
 /// Times of `sample --at`: any number of finite seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Times(pub(crate) Vec<f64>);
@@ -145,6 +166,26 @@ mod tests {
         ];
         for (text, expected) in cases {
             let error = text.parse::<Angles>().unwrap_err().to_string();
+            assert!(error.contains(expected), "`{text}`: {error}");
+        }
+    }
+
+    #[test]
+    fn position_is_three_finite_numbers() {
+        assert_eq!("0.4, -0.2,3e-1".parse::<Position>(), Ok(Position([0.4, -0.2, 0.3])));
+        let cases = [
+            ("", "1 values"),
+            ("1,2", "2 values"),
+            ("1,2,3,4", "4 values"),
+            ("1,,3", "y is ``"),
+            ("x,2,3", "x is `x`"),
+            ("1,2,nan", "z is NaN"),
+            ("1,-inf,3", "y is -inf"),
+            ("1e999,0,0", "x is inf"),
+            ("400mm,0,0", "x is `400mm`"),
+        ];
+        for (text, expected) in cases {
+            let error = text.parse::<Position>().unwrap_err();
             assert!(error.contains(expected), "`{text}`: {error}");
         }
     }

@@ -7,7 +7,7 @@ use crate::draw::Draw;
 use crate::kind::{Improvement, PlannerKind};
 use crate::leave::Leaving;
 use crate::optimize::{Method, Optimizer, Setup};
-use crate::plan::{Plan, PlanError, PlanOptions};
+use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions};
 use crate::refine::{self, refine};
 use crate::search::Searcher;
 use crate::shortcut::shorten;
@@ -414,7 +414,7 @@ impl<'a> Pipeline<'a> {
                 // What won comes first: messages hold 240 bytes.
                 let mut how = last;
                 if cut {
-                    how.push_str(", cut short by the deadline");
+                    how.push_str(CUT_SHORT);
                 }
                 if !tried.is_empty() && tried != how {
                     how = format!("{how} (tried: {tried})");

@@ -11,6 +11,9 @@ use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, Trajectory};
 
+/// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
+pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";
+
 /// How to plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanOptions {
@@ -248,7 +251,7 @@ impl PlanError {
     }
 }
 
-fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
+pub(crate) fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
     let joints = robot.joints.len();
     for (joint, &value_rad) in pose_rad.iter().enumerate() {
         if !value_rad.is_finite() || (joint >= joints && value_rad != 0.0) {

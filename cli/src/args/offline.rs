@@ -1,12 +1,12 @@
 //! Words of the commands that need no running process.
-use crate::angles::{Angles, Times};
+use crate::angles::{Angles, Position, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_planner::PlannerKind;
-use taustream_planner::optimize::Reading;
+use taustream_planner::optimize::{METHODS, Method, Reading};
 
 const PLAN_HELP: &str = "\
 Examples:
@@ -14,6 +14,7 @@ Examples:
       --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
   taustream plan ... --planner ibfoa --seed 7 --deadline-ms 5000 --json
   taustream plan ... --planner bfoa --reading printed
+  taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
 The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
@@ -33,8 +34,23 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
     pub(crate) start: Angles,
     /// Pose to go to, rad, one value a joint.
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
-    pub(crate) goal: Angles,
+    #[arg(
+        long,
+        value_name = "RAD,..",
+        allow_hyphen_values = true,
+        required_unless_present = "to_position",
+        conflicts_with = "to_position"
+    )]
+    pub(crate) goal: Option<Angles>,
+    /// Position to bring the tip to, m, in the base's frame, instead of a pose: "0.4,-0.2,0.3".
+    ///
+    /// Swarms look for poses whose tip is there, clear of everything; the best verified motion to one of them wins. How
+    /// the tip is turned there is left free.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) to_position: Option<Position>,
+    /// Which optimiser looks for poses at the position; without it `de` and `spso` take turns.
+    #[arg(long, value_name = "NAME", conflicts_with = "goal", value_parser = method())]
+    pub(crate) reach_with: Option<&'static Method>,
     /// Which planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
@@ -257,6 +273,12 @@ pub(super) fn planner_kind() -> impl TypedValueParser<Value = PlannerKind> {
         PlannerKind::all().map(|kind| PossibleValue::new(kind.name()).help(kind.about())),
     )
     .map(|name| PlannerKind::from_name(&name).unwrap_or_default())
+}
+
+/// The optimisers by name.
+fn method() -> impl TypedValueParser<Value = &'static Method> {
+    PossibleValuesParser::new(METHODS.iter().map(|m| PossibleValue::new(m.name).help(m.about)))
+        .try_map(|name| METHODS.iter().find(|m| m.name == name).ok_or("no such optimiser"))
 }
 
 /// The readings of the papers by name.

@@ -1,5 +1,6 @@
-//! `taustream plan`: from two poses to a verified trajectory file.
+//! `taustream plan`: from two poses, or a pose and a position, to a verified trajectory file.
 use super::verify::{PeakTable, PeakUse, clearance_words, peak_use};
+use crate::angles::Position;
 use crate::args::PlanArgs;
 use crate::arm;
 use crate::failure::Failure;
@@ -9,8 +10,12 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
-use taustream_arm::{Robot, TrajectoryFile};
-use taustream_planner::{Plan, PlanError, PlanOptions, plan};
+use taustream_arm::{Robot, Scene, TrajectoryFile};
+use taustream_motion::JointArray;
+use taustream_planner::optimize::Method;
+use taustream_planner::{
+    Plan, PlanOptions, PositionError, PositionTask, StartMargin, plan, plan_to_position,
+};
 
 /// The summary of a plan.
 #[derive(Debug, Serialize)]
@@ -27,6 +32,11 @@ struct Summary {
     clearance_at_s: f64,
     clearance_between: [String; 2],
     peak_use: Vec<PeakUse>,
+    goal_rad: Vec<f64>,
+    /// Where the tip was to go, when a position was asked for.
+    target_m: Option<[f64; 3]>,
+    /// Upper bound of how far off it ends.
+    position_error_m: Option<f64>,
 }
 
 impl fmt::Display for Summary {
@@ -35,6 +45,11 @@ impl fmt::Display for Summary {
         writeln!(f, "duration      {:.3} s, {} strokes", self.duration_s, self.strokes)?;
         let [a, b] = &self.clearance_between;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
+            writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off, in the pose")?;
+            let angles: Vec<String> = self.goal_rad.iter().map(|q| format!("{q:.6}")).collect();
+            writeln!(f, "              {} rad", angles.join(","))?;
+        }
         write!(f, "{}", PeakTable(&self.peak_use))?;
         match &self.file {
             Some(file) => write!(f, "written to    {file}"),
@@ -48,7 +63,6 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     let robot = arm::robot(&args.robot)?;
     let scene = arm::scene(&args.scene)?;
     let start_rad = args.start.pose_of(&robot, "--start")?;
-    let goal_rad = args.goal.pose_of(&robot, "--goal")?;
     let options = PlanOptions {
         seed: args.seed,
         deadline: Duration::from_millis(args.deadline_ms.into()),
@@ -56,12 +70,13 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         reading: args.reading,
         ..PlanOptions::default()
     };
-    let found = plan(&robot, &scene, &start_rad, &goal_rad, &options)
-        .map_err(|error| explain(&error, args, &robot))?;
+    let end = End::of(args, &robot)?;
+    let found =
+        end.plan((&robot, &scene), start_rad, &options).map_err(|error| explain(&error, args, &robot))?;
     let json = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
-        trajectory: found.trajectory.clone(),
+        trajectory: found.plan.trajectory.clone(),
     }
     .to_json();
 
@@ -83,15 +98,74 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     }
 }
 
-fn explain(error: &PlanError, args: &PlanArgs, robot: &Robot) -> Failure {
-    let hint = args.start.degrees_hint(robot).or_else(|| args.goal.degrees_hint(robot));
+/// What a motion is planned to.
+enum End {
+    Pose(JointArray),
+    Position([f64; 3], Option<&'static Method>),
+}
+
+/// A plan, and by how much it misses the position that was asked for.
+struct Planned {
+    plan: Plan,
+    position: Option<([f64; 3], f64)>,
+}
+
+impl End {
+    fn of(args: &PlanArgs, robot: &Robot) -> Result<Self, Failure> {
+        match (&args.goal, args.to_position) {
+            (_, Some(Position(target_m))) => Ok(Self::Position(target_m, args.reach_with)),
+            (Some(goal), None) => goal.pose_of(robot, "--goal").map(Self::Pose),
+            (None, None) => Err(Failure::Usage("give --goal or --to-position".to_owned())),
+        }
+    }
+
+    fn plan(
+        &self,
+        (robot, scene): (&Robot, &Scene),
+        start_rad: JointArray,
+        options: &PlanOptions,
+    ) -> Result<Planned, PositionError> {
+        match *self {
+            Self::Pose(goal_rad) => {
+                let plan = plan(robot, scene, &start_rad, &goal_rad, options)?;
+                Ok(Planned { plan, position: None })
+            }
+            Self::Position(target_m, method) => {
+                let margin = StartMargin::Scene;
+                let task = PositionTask { robot, scene, start_rad, target_m, margin, method };
+                let reached = plan_to_position(&task, options, None)?;
+                Ok(Planned { plan: reached.plan, position: Some((target_m, reached.error_m)) })
+            }
+        }
+    }
+}
+
+/// A second sentence for positions that look like millimetres.
+fn millimetres_hint(error: &PositionError, args: &PlanArgs) -> Option<String> {
+    let (PositionError::TooFar { distance_m, reach_m }, Some(Position(target_m))) = (error, args.to_position)
+    else {
+        return None;
+    };
+    let largest = target_m.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    (*distance_m > 10.0 * reach_m && largest <= 1e3 * reach_m).then(|| {
+        format!(
+            "positions are in m, and {largest} looks like millimetres: {largest} mm = {} m",
+            largest * 1e-3
+        )
+    })
+}
+
+fn explain(error: &PositionError, args: &PlanArgs, robot: &Robot) -> Failure {
+    let goal_hint = || args.goal.as_ref().and_then(|goal| goal.degrees_hint(robot));
+    let hint = args.start.degrees_hint(robot).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
     Failure::Refused(match hint {
         Some(hint) => format!("no plan: {error} ({hint})"),
         None => format!("no plan: {error}"),
     })
 }
 
-fn summarise(robot: &Robot, found: Plan, args: &PlanArgs) -> Summary {
+fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &PlanArgs) -> Summary {
+    let goal_rad = found.trajectory.end_rad().iter().take(robot.joints.len()).copied().collect();
     let (a, b) = found.proof.clearance_between;
     Summary {
         robot: robot.name.clone(),
@@ -106,5 +180,8 @@ fn summarise(robot: &Robot, found: Plan, args: &PlanArgs) -> Summary {
         clearance_at_s: found.proof.clearance_at_s,
         clearance_between: [a, b],
         peak_use: peak_use(robot, &found.proof.peaks),
+        goal_rad,
+        target_m: position.map(|(target_m, _)| target_m),
+        position_error_m: position.map(|(_, error_m)| error_m),
     }
 }

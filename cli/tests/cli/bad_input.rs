@@ -31,6 +31,8 @@ fn refuse_all(scratch: &Scratch, cases: &[Case<'_>]) {
 #[test]
 fn words_that_are_wrong_are_refused_by_name() {
     let with = |goal: &str| format!("plan --robot ur5 --scene open --start HOME --goal={goal} -o never.json");
+    let to =
+        |to: &str| format!("plan --robot ur5 --scene open --start HOME --to-position={to} -o never.json");
     let scratch = Scratch::new();
     refuse_all(
         &scratch,
@@ -44,6 +46,17 @@ fn words_that_are_wrong_are_refused_by_name() {
             (&with("0,0,0,inf,0,0"), 2, &["--goal", "value 4 is inf"]),
             (&with("0,0,x,0,0,0"), 2, &["--goal", "value 3 is `x`", "rad"]),
             (&with(""), 2, &["--goal"]),
+            ("plan --robot ur5 --scene open --start HOME -o never.json", 2, &["--goal"]),
+            ("plan --robot ur5 --scene open --start HOME --goal HOME --reach-with de", 2, &["--reach-with"]),
+            (&to("0.4,0,0.3 --goal HOME"), 2, &["--goal", "--to-position"]),
+            (&to("0.4,0,0.3 --reach-with magic"), 2, &["magic", "spso"]),
+            (&to("0.4,0"), 2, &["--to-position", "2 values"]),
+            (&to("0.4,0,0.3,1"), 2, &["--to-position", "4 values"]),
+            (&to("0.4,nan,0.3"), 2, &["--to-position", "y is NaN"]),
+            (&to("inf,0,0"), 2, &["--to-position", "x is inf"]),
+            (&to("0.4,0,up"), 2, &["--to-position", "z is `up`"]),
+            (&to("400,0,300"), 1, &["out of reach", "too short", "millimetres", "0.4 m"]),
+            (&to("0,0,0.75 --seed 3"), 1, &["out of reach", "tries", "0.0268"]),
             (
                 "plan --robot ur5 --scene open --start HOME --goal HOME --planner magic",
                 2,

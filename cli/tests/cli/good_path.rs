@@ -60,6 +60,24 @@ fn plan_with_one_seed_is_one_file() {
 }
 
 #[test]
+fn plan_to_a_position_says_pose_and_error_and_writes_a_file_that_verifies() {
+    let scratch = Scratch::new();
+    let words =
+        ["plan", "--robot", "ur5", "--scene", "open", "--start", HOME, "--to-position", "0.4,-0.3,0.35"];
+    let ran = scratch.run(&[&words[..], &["-o", "move.json"]].concat());
+    let text = ran.done();
+    assert!(text.contains("position      0.4, -0.3, 0.35 m, at most"), "{text}");
+    let verify = ["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "move.json", "--json"];
+    assert_eq!(scratch.run(&verify).json()["verified"], true);
+
+    let summary = scratch.run(&[&words[..], &["--reach-with", "iepso", "--json"]].concat()).json();
+    let error_m = summary["position_error_m"].as_f64().expect("a number");
+    assert!((0.0..=2e-6).contains(&error_m), "{summary}");
+    assert_eq!(summary["goal_rad"].as_array().map(Vec::len), Some(6), "{summary}");
+    assert_eq!(summary["target_m"][1], -0.3, "{summary}");
+}
+
+#[test]
 fn plan_to_stdout_is_the_file_and_nothing_else() {
     let scratch = Scratch::new();
     let words = ["plan", "--robot", "ur5", "--scene", "open", "--start", HOME, "--goal", GOAL, "-o", "-"];

@@ -72,8 +72,8 @@ pub struct Reach<'a> {
     pub start_rad: &'a [f64],
     /// Where the tip has to go.
     pub target_m: [f64; 3],
-    /// Speed of every joint, ω.
-    pub speed_rad_s: f64,
+    /// Speed of each joint, ω.
+    pub speeds_rad_s: &'a [f64],
     /// Reward and punishment.
     pub reward: Reward,
 }
@@ -82,15 +82,19 @@ impl Reach<'_> {
     /// The same, once its numbers are found to make sense together.
     ///
     /// # Errors
-    /// Names the first number that does not: a start of another length than the box, a target that is no place, a
-    /// speed of nothing, thresholds that are not in order.
+    /// Names the first number that does not: a start or speeds of another length than the box, a target that is no
+    /// place, a speed of nothing, thresholds that are not in order.
     pub fn checked(self) -> Result<Self, Refusal> {
         let (within, who) = (Refusal::check_number, "reaching a position");
         let (joints, given) = (self.bounds_rad.len() as f64, self.start_rad.len() as f64);
         within(who, "the start's number of joints", given, [joints, joints], "one for each range is needed")?;
         Refusal::check_finite(who, "the target", &self.target_m)?;
         Refusal::check_finite(who, "the start", self.start_rad)?;
-        within(who, "the speed", self.speed_rad_s, [1e-9, 1e9], "a speed above 0 rad/s is needed")?;
+        let speeds = self.speeds_rad_s.len() as f64;
+        within(who, "the number of speeds", speeds, [joints, joints], "one for each range is needed")?;
+        for speed_rad_s in self.speeds_rad_s {
+            within(who, "a speed", *speed_rad_s, [1e-9, 1e9], "a speed above 0 rad/s is needed")?;
+        }
         let Reward { threshold_m, inner_m, error_max_m, punishment, factor, .. } = self.reward;
         within(who, "s", inner_m, [1e-15, threshold_m], "above 0 m and at most the threshold is possible")?;
         within(who, "the threshold", threshold_m, [inner_m, 0.999 * error_max_m], "below e_max is possible")?;
@@ -108,8 +112,8 @@ impl Reach<'_> {
     /// Time of the joint that has farthest to go.
     #[must_use]
     pub fn time_s(&self, angles_rad: &[f64]) -> f64 {
-        let ways = angles_rad.iter().zip(self.start_rad).map(|(a, s)| (a - s).abs());
-        ways.fold(0.0, f64::max) / self.speed_rad_s
+        let ways = angles_rad.iter().zip(self.start_rad).zip(self.speeds_rad_s);
+        ways.map(|((angle, start), speed)| (angle - start).abs() / speed).fold(0.0, f64::max)
     }
 }
 
@@ -142,6 +146,7 @@ impl FiveJointArm {
     pub const TARGET_M: [f64; 3] = [0.151_171, 0.191_62, 0.172_124];
     /// The paper's joint speed; its unit is not printed.
     pub const SPEED_RAD_S: f64 = 0.2;
+    const SPEEDS_RAD_S: [f64; 4] = [Self::SPEED_RAD_S; 4];
     /// Links a1 to a4 and the hand d5.
     const LINKS_M: [f64; 5] = [0.010, 0.104, 0.096, 0.027, 0.137];
 
@@ -169,7 +174,7 @@ impl FiveJointArm {
             bounds_rad: &Self::BOUNDS_RAD,
             start_rad: &[0.0; 4],
             target_m: Self::TARGET_M,
-            speed_rad_s: Self::SPEED_RAD_S,
+            speeds_rad_s: &Self::SPEEDS_RAD_S,
             reward: Reward { reading, ..Reward::PAPER_003 },
         }
     }

@@ -1,0 +1,232 @@
+//! Reaching a position without inverse kinematics: any chain, any place that it can reach, and clear words about others.
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
+mod common;
+
+use common::{config, pose, sphere, ur5, ur5_origins_m};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use taustream_arm::{Robot, Scene};
+use taustream_motion::JointArray;
+use taustream_planner::draw::Draw;
+use taustream_planner::optimize::METHODS;
+use taustream_planner::position::{ERROR_M_MAX, error_m, polish};
+use taustream_planner::{
+    PlanOptions, PositionError, PositionTask, Reached, StartMargin, plan_to_position, verify,
+};
+
+fn scene(obstacles: Vec<taustream_arm::Obstacle>) -> Scene {
+    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles }
+}
+
+fn piper() -> Robot {
+    Robot::load(&config("robots/piper.toml")).expect("shipped")
+}
+
+/// A chain of standard rows (a, alpha, d), without shapes, whose joints turn by up to two radians.
+fn chain(rows: &[[f64; 3]]) -> Robot {
+    let mut text = String::from("name = \"chain\"\n");
+    for (i, [a, alpha, d]) in rows.iter().enumerate() {
+        write!(
+            text,
+            "[[joint]]\nname = \"j{i}\"\nlink_radius_m = 0.0\nposition_rad = [-2, 2]\n\
+             dh = {{ a_m = {a}, alpha_rad = {alpha}, d_m = {d}, theta_offset_rad = 0.0 }}\n\
+             motion = {{ velocity_rad_s = {}, acceleration_rad_s2 = 10, jerk_rad_s3 = 100 }}\n",
+            1.0 + 0.5 * (i as f64)
+        )
+        .expect("a string");
+    }
+    Robot::from_toml(Path::new("chain.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn two_joints() -> Robot {
+    chain(&[[0.5, 0.0, 0.1], [0.2, 0.0, 0.0]])
+}
+
+fn eight_joints() -> Robot {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let row = |i: u32| [0.1, if i.is_multiple_of(2) { quarter } else { -quarter }, 0.05 * f64::from(i % 3)];
+    chain(&(0..8).map(row).collect::<Vec<_>>())
+}
+
+fn reach(
+    robot: &Robot,
+    scene: &Scene,
+    start_rad: JointArray,
+    target_m: [f64; 3],
+    seed: u64,
+) -> Result<Reached, PositionError> {
+    let options = PlanOptions { seed, deadline: Duration::from_secs(4), ..PlanOptions::default() };
+    let task = PositionTask { robot, scene, start_rad, target_m, margin: StartMargin::Scene, method: None };
+    plan_to_position(&task, &options, None)
+}
+
+fn tip_m(robot: &Robot, q: &JointArray) -> [f64; 3] {
+    robot.chain.frames(q)[robot.joints.len()].translation.vector.into()
+}
+
+fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+}
+
+/// What every answer promises.
+fn assert_reached(robot: &Robot, scene: &Scene, target_m: [f64; 3], reached: &Reached, who: &str) {
+    let end = reached.plan.trajectory.end_rad();
+    let off_m = distance_m(tip_m(robot, &end), target_m);
+    assert!(off_m <= reached.error_m, "{who}: {off_m:e} m off, promised {:e}", reached.error_m);
+    assert!(reached.error_m <= 2.0 * ERROR_M_MAX, "{who}: {:e}", reached.error_m);
+    for (q, joint) in end.iter().zip(&robot.joints) {
+        let [low, high] = joint.limits.position_rad;
+        assert!((low - 1e-12..=high + 1e-12).contains(q), "{who}: {} at {q}", joint.name);
+    }
+    assert_eq!(verify(robot, scene, &reached.plan.trajectory).as_ref(), Ok(&reached.plan.proof), "{who}");
+    let as_said = end.iter().zip(reached.pose_rad).all(|(a, b)| (a - b).abs() < 1e-9);
+    assert!(as_said, "{who}: ends at {end:?}, said {:?}", reached.pose_rad);
+}
+
+/// Goal: whatever the arm can reach is reached, by arms of two to eight joints.
+/// Method: the tip's place in random poses of each arm is a place that it can reach.
+#[test]
+fn positions_of_random_poses_are_reached_by_arms_of_two_to_eight_joints() {
+    let empty = scene(Vec::new());
+    for (name, robot) in
+        [("ur5", ur5()), ("piper", piper()), ("two joints", two_joints()), ("eight joints", eight_joints())]
+    {
+        let mut draw = Draw::new(5, 60);
+        let mut random = || -> JointArray {
+            std::array::from_fn(|j| {
+                robot.joints.get(j).map_or(0.0, |joint| {
+                    let [low, high] = joint.limits.position_rad;
+                    draw.within(low, high)
+                })
+            })
+        };
+        let world = taustream_planner::world::World::new(&robot, &empty).expect("builds");
+        let mut free = || loop {
+            let q = random();
+            if world.contact(&q).is_none() {
+                return q;
+            }
+        };
+        for seed in 0..5 {
+            let (start, target_m) = (free(), tip_m(&robot, &free()));
+            let who = format!("{name}, seed {seed}, to {target_m:?}");
+            let reached =
+                reach(&robot, &empty, start, target_m, seed).unwrap_or_else(|e| panic!("{who}: {e}"));
+            assert_reached(&robot, &empty, target_m, &reached, &who);
+        }
+    }
+}
+
+/// Goal: the error is the real one, by other kinematics than the planner's, and one seed gives one answer.
+#[test]
+fn position_of_a_ur5_is_reached_by_independent_kinematics_and_repeats() {
+    let (robot, balls) = (ur5(), scene(vec![sphere("ball", [0.45, 0.1, 0.35], 0.1)]));
+    let (start, target_m) = (pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), [0.45, -0.25, 0.3]);
+    let once = reach(&robot, &balls, start, target_m, 11).expect("reached");
+    let origins = ur5_origins_m(&once.plan.trajectory.end_rad());
+    assert!(distance_m(origins[6], target_m) <= once.error_m, "{:?}", origins[6]);
+    assert!(once.poses >= 2, "{} poses to choose from", once.poses);
+    let again = reach(&robot, &balls, start, target_m, 11).expect("reached");
+    let cut = [&once, &again].iter().any(|r| r.plan.how.contains("cut short"));
+    assert!(cut || again.plan.trajectory == once.plan.trajectory, "one seed, two motions: {}", once.plan.how);
+}
+
+#[test]
+fn position_on_the_axis_of_the_base_is_reached_although_the_arm_is_singular_there() {
+    let (robot, empty) = (piper(), scene(Vec::new()));
+    for target_m in [[0.0, 0.0, 0.45], [0.0, 0.0, 0.6]] {
+        let reached = reach(&robot, &empty, pose([0.3, 0.5, -0.5, 0.0, 0.0, 0.0]), target_m, 2)
+            .unwrap_or_else(|e| panic!("{target_m:?}: {e}"));
+        assert_reached(&robot, &empty, target_m, &reached, "axis");
+    }
+    // A UR5's wrist stands 0.10915 m aside of the arm's plane, and its last link of 0.0823 m cannot bring the tip back.
+    let start = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let error = reach(&ur5(), &empty, start, [0.0, 0.0, 0.75], 2).unwrap_err();
+    let PositionError::Missed { by_m, .. } = error else { panic!("{error}") };
+    assert!((by_m - (0.109_15 - 0.082_3)).abs() < 1e-6, "{error}");
+    // Stretched out to the last: here every lever is at right angles to the way that is left.
+    let (robot, far_m) = (two_joints(), [0.7, 0.0, 0.1]);
+    let reached = reach(&robot, &empty, pose([0.3, 0.4, 0.0, 0.0, 0.0, 0.0]), far_m, 2).expect("the edge");
+    assert_reached(&robot, &empty, far_m, &reached, "edge");
+}
+
+#[test]
+fn position_out_of_reach_is_refused_with_how_far_it_is() {
+    let (robot, empty) = (two_joints(), scene(Vec::new()));
+    let error = reach(&robot, &empty, [0.0; 8], [0.9, 0.0, 0.1], 1).unwrap_err();
+    // The bound counts the first joint's height, which does not help; it never says too little.
+    let PositionError::TooFar { distance_m, reach_m } = error.clone() else { panic!("{error}") };
+    assert!(distance_m > reach_m && reach_m >= 0.7, "{error}");
+    assert!(error.to_string().contains("out of reach"), "{error}");
+    // In the hole round the base, whose rim is where the second joint ends at two radians; and above the arm's plane.
+    let rim_m = (0.25 + 0.04 + 2.0 * 0.5 * 0.2 * 2.0_f64.cos()).sqrt();
+    for (target_m, off_m) in [([0.1, 0.0, 0.1], rim_m - 0.1), ([0.6, 0.0, 0.25], 0.15)] {
+        let error = reach(&robot, &empty, [0.0; 8], target_m, 1).unwrap_err();
+        let PositionError::Missed { tries, by_m } = error.clone() else { panic!("{error}") };
+        assert!(tries >= 4 && (by_m - off_m).abs() < 1e-6, "{error}, not {off_m}");
+    }
+    for (axis, bad) in [('x', f64::NAN), ('y', f64::INFINITY), ('z', f64::NEG_INFINITY)] {
+        let mut target_m = [0.4, 0.0, 0.1];
+        target_m[usize::from(axis as u8 - b'x')] = bad;
+        let error = reach(&robot, &empty, [0.0; 8], target_m, 1).unwrap_err();
+        assert!(matches!(error, PositionError::BadTarget { axis: a, .. } if a == axis), "{error}");
+    }
+    let error =
+        reach(&robot, &empty, [9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.4, 0.0, 0.1], 1).unwrap_err();
+    assert!(error.to_string().contains("start outside limits"), "{error}");
+}
+
+#[test]
+fn position_inside_an_obstacle_is_refused_by_its_name() {
+    let (robot, target_m) = (ur5(), [0.45, -0.25, 0.3]);
+    let ball = scene(vec![sphere("ball", target_m, 0.05)]);
+    let error = reach(&robot, &ball, pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), target_m, 1).unwrap_err();
+    assert!(matches!(error, PositionError::NoClearPose { .. }), "{error}");
+    let words = error.to_string();
+    assert!(words.contains("ball") && words.contains("another position"), "{words}");
+}
+
+#[test]
+fn position_is_reached_by_the_papers_method_and_others_by_name() {
+    let (robot, empty) = (ur5(), scene(Vec::new()));
+    let (start_rad, target_m) = (pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), [0.45, -0.25, 0.3]);
+    for name in ["iepso", "de", "iwo", "gwo"] {
+        let method = METHODS.iter().find(|m| m.name == name);
+        let options = PlanOptions { seed: 4, deadline: Duration::from_secs(4), ..PlanOptions::default() };
+        let margin = StartMargin::Scene;
+        let task = PositionTask { robot: &robot, scene: &empty, start_rad, target_m, margin, method };
+        let reached = plan_to_position(&task, &options, None).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(reached.plan.how.starts_with(&name.to_uppercase()), "{}", reached.plan.how);
+        assert_reached(&robot, &empty, target_m, &reached, &reached.plan.how);
+    }
+}
+
+/// Goal: polishing never makes a pose worse, stays inside the ranges, and from near the target ends on it.
+#[test]
+fn polishing_ends_on_the_target_from_nearby_and_never_makes_worse() {
+    let (mut there, mut tried) = (0, 0);
+    for (robot, slack_rad) in [(ur5(), 0.1), (piper(), 0.1), (eight_joints(), 0.1), (two_joints(), 0.05)] {
+        for seed in 0..100 {
+            let mut draw = Draw::new(seed, 61);
+            let mut q = [0.0; 8];
+            let mut near = [0.0; 8];
+            for (j, joint) in robot.joints.iter().enumerate() {
+                let [low, high] = joint.limits.position_rad;
+                q[j] = draw.within(low, high);
+                near[j] = (q[j] + draw.within(-slack_rad, slack_rad)).clamp(low, high);
+            }
+            let target = nalgebra::Vector3::from(tip_m(&robot, &q));
+            let polished = polish(&robot, &near, &target);
+            let (before, after) = (error_m(&robot, &near, &target), error_m(&robot, &polished, &target));
+            assert!(after <= before, "seed {seed}: {before} became {after}");
+            for (q, joint) in polished.iter().zip(&robot.joints) {
+                let [low, high] = joint.limits.position_rad;
+                assert!((low..=high).contains(q), "seed {seed}: {q}");
+            }
+            tried += 1;
+            there += u32::from(after < 1e-9);
+        }
+    }
+    assert!(there * 100 >= tried * 97, "{there} of {tried}");
+}
