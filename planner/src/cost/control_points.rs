@@ -4,6 +4,8 @@
 //! angles. All joints of a stroke share one profile, so that a table of it serves every evaluation.
 //!
 //! Source: seed paper 000, section 5 and table 1.
+use super::fast::Fast;
+use super::level::Level;
 use super::phases::phases;
 use super::{CostError, CostModel, PaperCost, Point, Sum, spheres};
 use crate::optimize::Problem;
@@ -31,6 +33,8 @@ pub struct ControlPointCost<'a> {
     model: CostModel,
     /// Of a stroke, at each of its waypoints.
     phases: Vec<f64>,
+    /// `None` where only the yardstick can rate.
+    fast: Option<Fast>,
     bounds_rad: Vec<[f64; 2]>,
 }
 
@@ -59,7 +63,14 @@ impl<'a> ControlPointCost<'a> {
         }
         let phases = phases(EXPONENT, model.waypoints_per_segment);
         let bounds_rad = vec![[-PI, PI]; control_points * robot.joints.len()];
-        Ok(Self { robot, spheres, ends_rad, control_points, model, phases, bounds_rad })
+        let fast = Fast::new(&robot.chain, &spheres, &model, &phases);
+        Ok(Self { robot, spheres, ends_rad, control_points, model, phases, fast, bounds_rad })
+    }
+
+    /// The same with other vector instructions than the best of this machine.
+    #[must_use]
+    pub fn on(self, level: Level) -> Self {
+        Self { fast: self.fast.map(|fast| fast.on(level)), ..self }
     }
 
     /// Start, control points and goal of a decision vector; `None` when it is none.
@@ -79,22 +90,49 @@ impl<'a> ControlPointCost<'a> {
         Some(corners)
     }
 
-    /// The cost and its parts; `None` for what is no decision vector.
+    /// The cost and its parts; `None` for what is no decision vector. Penalty and collision are those of
+    /// [`Self::rate_exactly`]; the tip's path is summed in f32.
     #[must_use]
     pub fn rate(&self, x: &[f64]) -> Option<PaperCost> {
-        self.rate_exactly(x)
+        let corners = self.corners(x)?;
+        let Some(sifted) = self.fast.as_ref().and_then(|fast| fast.sift(&corners)) else {
+            return self.rate_poses(&corners);
+        };
+        let mut sum = Sum::new(&self.model, self.robot, &self.spheres);
+        for (segment, step) in sifted.suspects {
+            let pose = self.pose(corners.get(segment..segment + 2)?, step);
+            sum.penalise(&self.robot.chain.frames(&pose)[..=self.robot.chain.joints()]);
+        }
+        let ways = corners.windows(2).map(|pair| match pair {
+            [from, to] => from.iter().zip(to).map(|(p, q)| (q - p).abs()).sum(),
+            _ => 0.0,
+        });
+        sum.cost.path_length_m = sifted.length_m;
+        // Joints go one way within a segment.
+        sum.cost.joint_travel_rad = ways.sum();
+        sum.cost.poses = self.phases.len() * (corners.len() - 1) + 1;
+        Some(sum.finish())
+    }
+
+    /// The pose of a segment at a step; the step behind the last one is its end.
+    fn pose(&self, segment: &[JointArray], step: usize) -> JointArray {
+        match (segment, self.phases.get(step)) {
+            ([from, to], Some(phase)) => std::array::from_fn(|j| from[j] + phase * (to[j] - from[j])),
+            ([_, to], None) => *to,
+            _ => [0.0; MAX_JOINTS],
+        }
     }
 
     /// The same by plain f64 arithmetic, pose by pose: the yardstick, and what is reported in the end.
     #[must_use]
     pub fn rate_exactly(&self, x: &[f64]) -> Option<PaperCost> {
-        let corners = self.corners(x)?;
+        self.rate_poses(&self.corners(x)?)
+    }
+
+    fn rate_poses(&self, corners: &[JointArray]) -> Option<PaperCost> {
         let mut sum = Sum::new(&self.model, self.robot, &self.spheres);
         for segment in corners.windows(2) {
-            let [from, to] = segment else { continue };
-            for phase in &self.phases {
-                sum.add(&std::array::from_fn(|j| from[j] + phase * (to[j] - from[j])));
-            }
+            (0..self.phases.len()).for_each(|step| sum.add(&self.pose(segment, step)));
         }
         sum.add(corners.last()?);
         Some(sum.finish())

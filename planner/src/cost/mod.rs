@@ -6,9 +6,19 @@
 //! Source: seed paper 000, eq. 3.5 to 3.10 in the corrected reading (its eq. 3.9 sums the distances over the links,
 //! so that its penalty never acts). [`Reading::Printed`] selects that sum.
 mod control_points;
+mod fast;
+mod flat;
+mod lanes;
+mod level;
+mod margin;
 mod phases;
+mod sieve;
+mod skeleton;
+#[cfg(test)]
+mod soundness;
 
 pub use control_points::ControlPointCost;
+pub use level::Level;
 
 use crate::optimize::Reading;
 use taustream_arm::scene::Shape;
@@ -205,6 +215,11 @@ impl<'a> Sum<'a> {
         }
         self.last = Some((*position_rad, tip));
         self.cost.poses += 1;
+        self.penalise(frames);
+    }
+
+    /// Adds what a pose costs by being too near to spheres.
+    fn penalise(&mut self, frames: &[Pose]) {
         for (centre, radius_m) in self.spheres {
             let distances_m = frames
                 .windows(2)
