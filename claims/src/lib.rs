@@ -15,6 +15,7 @@ mod figure;
 mod lab;
 mod number;
 mod paper_001;
+pub mod planners;
 mod registry;
 mod report;
 pub mod statistics;

@@ -17,6 +17,7 @@ use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
 use crate::work::Work;
 use crate::world::World;
 use std::ops::Range;
+use std::time::Duration;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 
 /// Poses that differ by less are one: far below a count of any encoder.
@@ -42,12 +43,23 @@ struct Budget {
     timings: usize,
 }
 
+/// The deadline in milliseconds, as far as it counts: a minute is the most that anybody waits for, and beyond it more
+/// work finds nothing new.
+fn counted_ms(deadline: Duration) -> usize {
+    usize::try_from(deadline.as_millis()).unwrap_or(usize::MAX).clamp(1, 60_000)
+}
+
+/// Poses that all searches of a plan may check.
+#[must_use]
+pub fn search_checks(deadline: Duration) -> usize {
+    counted_ms(deadline) * 100
+}
+
 impl Budget {
     fn of(options: &PlanOptions) -> Self {
-        // A minute is the most that anybody waits for; beyond it more work finds nothing new.
-        let ms = usize::try_from(options.deadline.as_millis()).unwrap_or(usize::MAX).clamp(1, 60_000);
+        let ms = counted_ms(options.deadline);
         Self {
-            search_checks: ms * 100,
+            search_checks: search_checks(options.deadline),
             shortcuts: (ms / 10).clamp(20, 200),
             refinements: ms,
             timings: (ms / 50).clamp(6, 40),
@@ -318,6 +330,7 @@ impl<'a> Pipeline<'a> {
             self.space.is_edge_free(a, b)
         });
         let evaluations = found.progress.evaluations;
+        self.space.note_checks(evaluations * refine::POSES);
         let verdict = if free { "" } else { ", collides" };
         self.tried.push(format!("{name} from {from} ({evaluations} evaluations{verdict})"));
         if !free {
@@ -419,7 +432,7 @@ impl<'a> Pipeline<'a> {
                 if !tried.is_empty() && tried != how {
                     how = format!("{how} (tried: {tried})");
                 }
-                Ok(Plan { trajectory, how, proof, planning_s: work.elapsed_s() })
+                Ok(Plan { trajectory, how, proof, planning_s: work.elapsed_s(), checks: self.space.checks() })
             }
             (None, Some(violation)) => Err(PlanError::Unproven { tried, violation }),
             (None, None) => Err(PlanError::NotFound { tried, cut_short: cut }),

@@ -2,6 +2,7 @@
 mod live;
 mod offline;
 mod papers;
+mod planners;
 
 pub(crate) use live::{
     CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
@@ -12,6 +13,7 @@ pub(crate) use offline::{
 };
 
 pub(crate) use papers::PapersArgs;
+pub(crate) use planners::PlannersArgs;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;

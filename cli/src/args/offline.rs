@@ -245,6 +245,8 @@ pub(crate) enum BenchName {
     Compare(CompareArgs),
     /// Judge the claims of the five seed papers: their tables beside ours, claim by claim.
     Papers(super::PapersArgs),
+    /// Compare the planners by name: what they find, how fast, and how good the motions are.
+    Planners(super::PlannersArgs),
 }
 
 /// What `taustream bench compare` takes.

@@ -21,6 +21,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         }
         BenchName::Compare(args) => return super::compare::run(form, args),
         BenchName::Papers(args) => return super::papers::run(form, args),
+        BenchName::Planners(args) => return super::planners::run(form, args),
     };
     let options = BenchOptions {
         settings: arm::settings(settings)?,

@@ -7,6 +7,7 @@ mod compare;
 pub(crate) mod cost;
 mod papers;
 pub(crate) mod plan;
+mod planners;
 pub(crate) mod plot;
 mod protocol_line;
 pub(crate) mod sample;
