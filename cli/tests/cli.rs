@@ -11,6 +11,8 @@ mod doctor;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
+#[path = "cli/planners.rs"]
+mod planners;
 #[path = "cli/plot.rs"]
 mod plot;
 #[path = "cli/urdf.rs"]

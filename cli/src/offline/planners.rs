@@ -71,17 +71,18 @@ fn contest(form: Form, args: &PlannersArgs) -> Result<Contest, Failure> {
     }
     kinds.push(("clutter".to_owned(), Surroundings::Clutter));
     kinds.push(("cup".to_owned(), Surroundings::Cup));
+    let mut remarks = Vec::new();
+    let outside = if let Some(directory) = args.published() {
+        published(&directory, count).map_err(Failure::Usage)?
+    } else {
+        let how = "name their directory with --published or TAUSTREAM_MBM_DIR";
+        remarks.push(format!("published problems: NOT measured; {how}"));
+        Vec::new()
+    };
     form.progress("drawing problems ..");
     let sets = kinds.iter().map(|(name, surroundings)| draw(name, &robot, surroundings, (count, args.seed)));
     let mut sets = sets.collect::<Result<Vec<_>, Failure>>()?;
-    let mut remarks = Vec::new();
-    match args.published() {
-        Some(directory) => sets.extend(published(&directory, count).map_err(Failure::Usage)?),
-        None => remarks.push(
-            "published problems: NOT measured; name their directory with --published or TAUSTREAM_MBM_DIR"
-                .to_owned(),
-        ),
-    }
+    sets.extend(outside);
     Ok(Contest { sets, entrants, deadline: Duration::from_millis(deadline_ms.into()), remarks })
 }
 

@@ -77,6 +77,7 @@ impl Scratch {
             .args(words)
             .current_dir(&self.dir)
             .env_remove("TAUSTREAM_SETTINGS")
+            .env_remove("TAUSTREAM_MBM_DIR")
             .env("TAUSTREAM_CONFIG_DIR", config());
         command
     }
