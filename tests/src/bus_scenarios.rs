@@ -1,6 +1,6 @@
 //! What must hold when a bus fails under a moving arm: it stops, says why and what to do, stays silent whatever the bus
 //! does, and comes back by command alone.
-use crate::scenarios::{Goals, Judged, Scenario, arrive, enable, is_ready_to_enable};
+use crate::scenarios::{Goals, Judged, Scenario, enable, go, is_ready_to_enable, set_off};
 use crate::stage::{PATIENCE, Stage};
 use anyhow::{Result, ensure};
 use std::time::{Duration, Instant};
@@ -31,8 +31,7 @@ const fn scenario(name: &'static str, run: fn(&mut Stage, &Goals) -> Result<()>)
 fn under_way(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
     stage.cli_done(&["speed", "20"])?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     Ok(())
 }
 
@@ -91,8 +90,7 @@ fn move_on(stage: &mut Stage, goals: &Goals) -> Result<()> {
         let by_rad = (commanded - measured).abs();
         ensure!(by_rad < AT_REST_RAD, "joint {} is enabled {by_rad} rad from where it stands", joint + 1);
     }
-    stage.replan(&goals.text(1)?)?;
-    arrive(stage, goals.rad(1)?)?;
+    go(stage, goals, 1)?;
     Ok(())
 }
 
@@ -206,8 +204,7 @@ fn unacknowledged(stage: &mut Stage, goals: &Goals) -> Result<()> {
     add_interface(stage, "vcan1")?;
     way_back(stage, goals)?;
     stage.cli_done(&["speed", "20"])?;
-    stage.replan(&goals.text(2)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 2, 0.1)?;
     stage.run("tc", "qdisc add dev vcan0 root netem delay 700ms limit 1000")?;
     let report = bus_fault(stage, BusTrouble::Unconfirmed, &["frames are not acknowledged", "in flight"])?;
     ensure!(report.fault_value >= 7.0, "only {} frames in flight", report.fault_value);

@@ -1,10 +1,10 @@
 //! What must hold of an arm of Damiao motors over the real processes on a real vcan0.
-use crate::scenarios::Goals;
+use crate::scenarios::{Goals, arrive_within, enable, set_off};
 use crate::stage::{PATIENCE, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
-use taustream_messages::{FaultReason, Phase, Report};
+use taustream_messages::{FaultReason, Phase};
 
 /// A spring under a load does not stand where it is told: this far off it may rest. The shipped shoulder carries 10 Nm on
 /// 400 Nm/rad.
@@ -33,34 +33,17 @@ pub const ALL: &[Scenario] = &[
     Scenario { name: "damiao_streamer_killed_mid_motion_motors_let_go", run: streamer_killed, kills: true },
 ];
 
-fn enable(stage: &mut Stage) -> Result<()> {
-    stage.cli_done(&["enable"])?;
-    stage.await_phase(Phase::Holding)?;
-    stage.cli_done(&["speed", "100"])?;
-    Ok(())
-}
-
-fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
-    stage.await_through_stalls("the end of the motion", |report, phase| {
-        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
-    })?;
-    stage.await_report("the motors to settle at the goal", |report, _| {
-        goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < AT_GOAL_RAD)
-    })
-}
-
 fn goals_with_pause(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
     for index in 0..goals.0.len() {
-        stage.replan(&goals.text(index)?)?;
-        stage.await_under_way(0.3)?;
+        let motion = set_off(stage, goals, index, 0.3)?;
         if index == 1 {
             stage.cli_done(&["pause"])?;
             let paused = stage.await_phase(Phase::Paused)?;
             ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
             stage.cli_done(&["resume"])?;
         }
-        let report = arrive(stage, goals.rad(index)?)?;
+        let report = arrive_within(stage, motion, goals.rad(index)?, AT_GOAL_RAD)?;
         ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
     }
     stage.cli_done(&["disable"])?;
@@ -72,8 +55,7 @@ fn goals_with_pause(stage: &mut Stage, goals: &Goals) -> Result<()> {
 fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
     enable(stage)?;
     stage.cli_done(&["speed", "20"])?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     stage.simulator.tell(fault)?;
     let report = stage.await_phase(Phase::Fault)?;
     ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
@@ -85,8 +67,8 @@ fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[Faul
     stage.await_report("all motors off", |report, _| report.energised == 0)?;
     bring_back(stage)?;
     enable(stage)?;
-    stage.replan(&goals.text(1)?)?;
-    arrive(stage, goals.rad(1)?)?;
+    let motion = stage.replan(&goals.text(1)?)?;
+    arrive_within(stage, motion, goals.rad(1)?, AT_GOAL_RAD)?;
     Ok(())
 }
 
@@ -119,8 +101,7 @@ fn motor_fault(stage: &mut Stage, goals: &Goals) -> Result<()> {
 fn streamer_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
     stage.cli_done(&["speed", "20"])?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     stage.streamer.signal(Signal::KILL)?;
     stage.streamer.await_end()?;
     let since = Instant::now();

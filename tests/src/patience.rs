@@ -1,6 +1,7 @@
-//! Trying again, aloud, where the host held the whole machine up: the arm then pauses or faults, as it must, and the
+//! Scenarios one after another, each tried again, aloud, where the host held the whole machine up: the arm then pauses or faults, as it must, and the
 //! scenario's own event never comes. A fault of the product comes back in every try.
 use anyhow::{Error, Result};
+use std::time::Instant;
 
 /// How often a scenario is tried on a host that stalls the machine.
 const TRIES: usize = 3;
@@ -20,15 +21,25 @@ impl<E: Into<Error>> From<E> for Failed {
     }
 }
 
-/// Performs a scenario, which is told the number of the attempt; again only after a stall of the host.
-///
-/// # Errors
-/// What did not hold in the last try.
-pub fn with_patience<T>(name: &str, perform: impl Fn(usize) -> Result<T, Failed>) -> Result<T> {
+/// Performs a scenario, which is told the number of the attempt and says what was seen; prints how it went. Whether it
+/// passed.
+pub fn passes(name: &str, perform: impl Fn(usize) -> Result<String, Failed>) -> bool {
+    let since = Instant::now();
+    let result = with_patience(name, perform);
+    let took_s = since.elapsed().as_secs_f64();
+    match &result {
+        Ok(seen) => println!("ok     {name}: {seen}; {took_s:.1} s"),
+        Err(error) => println!("FAILED {name}: {error:#}; {took_s:.1} s"),
+    }
+    result.is_ok()
+}
+
+/// Again only after a stall of the host; what did not hold in the last try is the error.
+fn with_patience<T>(name: &str, perform: impl Fn(usize) -> Result<T, Failed>) -> Result<T> {
     for attempt in 1..TRIES {
         match perform(attempt) {
             Err(Failed { error, stalled: true }) => {
-                let reason: String = error.to_string().chars().take(160).collect();
+                let reason: String = format!("{error:#}").chars().take(400).collect();
                 println!("       {name}: the host stalled the machine, trying again: {reason}");
             }
             outcome => return outcome.map_err(|failed| failed.error),

@@ -3,7 +3,7 @@
 //! The stage's recording goes on over the kill; the judge of setpoints does not, because a log ends with its streamer.
 use crate::candump;
 use crate::patience::Failed;
-use crate::scenarios::Goals;
+use crate::scenarios::{Goals, set_off};
 use crate::stage::{Place, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
@@ -51,15 +51,14 @@ pub fn perform(restart: &Restart, place: &Place, goals: &Goals, attempt: usize) 
     let mut stage = Stage::open(&place, &format!("{}-{attempt}", restart.name))?;
     let outcome = kill_and_restart(restart, &mut stage, goals);
     fs::remove_file(&settings).context("the settings of this scenario cannot be removed")?;
-    outcome.map_err(|error| Failed { stalled: stage.was_stalled(), error })
+    outcome.map_err(|error| stage.failed(error))
 }
 
 fn kill_and_restart(restart: &Restart, stage: &mut Stage, goals: &Goals) -> Result<String> {
     stage.cli_done(&["enable"])?;
     stage.await_phase(Phase::Holding)?;
     if restart.mid_motion {
-        stage.replan(&goals.text(0)?)?;
-        stage.await_under_way(0.2)?;
+        set_off(stage, goals, 0, 0.2)?;
     }
     stage.streamer.signal(Signal::KILL)?;
     stage.streamer.await_end()?;
@@ -90,10 +89,8 @@ fn kill_and_restart(restart: &Restart, stage: &mut Stage, goals: &Goals) -> Resu
     stage.cli_done(&["enable"])?;
     stage.await_phase(Phase::Holding)?;
     stage.cli_done(&["speed", "100"])?;
-    stage.replan(&goals.text(1)?)?;
-    stage.await_through_stalls("the end of the motion", |report, phase| {
-        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
-    })?;
+    let motion = stage.replan(&goals.text(1)?)?;
+    stage.await_end_of(motion)?;
     Ok(format!("{told} setpoints before enable, all of them the hold"))
 }
 

@@ -1,5 +1,5 @@
 //! What must hold over the real processes, one function a promise. Names say area, event, condition.
-use crate::stage::{PATIENCE, Stage};
+use crate::stage::{Motion, PATIENCE, Stage};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
@@ -120,28 +120,45 @@ pub(crate) fn enable(stage: &mut Stage) -> Result<()> {
     Ok(())
 }
 
-pub(crate) fn arrive(stage: &mut Stage, goal_rad: &[f64]) -> Result<Report> {
-    let report = stage.await_through_stalls("the end of the motion", |report, phase| {
-        phase == Phase::Holding && report.trajectory_s >= report.trajectory_duration_s
-    })?;
-    for (joint, goal) in goal_rad.iter().enumerate() {
-        let commanded = report.command_rad[joint];
-        ensure!(
-            (commanded - goal).abs() < 1e-9,
-            "joint {}: commanded {commanded}, goal {goal} rad",
-            joint + 1
-        );
+/// Waits until a motion has brought the arm to its goal.
+fn arrive(stage: &mut Stage, motion: Motion, goal_rad: &[f64]) -> Result<Report> {
+    arrive_within(stage, motion, goal_rad, AT_GOAL_RAD)
+}
+
+/// Like [`arrive`], for joints that rest within `off_rad` of where they are told to be.
+pub(crate) fn arrive_within(
+    stage: &mut Stage,
+    motion: Motion,
+    goal_rad: &[f64],
+    off_rad: f64,
+) -> Result<Report> {
+    let report = stage.await_end_of(motion)?;
+    for (joint, (goal, commanded)) in goal_rad.iter().zip(report.command_rad).enumerate() {
+        let joint = joint + 1;
+        ensure!((commanded - goal).abs() < 1e-9, "joint {joint}: commanded {commanded}, goal {goal} rad");
     }
-    stage.await_report("the servos to settle at the goal", |report, _| {
-        goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < AT_GOAL_RAD)
+    stage.await_report("the joints to settle at the goal", |report, _| {
+        goal_rad.iter().zip(report.measured_rad).all(|(goal, got)| (goal - got).abs() < off_rad)
     })
+}
+
+/// Sends the arm to a goal and waits until it is under way: past `share` of the motion.
+pub(crate) fn set_off(stage: &mut Stage, goals: &Goals, index: usize, share: f64) -> Result<Motion> {
+    let motion = stage.replan(&goals.text(index)?)?;
+    stage.await_under_way(motion, share)?;
+    Ok(motion)
+}
+
+/// Sends the arm to a goal and waits until it stands there.
+pub(crate) fn go(stage: &mut Stage, goals: &Goals, index: usize) -> Result<Report> {
+    let motion = stage.replan(&goals.text(index)?)?;
+    arrive(stage, motion, goals.rad(index)?)
 }
 
 fn three_goals(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    for (index, goal) in goals.0.iter().enumerate() {
-        stage.replan(&goals.text(index)?)?;
-        let report = arrive(stage, goal)?;
+    for index in 0..goals.0.len() {
+        let report = go(stage, goals, index)?;
         ensure!(report.accepted == index as u64 + 1, "{} trajectories accepted", report.accepted);
         ensure!(report.guard_trips == 0, "the guard tripped in a verified motion");
         ensure!(report.frames_lost == 0, "{} frames lost", report.frames_lost);
@@ -153,8 +170,7 @@ fn three_goals(stage: &mut Stage, goals: &Goals) -> Result<()> {
 
 fn pause_and_resume(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.2)?;
+    let motion = set_off(stage, goals, 0, 0.2)?;
     stage.cli_done(&["pause"])?;
     let paused = stage.await_phase(Phase::Paused)?;
     ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
@@ -164,14 +180,13 @@ fn pause_and_resume(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let bits = |report: &Report| report.command_rad.map(f64::to_bits);
     ensure!(bits(&still) == bits(&paused), "the command moved while paused");
     stage.cli_done(&["resume"])?;
-    arrive(stage, goals.rad(0)?)?;
+    arrive(stage, motion, goals.rad(0)?)?;
     Ok(())
 }
 
 fn speed_and_stop(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     stage.cli_done(&["speed", "30"])?;
     stage.await_through_stalls("30 % speed", |report, _| (report.sigma - 0.3).abs() < 1e-12)?;
     stage.cli_done(&["stop"])?;
@@ -181,24 +196,21 @@ fn speed_and_stop(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let short = goal.iter().zip(held.command_rad).any(|(goal, at)| (goal - at).abs() > 1e-3);
     ensure!(short, "the stop came after the motion had ended");
     stage.cli_done(&["speed", "100"])?;
-    stage.replan(&goals.text(0)?)?;
-    arrive(stage, goal)?;
+    go(stage, goals, 0)?;
     Ok(())
 }
 
 fn planner_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.2)?;
+    let motion = set_off(stage, goals, 0, 0.2)?;
     stage.planner.signal(Signal::KILL)?;
     stage.planner.await_end()?;
     let (_, phase) = stage.report()?;
     ensure!(phase == Phase::Moving, "the arm is {} right after the planner died", phase.word());
-    arrive(stage, goals.rad(0)?)?;
+    arrive(stage, motion, goals.rad(0)?)?;
     stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "taustream-planner")?;
     stage.restart_planner()?;
-    stage.replan(&goals.text(1)?)?;
-    arrive(stage, goals.rad(1)?)?;
+    go(stage, goals, 1)?;
     Ok(())
 }
 
@@ -207,8 +219,7 @@ fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[Faul
     enable(stage)?;
     // A joint that loses its drive at full speed coasts before its brake holds it, here into a pillar.
     stage.cli_done(&["speed", "20"])?;
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     stage.simulator.tell(fault)?;
     let report = stage.await_phase(Phase::Fault)?;
     ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
@@ -229,8 +240,7 @@ fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[Faul
         stage.cli(&["clear-fault"])?;
     }
     enable(stage)?;
-    stage.replan(&goals.text(1)?)?;
-    arrive(stage, goals.rad(1)?)?;
+    go(stage, goals, 1)?;
     Ok(())
 }
 
@@ -333,8 +343,7 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
     let fast = sender.rejection(&TrajectoryMessage::new(&fast))?;
     ensure!(matches!(fast, Rejection::Limit { joint: 0, .. }), "{fast}");
 
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    let motion = set_off(stage, goals, 0, 0.1)?;
     for doctored in [
         Doctored::Delta(f64::NAN),
         Doctored::Base(f64::NAN),
@@ -353,7 +362,7 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
     cut.replaces = Replaces::Cut { trajectory_id: running.trajectory_id, at_s: running.trajectory_s + 0.5 };
     let cut = sender.rejection(&TrajectoryMessage::new(&cut))?;
     ensure!(matches!(cut, Rejection::CutUnsupported { .. } | Rejection::NotReady { .. }), "{cut}");
-    let report = arrive(stage, goals.rad(0)?)?;
+    let report = arrive(stage, motion, goals.rad(0)?)?;
     ensure!(report.accepted == 1, "{} trajectories accepted", report.accepted);
     ensure!(report.rejected >= 12, "only {} rejections counted", report.rejected);
     Ok(())
@@ -361,18 +370,18 @@ fn hostile_messages(stage: &mut Stage, goals: &Goals) -> Result<()> {
 
 fn started_twice(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    stage.replan(&goals.text(0)?)?;
+    let motion = stage.replan(&goals.text(0)?)?;
     let (status, said) = stage.second_streamer()?;
     ensure!(status.code() == Some(1), "the second streamer ended with {status}: {said}");
     ensure!(said.contains("vcan0") || said.contains("command"), "it does not say what is taken: {said}");
-    arrive(stage, goals.rad(0)?)?;
+    arrive(stage, motion, goals.rad(0)?)?;
     Ok(())
 }
 
 /// A streamer whose bus is not there ends with the cure in its message, and disturbs nobody.
 fn interface_missing_or_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
     enable(stage)?;
-    stage.replan(&goals.text(0)?)?;
+    let motion = stage.replan(&goals.text(0)?)?;
     let (status, said) = stage.streamer_on("vcan9")?;
     ensure!(status.code() == Some(1), "a missing interface ended the streamer with {status}: {said}");
     ensure!(said.contains("vcan9") && said.contains("ip link"), "no cure in: {said}");
@@ -381,7 +390,7 @@ fn interface_missing_or_down(stage: &mut Stage, goals: &Goals) -> Result<()> {
     stage.run("ip", "link set vcan1 up")?;
     ensure!(status.code() == Some(1), "an interface that is down ended the streamer with {status}: {said}");
     ensure!(said.contains("vcan1") && said.contains("up"), "no cure in: {said}");
-    arrive(stage, goals.rad(0)?)?;
+    arrive(stage, motion, goals.rad(0)?)?;
     Ok(())
 }
 
@@ -394,8 +403,7 @@ fn commands_out_of_place(stage: &mut Stage, goals: &Goals) -> Result<()> {
     stage.cli_refused(&["replan", "--goal", outside], "joint")?;
     ensure!(stage.cli(&["replan", "--goal", "0,0,0,0,0,0,0"])?.code != 0, "seven values for six joints");
     ensure!(stage.cli(&["speed", "101"])?.code == 2, "101 %");
-    stage.replan(&goals.text(0)?)?;
-    stage.await_under_way(0.1)?;
+    set_off(stage, goals, 0, 0.1)?;
     stage.cli_refused(&["disable"], "moving")?;
     stage.cli_refused(&["replan", "--at-once", "--goal", &goals.text(1)?], "rest")?;
     stage.cli_done(&["torque-off"])?;

@@ -6,6 +6,7 @@
 //! trajectory time: bit for bit by the product's sampler, and to 1e-11 rad by a second formula written here.
 use crate::cycle_log::{Cycle, Event};
 use std::collections::BTreeMap;
+use std::fmt;
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
 /// CANopen SYNC.
@@ -85,6 +86,16 @@ impl Verdict {
         self.trajectories = self.trajectories.max(other.trajectories);
         self.last_measured_rad.extend(other.last_measured_rad);
         self.last_setpoint_rad = other.last_setpoint_rad;
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { frames, syncs, setpoints, on_trajectory, .. } = self;
+        write!(
+            f,
+            "{frames} frames on the bus, {syncs} cycles, {setpoints} setpoints equal to the log, {on_trajectory} of them to a trajectory"
+        )
     }
 }
 
@@ -267,6 +278,27 @@ fn is_lost(cycle: &Cycle, bus: usize) -> bool {
     cycle.sent.get(bus).is_none_or(|sent| *sent == 0)
 }
 
+fn flaw(cycle: &Cycle, bus: usize, what: String) -> Flaw {
+    Flaw::Bus { sync: cycle.sync.get(bus).copied().unwrap_or(0), tick: cycle.tick, what }
+}
+
+/// The setpoints that followed a cycle's SYNC, by node; from now on they count as claimed.
+fn claim<'a>(
+    on_bus: &'a [Vec<(u8, Vec<u8>)>],
+    cycle: &Cycle,
+    bus: usize,
+    claimed: &mut [bool],
+) -> Result<&'a [(u8, Vec<u8>)], Flaw> {
+    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
+    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
+    let sent = at.and_then(|at| on_bus.get(at));
+    let sent = sent.ok_or_else(|| flaw(cycle, bus, "is not on the bus".into()))?;
+    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
+        *slot = true;
+    }
+    Ok(sent)
+}
+
 /// Compares what is left of a cycle that was lost in part: its SYNC, if that left, and the setpoints behind it.
 fn compare_rest(
     on_bus: &[Vec<(u8, Vec<u8>)>],
@@ -275,13 +307,8 @@ fn compare_rest(
     encodings: &[Encoding],
     claimed: &mut [bool],
 ) -> Result<usize, Flaw> {
-    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
-    let flaw = |what: String| Flaw::Bus { sync, tick: cycle.tick, what };
-    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
-    let sent = at.and_then(|at| on_bus.get(at)).ok_or_else(|| flaw("is not on the bus".into()))?;
-    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
-        *slot = true;
-    }
+    let flaw = |what: String| flaw(cycle, bus, what);
+    let sent = claim(on_bus, cycle, bus, claimed)?;
     for (node, data) in sent.iter().filter(|(_, data)| follows_target(data)) {
         let encoding = encodings.iter().find(|e| e.node_id == *node);
         let wish = encoding.and_then(|e| Some(e.counts(*cycle.position_rad.get(e.joint)?)));
@@ -302,13 +329,8 @@ fn compare_bus(
     encodings: &[Encoding],
     claimed: &mut [bool],
 ) -> Result<usize, Flaw> {
-    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
-    let flaw = |what: String| Flaw::Bus { sync, tick: cycle.tick, what };
-    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
-    let sent = at.and_then(|at| on_bus.get(at)).ok_or_else(|| flaw("is not on the bus".into()))?;
-    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
-        *slot = true;
-    }
+    let flaw = |what: String| flaw(cycle, bus, what);
+    let sent = claim(on_bus, cycle, bus, claimed)?;
     // Only in a fault may a drive that dropped out go without a setpoint.
     let may_miss = cycle.phase == "fault" && sent.len() < encodings.len();
     if sent.len() != encodings.len() && !may_miss {

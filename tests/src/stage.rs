@@ -1,6 +1,8 @@
 //! A stage for one scenario: the real processes on one bus, a `candump` beside them, everything kept in one folder.
+use crate::patience::Failed;
 use anyhow::{Context, Result, bail, ensure};
 use rustix::process::{Pid, Signal, kill_process};
+use serde::Deserialize;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -114,6 +116,19 @@ pub struct Answer {
     pub stdout: String,
     /// Standard error.
     pub stderr: String,
+}
+
+/// A motion that the streamer has accepted.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub struct Motion {
+    trajectory_id: u64,
+}
+
+impl Motion {
+    /// Whether a report speaks of this motion: the newest one may be older than the acceptance.
+    fn is_in(self, report: &Report) -> bool {
+        report.trajectory_id == self.trajectory_id
+    }
 }
 
 /// The processes of one scenario.
@@ -354,8 +369,10 @@ impl Stage {
     ///
     /// # Errors
     /// When it is refused.
-    pub fn replan(&self, goal_rad: &str) -> Result<Answer> {
-        self.cli_done(&["replan", "--goal", goal_rad, "--seed", "1", "--deadline-ms", "2500"])
+    pub fn replan(&self, goal_rad: &str) -> Result<Motion> {
+        let words = ["replan", "--goal", goal_rad, "--seed", "1", "--deadline-ms", "2500", "--json"];
+        let answer = self.cli_done(&words)?;
+        serde_json::from_str(&answer.stdout).with_context(|| format!("no receipt in {answer:?}"))
     }
 
     /// The newest report.
@@ -412,13 +429,23 @@ impl Stage {
         self.await_report(wanted.word(), |_, phase| phase == wanted)
     }
 
-    /// Waits until the running motion is under way: past `share` of its duration.
+    /// Waits until a motion is under way: past `share` of its duration.
     ///
     /// # Errors
     /// When it does not get there.
-    pub fn await_under_way(&mut self, share: f64) -> Result<Report> {
+    pub fn await_under_way(&mut self, motion: Motion, share: f64) -> Result<Report> {
         self.await_through_stalls("a motion under way", |r, phase| {
-            phase == Phase::Moving && r.trajectory_s > share * r.trajectory_duration_s
+            motion.is_in(r) && phase == Phase::Moving && r.trajectory_s > share * r.trajectory_duration_s
+        })
+    }
+
+    /// Waits until a motion has ended at its end.
+    ///
+    /// # Errors
+    /// When it does not get there.
+    pub fn await_end_of(&mut self, motion: Motion) -> Result<Report> {
+        self.await_through_stalls("the end of the motion", |r, phase| {
+            motion.is_in(r) && phase == Phase::Holding && r.trajectory_s >= r.trajectory_duration_s
         })
     }
 
@@ -443,11 +470,25 @@ impl Stage {
         }
     }
 
-    /// Whether the host held the machine up: the streamer counted stalls, or hears from no joint in time (the simulator
-    /// is held up with the rest, a fault of the arm concerns one joint or one bus).
-    pub fn was_stalled(&mut self) -> bool {
+    /// What did not hold, with the arm's state, and whether the host held the machine up.
+    #[must_use]
+    pub fn failed(&mut self, error: anyhow::Error) -> Failed {
+        let Ok((report, phase)) = self.report() else { return Failed { error, stalled: false } };
+        let state = format!(
+            "the arm is {} ({:?}, {} stalls, {} late cycles, feedback {:.3?} s old)",
+            phase.word(),
+            report.cause(),
+            report.stalls,
+            report.cycles_late,
+            report.feedback_age_s.iter().take(report.joints()).collect::<Vec<_>>()
+        );
+        Failed { error: error.context(state), stalled: self.is_stalled(&report) }
+    }
+
+    /// The streamer counted stalls, or hears from no joint in time (the simulator is held up with the rest, a fault of
+    /// the arm concerns one joint or one bus).
+    fn is_stalled(&self, report: &Report) -> bool {
         let limit_s = self.settings.supervision.feedback_age_s_max;
-        let Ok((report, _)) = self.report() else { return false };
         let all_late = report.feedback_age_s.iter().take(report.joints()).all(|age_s| *age_s > limit_s);
         let bus_well = report.buses().iter().all(|bus| bus.trouble == 0);
         report.stalls > 0 || (all_late && bus_well) || report.fault() == Some(FaultReason::Stall)

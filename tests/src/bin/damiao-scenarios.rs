@@ -3,13 +3,12 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
 use taustream_tests::damiao_scenarios::{ALL, Scenario};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::mit_setpoints::{LogEnds, encodings, judge};
-use taustream_tests::patience::{Failed, with_patience};
+use taustream_tests::patience::{Failed, passes};
 use taustream_tests::scenarios::Goals;
-use taustream_tests::setpoints::{BusFrame, Verdict};
+use taustream_tests::setpoints::BusFrame;
 use taustream_tests::stage::{Place, Stage};
 use taustream_tests::{candump, cycle_log};
 
@@ -48,34 +47,23 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read(arguments)?;
     let chosen: Vec<&Scenario> = ALL.iter().filter(|s| s.name.contains(&arguments.only)).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
-    let mut failed = 0;
+    let mut passed = 0;
     for scenario in &chosen {
-        let since = Instant::now();
-        let result = with_patience(scenario.name, |attempt| perform(scenario, &place, &goals, attempt));
-        let took_s = since.elapsed().as_secs_f64();
-        match result {
-            Ok(v) => println!(
-                "ok     {}: {} frames on the bus, {} cycles, {} commands equal to the log, {} of them to a trajectory; {took_s:.1} s",
-                scenario.name, v.frames, v.syncs, v.setpoints, v.on_trajectory
-            ),
-            Err(error) => {
-                failed += 1;
-                println!("FAILED {}: {error:#}; {took_s:.1} s", scenario.name);
-            }
-        }
+        passed += usize::from(passes(scenario.name, |attempt| perform(scenario, &place, &goals, attempt)));
     }
-    println!("{} passed, {failed} failed", chosen.len() - failed);
+    let failed = chosen.len() - passed;
+    println!("{passed} passed, {failed} failed");
     Ok(failed)
 }
 
-fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
+fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
     let motors = encodings(&stage.settings).context("not every servo is a Damiao motor in MIT mode")?;
     let period_s = f64::from(stage.settings.cycle.period_us) * 1e-6;
     let bus = stage.settings.buses.first().context("no bus")?.clone();
     let interface = bus.interface.clone();
     if let Err(error) = (scenario.run)(&mut stage, goals) {
-        return Err(Failed { stalled: stage.was_stalled(), error });
+        return Err(stage.failed(error));
     }
     let (recording, log) = stage.close_whatever_became_of_the_streamer()?;
     let seen = |record: candump::Record| BusFrame {
@@ -101,7 +89,7 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     if verdict.on_trajectory == 0 {
         return Err(anyhow!("nothing was compared with a trajectory").into());
     }
-    Ok(verdict)
+    Ok(verdict.to_string())
 }
 
 fn read(arguments: &Arguments) -> Result<(Place, Goals)> {

@@ -3,10 +3,9 @@ use anyhow::{Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
 use taustream_arm::Settings;
 use taustream_tests::demo_file::{DemoFile, programs_beside};
-use taustream_tests::patience::{Failed, with_patience};
+use taustream_tests::patience::{Failed, passes};
 use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
 use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
 use taustream_tests::stage::{Place, Stage};
@@ -57,46 +56,27 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let restarts = if settings.buses.len() == 1 { restart_scenarios::ALL } else { &[] };
     let restarts: Vec<_> = restarts.iter().filter(|r| r.name.contains(&arguments.only)).collect();
     ensure!(!(chosen.is_empty() && restarts.is_empty()), "no scenario is called `{}`", arguments.only);
-    let mut failed = 0;
+    let mut passed = 0;
     for scenario in &chosen {
-        let since = Instant::now();
-        let result = with_patience(scenario.name, |attempt| perform(scenario, &place, &goals, attempt));
-        let took_s = since.elapsed().as_secs_f64();
-        match result {
-            Ok(v) => println!(
-                "ok     {}: {} frames on the bus, {} SYNCs, {} setpoints equal to the log, {} of them to a trajectory; {took_s:.1} s",
-                scenario.name, v.frames, v.syncs, v.setpoints, v.on_trajectory
-            ),
-            Err(error) => {
-                failed += 1;
-                println!("FAILED {}: {error:#}; {took_s:.1} s", scenario.name);
-            }
-        }
+        passed += usize::from(passes(scenario.name, |attempt| perform(scenario, &place, &goals, attempt)));
     }
     for restart in &restarts {
-        let result = with_patience(restart.name, |attempt| {
+        passed += usize::from(passes(restart.name, |attempt| {
             restart_scenarios::perform(restart, &place, &goals, attempt)
-        });
-        match result {
-            Ok(seen) => println!("ok     {}: {seen}", restart.name),
-            Err(error) => {
-                failed += 1;
-                println!("FAILED {}: {error:#}", restart.name);
-            }
-        }
+        }));
     }
-    println!("{} passed, {failed} failed", chosen.len() + restarts.len() - failed);
+    let failed = chosen.len() + restarts.len() - passed;
+    println!("{passed} passed, {failed} failed");
     Ok(failed)
 }
 
-fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<Verdict, Failed> {
+fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let other = scenario.settings.map(|file| place.settings.with_file_name(file));
     let place = Place { settings: other.unwrap_or_else(|| place.settings.clone()), ..place.clone() };
     let mut stage = Stage::open(&place, &format!("{}-{attempt}", scenario.name))?;
     let settings = stage.settings.clone();
     if let Err(error) = (scenario.run)(&mut stage, goals) {
-        let stalled = stage.was_stalled();
-        return Err(Failed { error, stalled });
+        return Err(stage.failed(error));
     }
     let (recording, log) = stage.close()?;
     let losses = match scenario.judged {
@@ -107,7 +87,7 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     if verdict.on_trajectory == 0 {
         return Err(anyhow!("nothing was compared with a trajectory: it would pass every comparison").into());
     }
-    Ok(verdict)
+    Ok(verdict.to_string())
 }
 
 /// Judges every bus of a recording.
