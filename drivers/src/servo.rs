@@ -74,6 +74,23 @@ pub enum DriveState {
     Refused,
 }
 
+impl DriveState {
+    /// Whether a drive in this state reports its position every cycle, without interruption since it was configured or
+    /// adopted; before, the last position that was read stands still.
+    #[must_use]
+    pub fn reports(self) -> bool {
+        match self {
+            Self::Disabled
+            | Self::Adopted
+            | Self::Enabling
+            | Self::Enabled
+            | Self::Disabling
+            | Self::Fault => true,
+            Self::Absent | Self::Configuring | Self::EnergisedUnowned | Self::Refused => false,
+        }
+    }
+}
+
 /// What is known of one joint's drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoStatus {

@@ -155,7 +155,7 @@ impl Turns {
     pub fn read(&mut self, facts: &mut Facts) {
         for (turn, servo) in self.turns.iter_mut().zip(&mut facts.servos) {
             let Some(turn) = turn else { continue };
-            let present = is_present(servo.state) && servo.position_rad.is_finite();
+            let present = servo.state.reports() && servo.position_rad.is_finite();
             match (turn.present, present) {
                 (false, true) => {
                     let adopted = servo.state == DriveState::Adopted;
@@ -219,20 +219,5 @@ impl Turns {
         let offset_rad = turn.rule.stated(joint, reading_rad, at_rad)?;
         turn.resolved = Resolved { offset_rad, standing: Standing::Operator, by_rad: 0.0 };
         Ok(reading_rad + offset_rad)
-    }
-}
-
-/// Whether a drive in this state was heard without interruption since it was configured, or adopted.
-fn is_present(state: DriveState) -> bool {
-    match state {
-        DriveState::Disabled
-        | DriveState::Adopted
-        | DriveState::Enabling
-        | DriveState::Enabled
-        | DriveState::Disabling
-        | DriveState::Fault => true,
-        DriveState::Absent | DriveState::Configuring | DriveState::EnergisedUnowned | DriveState::Refused => {
-            false
-        }
     }
 }

@@ -109,7 +109,7 @@ impl Watch {
             let command = self.commands_rad.get(*transport_cycles);
             let command_rad = command.and_then(|pose| pose.get(joint)).copied().unwrap_or(f64::NAN);
             answer.past_rad[self.slot] = servo.position_rad;
-            let told = reports(servo.state) && servo.position_rad.is_finite();
+            let told = servo.state.reports() && servo.position_rad.is_finite();
             answer.told_cycles = if told { answer.told_cycles.saturating_add(1) } else { 0 };
             answer.past_at[self.slot] = facts.tick.woke;
             let Some(received) = servo.received else { continue };
@@ -259,21 +259,6 @@ fn transport_cycles(settings: &Settings) -> [usize; MAX_JOINTS] {
         }
     }
     cycles
-}
-
-/// Whether a drive in this state reports its position every cycle; before, the last one that was read stands still.
-fn reports(state: DriveState) -> bool {
-    match state {
-        DriveState::Disabled
-        | DriveState::Adopted
-        | DriveState::Enabling
-        | DriveState::Enabled
-        | DriveState::Disabling
-        | DriveState::Fault => true,
-        DriveState::Absent | DriveState::Configuring | DriveState::EnergisedUnowned | DriveState::Refused => {
-            false
-        }
-    }
 }
 
 /// A drive that is not where it should be, or that warns.

@@ -5,6 +5,7 @@ mod demo;
 mod install;
 mod manual;
 mod packages;
+mod place;
 mod test;
 mod workspace;
 
