@@ -168,10 +168,7 @@ fn interrupt_thread(s: &Subject, interface: &str) -> Option<Finding> {
     const NAME: &str = "CAN interrupt";
     let is_its = |name: &str| name.starts_with(IRQ_THREAD) && name.ends_with(&format!("-{interface}"));
     let (pid, name) = s.processes().find(|(_, name)| is_its(name))?;
-    let stat = s.tree.text(&format!("proc/{pid}/stat"))?;
-    // After the name in brackets, which may hold blanks, rt_priority is field 40 of the manual's count from 1.
-    let (_, fields) = stat.rsplit_once(')')?;
-    let priority: i64 = fields.split_whitespace().nth(40 - 3)?.parse().ok()?;
+    let priority = s.realtime_priority(pid)?;
     let (name, wanted) = (shown(&name), i64::from(s.priority) + 10);
     Some(if priority > IRQ_PRIORITY_DEFAULT {
         Finding::ok(NAME, format!("thread {name} has priority {priority}"))

@@ -5,7 +5,7 @@ use super::tree::shown;
 use taustream_arm::BusKind;
 
 pub(crate) fn examine(s: &Subject) -> Vec<Finding> {
-    vec![preemption(s), can(s), throttling(s), group_scheduling(s), clock_source(s)]
+    vec![preemption(s), can(s), software_interrupts(s), throttling(s), group_scheduling(s), clock_source(s)]
 }
 
 fn preemption(s: &Subject) -> Finding {
@@ -51,6 +51,30 @@ fn can(s: &Subject) -> Finding {
         return Finding::warning(NAME, what, cure);
     }
     Finding::problem(NAME, what, cure)
+}
+
+/// CAN frames go through software interrupts, which the kernel hands to a thread of its own when there are many; as an
+/// ordinary process that waits behind every other one.
+fn software_interrupts(s: &Subject) -> Finding {
+    const NAME: &str = "software interrupts";
+    let is_meant = |name: &str| {
+        let cpu = name.strip_prefix("ksoftirqd/").and_then(|cpu| cpu.parse().ok());
+        cpu.is_some_and(|cpu: usize| s.cpu().is_none_or(|own| own == cpu))
+    };
+    let threads: Vec<(u32, String)> = s.processes().filter(|(_, name)| is_meant(name)).collect();
+    let ordinary = threads.iter().find(|(pid, _)| s.realtime_priority(*pid) == Some(0));
+    match (threads.first(), ordinary) {
+        (None, _) => Finding::unknown(NAME, "no thread of the kernel for them can be seen"),
+        (Some((_, name)), None) => Finding::ok(NAME, format!("thread {} has real-time priority", shown(name))),
+        (_, Some((pid, name))) => Finding::warning(
+            NAME,
+            format!(
+                "thread {} is an ordinary process: under load CAN frames wait in it behind other programs",
+                shown(name)
+            ),
+            format!("chrt --fifo --pid {} {pid}, at every boot", (i64::from(s.priority) + 10).min(98)),
+        ),
+    }
 }
 
 fn throttling(s: &Subject) -> Finding {

@@ -42,6 +42,14 @@ impl Subject {
         }
     }
 
+    /// `SCHED_FIFO` or `SCHED_RR` priority of a process; 0 for an ordinary one.
+    pub(crate) fn realtime_priority(&self, pid: u32) -> Option<i64> {
+        let stat = self.tree.text(&format!("proc/{pid}/stat"))?;
+        // After the name in brackets, which may hold blanks, rt_priority is field 40 of the manual's count from 1.
+        let (_, fields) = stat.rsplit_once(')')?;
+        fields.split_whitespace().nth(40 - 3)?.parse().ok()
+    }
+
     /// Number and name of every process. The kernel cuts names after 15 bytes.
     pub(crate) fn processes(&self) -> impl Iterator<Item = (u32, String)> {
         let pids = self.tree.names("proc").into_iter().filter_map(|name| name.parse::<u32>().ok());

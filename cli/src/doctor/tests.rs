@@ -46,6 +46,16 @@ const HEALTHY: &[(&str, &str)] = &[
         "proc/77/stat",
         "77 (irq/30-can0) S 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 90 1 0",
     ),
+    ("proc/16/comm", "ksoftirqd/0\n"),
+    (
+        "proc/16/stat",
+        "16 (ksoftirqd/0) S 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1 0",
+    ),
+    ("proc/31/comm", "ksoftirqd/3\n"),
+    (
+        "proc/31/stat",
+        "31 (ksoftirqd/3) S 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 90 1 0",
+    ),
     ("proc/swaps", "Filename Type Size Used Priority\n"),
     ("proc/cpuinfo", "flags : fpu tsc\n"),
     ("sys/class/thermal/thermal_zone0/temp", "41000\n"),
@@ -250,6 +260,13 @@ const ROWS: &[Row] = &[
         "CAN interrupt",
         Grade::Warning,
         &["priority 50", "chrt --fifo --pid 90 77"],
+    ),
+    (
+        "proc/31/stat",
+        "31 (ksoftirqd/3) S 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1 0",
+        "software interrupts",
+        Grade::Warning,
+        &["ksoftirqd/3", "ordinary", "chrt --fifo --pid 90 31"],
     ),
     (
         "proc/swaps",
