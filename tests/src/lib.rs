@@ -12,6 +12,7 @@
 pub mod booted;
 pub mod bus_scenarios;
 pub mod candump;
+mod carried;
 pub mod cycle_log;
 pub mod damiao_scenarios;
 pub mod debian;

@@ -4,15 +4,12 @@
 //! each cycle: the frames between two SYNCs are exactly one RPDO per servo, their targets equal the encoding
 //! of the logged setpoint count by count, and the logged setpoint equals the accepted trajectory at the logged
 //! trajectory time: bit for bit by the product's sampler, and to 1e-11 rad by a second formula written here.
+use crate::carried::Carried;
 use crate::cycle_log::{Cycle, Event};
 use std::collections::BTreeMap;
 use std::fmt;
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
-/// CANopen SYNC.
-const SYNC: u32 = 0x080;
-/// RPDO1 of node 0.
-const RPDO1: u32 = 0x200;
 /// TPDO1 of node 0.
 const TPDO1: u32 = 0x180;
 /// Agreement of the second formula with the product's sampler.
@@ -164,12 +161,26 @@ pub fn judge_with(
     bus: usize,
     encodings: &[Encoding],
 ) -> Result<Verdict, Flaw> {
-    let on_bus = split_at_syncs(frames, encodings);
+    let judge = |fates: &Fates| judge_assuming(fates, losses, (frames, log), bus, encodings);
+    let whole = judge(&Fates::new());
+    let doubtful = if losses == Losses::AsLogged { before_silences(log, bus) } else { Vec::new() };
+    let other = whole.is_err().then(|| fates_of(&doubtful).iter().find_map(|fates| judge(fates).ok()));
+    other.flatten().map_or(whole, Ok)
+}
+
+/// Judges with cycles that did not fare as the log says.
+fn judge_assuming(
+    fates: &Fates,
+    losses: Losses,
+    (frames, log): (&[BusFrame], &[Event]),
+    bus: usize,
+    encodings: &[Encoding],
+) -> Result<Verdict, Flaw> {
+    let mut carried = Carried::new(frames, bus, encodings);
     let mut verdict =
-        Verdict { frames: frames.len(), syncs: on_bus.len(), ..last_measured(frames, encodings) };
+        Verdict { frames: frames.len(), syncs: carried.syncs(), ..last_measured(frames, encodings) };
     let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
     let mut last: Option<&Cycle> = None;
-    let mut claimed = vec![false; on_bus.len()];
     for event in log {
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
@@ -191,45 +202,61 @@ pub fn judge_with(
                     continue; // Nothing of it left: the next cycle takes its place.
                 }
                 follows(last, cycle, bus)?;
-                if whole {
-                    verdict.setpoints += compare_bus(&on_bus, cycle, bus, encodings, &mut claimed)?;
-                } else {
-                    verdict.setpoints += compare_rest(&on_bus, cycle, bus, encodings, &mut claimed)?;
-                }
+                verdict.setpoints += match fates.get(&cycle.tick) {
+                    None if whole => carried.compare_whole(cycle)?,
+                    None | Some(Fate::InPart) => carried.compare_rest(cycle)?,
+                    Some(Fate::Gone) => carried.pass_over(),
+                };
                 last = Some(cycle);
             }
         }
     }
-    if let Some(at) = on_bus.iter().zip(&claimed).position(|(cycle, claimed)| !claimed && is_live(cycle)) {
-        return Err(Flaw::Log(format!("SYNC {} carried setpoints that the log does not know", at + 1)));
-    }
+    carried.nothing_else()?;
     verdict.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
     Ok(verdict)
 }
 
-/// For each SYNC on the bus, the RPDO1 frames that came before the next one: (node id, data).
-fn split_at_syncs(frames: &[BusFrame], encodings: &[Encoding]) -> Vec<Vec<(u8, Vec<u8>)>> {
-    let mut cycles: Vec<Vec<(u8, Vec<u8>)>> = Vec::new();
-    for frame in frames {
-        if frame.id == SYNC {
-            cycles.push(Vec::new());
-            continue;
-        }
-        let node = encodings.iter().find(|e| RPDO1 + u32::from(e.node_id) == frame.id);
-        if let (Some(encoding), Some(cycle)) = (node, cycles.last_mut()) {
-            cycle.push((encoding.node_id, frame.data.clone()));
+/// How a cycle fared that the kernel had taken when its interface went: frames on the way go with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fate {
+    /// Only a part of it came through, its SYNC first.
+    InPart,
+    /// Nothing of it came through.
+    Gone,
+}
+
+/// By cycle number; who is not in it fared as the log says.
+type Fates = BTreeMap<u64, Fate>;
+
+/// Cycles in a row without a frame that make a silence.
+const SILENCE_CYCLES: usize = 20;
+/// More silences are not excused in one recording.
+const SILENCES_MAX: usize = 3;
+
+/// The last cycles that a bus took before it fell silent.
+fn before_silences(log: &[Event], bus: usize) -> Vec<u64> {
+    let cycle = |event: &Event| match event {
+        Event::Cycle(cycle) => Some((cycle.tick, is_lost(cycle, bus))),
+        Event::Start { .. } | Event::Phase { .. } | Event::Lost { .. } | Event::Trajectory { .. } => None,
+    };
+    let cycles: Vec<(u64, bool)> = log.iter().filter_map(cycle).collect();
+    let silent = |rest: &&[(u64, bool)]| rest.iter().skip(1).all(|(_, lost)| *lost) && !rest[0].1;
+    cycles.windows(SILENCE_CYCLES + 1).filter(silent).map(|rest| rest[0].0).take(SILENCES_MAX).collect()
+}
+
+/// Every way in which these cycles may have fared.
+fn fates_of(ticks: &[u64]) -> Vec<Fates> {
+    let mut all = vec![Fates::new()];
+    for tick in ticks {
+        let before = all.clone();
+        for fate in [Fate::InPart, Fate::Gone] {
+            all.extend(before.iter().cloned().map(|mut fates| {
+                fates.insert(*tick, fate);
+                fates
+            }));
         }
     }
-    cycles
-}
-
-/// True when any drive is told to follow: bit 3 of the controlword (CiA 402, "enable operation").
-fn is_live(cycle: &[(u8, Vec<u8>)]) -> bool {
-    cycle.iter().any(|(_, data)| follows_target(data))
-}
-
-fn follows_target(data: &[u8]) -> bool {
-    data.first().is_some_and(|low| low & 0x08 != 0)
+    all
 }
 
 /// Phases in which single drives may be off, or on their way on or off.
@@ -248,7 +275,7 @@ fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> Verdict {
 }
 
 /// The i32 behind the control or status word of a PDO of 6 bytes.
-fn target(data: &[u8]) -> Option<i32> {
+pub(crate) fn target(data: &[u8]) -> Option<i32> {
     let bytes: [u8; 4] = data.get(2..6)?.try_into().ok()?;
     (data.len() == 6).then(|| i32::from_le_bytes(bytes))
 }
@@ -276,91 +303,6 @@ fn is_whole(cycle: &Cycle, bus: usize) -> bool {
 /// No frame of the cycle was taken.
 fn is_lost(cycle: &Cycle, bus: usize) -> bool {
     cycle.sent.get(bus).is_none_or(|sent| *sent == 0)
-}
-
-fn flaw(cycle: &Cycle, bus: usize, what: String) -> Flaw {
-    Flaw::Bus { sync: cycle.sync.get(bus).copied().unwrap_or(0), tick: cycle.tick, what }
-}
-
-/// The setpoints that followed a cycle's SYNC, by node; from now on they count as claimed.
-fn claim<'a>(
-    on_bus: &'a [Vec<(u8, Vec<u8>)>],
-    cycle: &Cycle,
-    bus: usize,
-    claimed: &mut [bool],
-) -> Result<&'a [(u8, Vec<u8>)], Flaw> {
-    let sync = cycle.sync.get(bus).copied().unwrap_or(0);
-    let at = usize::try_from(sync).ok().and_then(|n| n.checked_sub(1));
-    let sent = at.and_then(|at| on_bus.get(at));
-    let sent = sent.ok_or_else(|| flaw(cycle, bus, "is not on the bus".into()))?;
-    if let Some(slot) = at.and_then(|at| claimed.get_mut(at)) {
-        *slot = true;
-    }
-    Ok(sent)
-}
-
-/// Compares what is left of a cycle that was lost in part: its SYNC, if that left, and the setpoints behind it.
-fn compare_rest(
-    on_bus: &[Vec<(u8, Vec<u8>)>],
-    cycle: &Cycle,
-    bus: usize,
-    encodings: &[Encoding],
-    claimed: &mut [bool],
-) -> Result<usize, Flaw> {
-    let flaw = |what: String| flaw(cycle, bus, what);
-    let sent = claim(on_bus, cycle, bus, claimed)?;
-    for (node, data) in sent.iter().filter(|(_, data)| follows_target(data)) {
-        let encoding = encodings.iter().find(|e| e.node_id == *node);
-        let wish = encoding.and_then(|e| Some(e.counts(*cycle.position_rad.get(e.joint)?)));
-        if target(data) != wish {
-            return Err(flaw(format!(
-                "node {node} got target {:?}, the setpoint encodes to {wish:?}",
-                target(data)
-            )));
-        }
-    }
-    Ok(sent.len())
-}
-
-fn compare_bus(
-    on_bus: &[Vec<(u8, Vec<u8>)>],
-    cycle: &Cycle,
-    bus: usize,
-    encodings: &[Encoding],
-    claimed: &mut [bool],
-) -> Result<usize, Flaw> {
-    let flaw = |what: String| flaw(cycle, bus, what);
-    let sent = claim(on_bus, cycle, bus, claimed)?;
-    // Only in a fault may a drive that dropped out go without a setpoint.
-    let may_miss = cycle.phase == "fault" && sent.len() < encodings.len();
-    if sent.len() != encodings.len() && !may_miss {
-        return Err(flaw(format!("{} setpoint frames for {} servos", sent.len(), encodings.len())));
-    }
-    for encoding in encodings {
-        let node = encoding.node_id;
-        if may_miss && sent.iter().all(|(n, _)| *n != node) {
-            continue;
-        }
-        let mut of_node = sent.iter().filter(|(n, _)| *n == node);
-        let (Some((_, data)), None) = (of_node.next(), of_node.next()) else {
-            return Err(flaw(format!("node {node} has not exactly one setpoint frame")));
-        };
-        // A drive that is not told to follow gets its own position as target; that is right only outside of motion.
-        if !follows_target(data) && may_be_off(&cycle.phase) {
-            continue;
-        }
-        if !follows_target(data) {
-            return Err(flaw(format!("node {node} is not told to follow while {}", cycle.phase)));
-        }
-        let got = target(data).ok_or_else(|| flaw(format!("node {node} got {} bytes", data.len())))?;
-        let wish = cycle.position_rad.get(encoding.joint).copied();
-        let wish = wish.ok_or_else(|| flaw(format!("no setpoint of joint {}", encoding.joint + 1)))?;
-        let want = encoding.counts(wish);
-        if got != want {
-            return Err(flaw(format!("node {node} got target {got}, {wish} rad encodes to {want}")));
-        }
-    }
-    Ok(sent.len())
 }
 
 /// Phases in which the arm is on its trajectory.

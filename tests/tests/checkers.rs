@@ -319,6 +319,27 @@ fn recording_with_losses_that_carries_what_the_log_does_not_claim_fails() {
     lossy(&frames, &log);
 }
 
+/// Goal: frames that the kernel took and that went with their interface are excused for the last cycle before a silence,
+/// and for no other; what came through of it must still be right.
+#[test]
+fn last_cycle_before_a_silence_may_go_with_its_interface_and_no_other() {
+    let (frames, log) = lossy_recording();
+    let judged = |frames: &[BusFrame]| judge_with(Losses::AsLogged, (frames, &log), 0, &encodings());
+    let without = |from: usize, to: usize| {
+        let (first, last) = (sync_place(&frames, from), sync_place(&frames, to));
+        [&frames[..first], &frames[last..]].concat()
+    };
+    assert_eq!(judged(&without(299, 300)).unwrap().setpoints, 297 * JOINTS + 2, "the last one is gone");
+    judged(&without(150, 151)).expect_err("one in mid-motion is gone");
+    judged(&without(298, 300)).expect_err("two are gone");
+
+    let mut part = frames.clone();
+    part.truncate(place(&frames, 299, 4));
+    assert_eq!(judged(&part).unwrap().setpoints, 297 * JOINTS + 2 + 3, "a part came through");
+    part[place(&frames, 299, 2)].data[2] ^= 4;
+    assert!(judged(&part).unwrap_err().to_string().contains("node 2 got target"));
+}
+
 #[test]
 fn log_line_that_is_not_understood_is_an_error() {
     assert!(parse("{\"event\":\"surprise\"}").is_err());

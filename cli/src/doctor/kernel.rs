@@ -65,7 +65,9 @@ fn software_interrupts(s: &Subject) -> Finding {
     let ordinary = threads.iter().find(|(pid, _)| s.realtime_priority(*pid) == Some(0));
     match (threads.first(), ordinary) {
         (None, _) => Finding::unknown(NAME, "no thread of the kernel for them can be seen"),
-        (Some((_, name)), None) => Finding::ok(NAME, format!("thread {} has real-time priority", shown(name))),
+        (Some((_, name)), None) => {
+            Finding::ok(NAME, format!("thread {} has real-time priority", shown(name)))
+        }
         (_, Some((pid, name))) => Finding::warning(
             NAME,
             format!(
