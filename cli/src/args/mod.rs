@@ -8,8 +8,8 @@ pub(crate) use live::{
     CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
 };
 pub(crate) use offline::{
-    BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, DoctorArgs, ManArgs, MotionArgs, PlanArgs,
-    PlotArgs, SampleArgs,
+    BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
+    PlanArgs, PlotArgs, SampleArgs,
 };
 
 pub(crate) use papers::PapersArgs;

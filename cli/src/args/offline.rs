@@ -243,10 +243,29 @@ pub(crate) enum BenchName {
     ///
     /// As with `cycle`, no servos are needed, and real ones on the bus would get setpoints.
     Compare(CompareArgs),
+    /// The paper's cost function in vector lanes beside plain f64, in turns in one run, and whole runs of its IBFOA.
+    Cost(CostBenchArgs),
     /// Judge the claims of the five seed papers: their tables beside ours, claim by claim.
     Papers(super::PapersArgs),
     /// Compare the planners by name: what they find, how fast, and how good the motions are.
     Planners(super::PlannersArgs),
+}
+
+/// What `taustream bench cost` takes.
+#[derive(Args, Debug)]
+pub(crate) struct CostBenchArgs {
+    /// Robot: a path, or the name of a shipped robot.
+    #[arg(long, value_name = "FILE", default_value = "ur5")]
+    pub(crate) robot: PathBuf,
+    /// How long to measure single evaluations, s.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0, value_parser = measuring_s)]
+    pub(crate) seconds: f64,
+    /// Whole runs of the paper's case 1, each of a random case of its own.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 9, value_parser = runs())]
+    pub(crate) case_1_runs: usize,
+    /// Whole runs of case 2, some seconds each.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1, value_parser = runs())]
+    pub(crate) case_2_runs: usize,
 }
 
 /// What `taustream bench compare` takes.
@@ -287,6 +306,11 @@ fn method() -> impl TypedValueParser<Value = &'static Method> {
 fn reading() -> impl TypedValueParser<Value = Reading> {
     PossibleValuesParser::new(Reading::ALL.map(|r| PossibleValue::new(r.name()).help(r.about())))
         .map(|name| Reading::from_name(&name).unwrap_or_default())
+}
+
+/// How often something is run.
+fn runs() -> impl TypedValueParser<Value = usize> {
+    clap::value_parser!(u16).range(0..=1000).map(usize::from)
 }
 
 /// A time to measure: nothing, or at least what gives a few samples.

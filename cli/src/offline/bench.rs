@@ -20,6 +20,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
             (seconds, slices, link, allow_non_realtime)
         }
         BenchName::Compare(args) => return super::compare::run(form, args),
+        BenchName::Cost(args) => return super::cost_bench::run(form, args),
         BenchName::Papers(args) => return super::papers::run(form, args),
         BenchName::Planners(args) => return super::planners::run(form, args),
     };

@@ -5,6 +5,7 @@ pub(crate) mod check;
 mod checked_robot;
 mod compare;
 pub(crate) mod cost;
+mod cost_bench;
 mod papers;
 pub(crate) mod plan;
 mod planners;
