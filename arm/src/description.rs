@@ -2,6 +2,7 @@
 //!
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
 use crate::document::{Node, Value, shown};
+use crate::mass::{self, Weight};
 use crate::reader::{Book, Bounds, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row};
@@ -33,6 +34,10 @@ pub(crate) struct Description {
     pub(crate) geometry: Geometry,
     /// Link pairs, lower index first, sorted, each once.
     pub(crate) allowed_contacts: Vec<(usize, usize)>,
+    /// What the tip carries, in its frame.
+    pub(crate) payload: Option<Weight>,
+    /// Gravity in the base's frame.
+    pub(crate) gravity_m_s2: [f64; 3],
     /// What the owner should know about the joints' limits, in words.
     pub(crate) notices: Vec<String>,
 }
@@ -56,9 +61,13 @@ impl Description {
         let from_urdf = top.has("urdf");
         let read = if from_urdf { read_urdf(&mut top, &mut notices) } else { read_rows(&mut top) };
         let allowed_contacts = read_contacts(&mut top, read.links.as_deref());
+        let payload = read_payload(&mut top);
+        let gravity_m_s2 = Weight::read_gravity(&mut top);
         top.done();
         let (joints, geometry) = read.whole?;
-        book.is_clean().then_some(Self { name: name?, joints, geometry, allowed_contacts, notices })
+        let (name, payload, gravity_m_s2) = (name?, payload?, gravity_m_s2?);
+        let described = Self { name, joints, geometry, allowed_contacts, payload, gravity_m_s2, notices };
+        book.is_clean().then_some(described)
     }
 }
 
@@ -98,6 +107,7 @@ fn read_rows(top: &mut Table<'_>) -> Read {
     let rows: Vec<_> =
         read.iter().map(|j| j.as_ref().map(|(joint, row)| (joint.name.as_str(), row))).collect();
     rows::check_kinds(top.book(), &rows);
+    rows::check_weights(top.book(), &rows);
     let (joints, rows): (Vec<Joint>, Vec<Row>) = read.into_iter().flatten().unzip();
     // The names of the links follow from the number of tables, faulty ones included.
     let links = (0..=count).map(link_name).collect();
@@ -285,6 +295,21 @@ fn read_stop(mut table: Table<'_>, motion: Option<&LimitSet>) -> Option<LimitSet
         acceleration_rad_s2: acceleration_rad_s2?,
         jerk_rad_s3: jerk_rad_s3?,
     })
+}
+
+/// What the tip carries, if anything; the outer `None` is a fault.
+fn read_payload(top: &mut Table<'_>) -> Option<Option<Weight>> {
+    if !top.has("payload") {
+        top.take("payload");
+        return Some(None);
+    }
+    let mut table = top.table("payload", "a table of mass_kg, center_m and inertia_kg_m2")?;
+    if !table.has("mass_kg") {
+        table.number("mass_kg", &mass::MASS_KG);
+    }
+    let payload = Weight::read(&mut table, mass::PAYLOAD);
+    table.done();
+    payload
 }
 
 /// Pairs of link names as pairs of indices; the names are not known after a fault in the geometry.

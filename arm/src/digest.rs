@@ -31,10 +31,14 @@
 //! | u32 | number of joints that are held; per joint: u32 joint; f64 position |
 //! | u32 | number of solid parts; per part: u32 link; origin; u8 kind; the mesh file's SHA-256 (32) for a mesh; numbers: sphere (0) radius, box (1) 3 sizes, cylinder (2) and capsule (3) radius and length, mesh (4) 3 scales |
 //! | u32 | number of pairs that the SRDF lets touch; per pair 2 x u32, as above |
+//! | then, only when rows have masses or there is a payload: | |
+//! | u8 | 1 when rows have masses, otherwise 0; with 1, per joint f64 mass and 3 x f64 centre of its link |
+//! | u8 | 1 when there is a payload, otherwise 0; with 1, f64 mass and 3 x f64 centre |
 //!
 //! A string is its length in bytes as u32, then its UTF-8 bytes. An origin is x, y, z, roll, pitch, yaw as 6 x f64. An f64 is its
 //! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
 use crate::description::{Description, Geometry, Joint};
+use crate::mass::Weight;
 use crate::rows::{Row, RowKind};
 use sha2::{Digest, Sha256};
 
@@ -52,7 +56,9 @@ pub(crate) fn of_bytes(bytes: &[u8]) -> [u8; 32] {
 
 fn bytes(description: &Description) -> Vec<u8> {
     // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
-    let Description { name, joints, geometry, allowed_contacts, notices: _ } = description;
+    // Gravity and moments of inertia weigh proven motions against each other, and change none.
+    let Description { name, joints, geometry, allowed_contacts, payload, gravity_m_s2: _, notices: _ } =
+        description;
     let mut out = HEADER.to_vec();
     put_text(&mut out, name);
     put_count(&mut out, joints.len());
@@ -74,7 +80,31 @@ fn bytes(description: &Description) -> Vec<u8> {
             arm.put(&mut out);
         }
     }
+    put_weights(&mut out, geometry, payload.as_ref());
     out
+}
+
+/// What links and payload weigh; nothing at all when nothing is stated, so that a description that states none keeps
+/// the digest which it had before there were such keys.
+fn put_weights(out: &mut Vec<u8>, geometry: &Geometry, payload: Option<&Weight>) {
+    let weights: Vec<&Weight> = match geometry {
+        Geometry::Rows(rows) => rows.iter().filter_map(|row| row.weight.as_ref()).collect(),
+        // A URDF's masses stand with its links.
+        Geometry::Urdf(_) => Vec::new(),
+    };
+    if weights.is_empty() && payload.is_none() {
+        return;
+    }
+    out.push(u8::from(!weights.is_empty()));
+    weights.iter().for_each(|weight| put_weight(out, weight));
+    out.push(u8::from(payload.is_some()));
+    payload.iter().for_each(|weight| put_weight(out, weight));
+}
+
+fn put_weight(out: &mut Vec<u8>, weight: &Weight) {
+    let Weight { mass_kg, center_m, inertia_kg_m2: _ } = weight;
+    put_number(out, *mass_kg);
+    center_m.iter().for_each(|number| put_number(out, *number));
 }
 
 fn put_joint(out: &mut Vec<u8>, Joint { name, limits }: &Joint) {
@@ -88,7 +118,8 @@ fn put_joint(out: &mut Vec<u8>, Joint { name, limits }: &Joint) {
 }
 
 fn put_row(out: &mut Vec<u8>, row: &Row) {
-    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m } = row;
+    // Weights come after all rows.
+    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, weight: _ } = row;
     out.push(match kind {
         RowKind::Standard => 0,
         RowKind::Modified => 1,
@@ -162,6 +193,27 @@ mod tests {
             assert!(!seen.contains(&edited), "{from:?} -> {to:?} leaves the digest as it was");
             seen.push(edited);
         }
+        let massive = TEXT
+            .replace("link_radius_m", "link_mass_kg = 2.0\nlink_center_m = [0.1, 0.0, 0.0]\nlink_radius_m");
+        let payload = |mass: &str| {
+            TEXT.replacen(
+                "[[joint]]",
+                &format!("[payload]\nmass_kg = {mass}\ncenter_m = [0, 0, 0]\n[[joint]]"),
+                1,
+            )
+        };
+        let heavier = [
+            massive.clone(),
+            massive.replacen("= 2.0", "= 2.5", 1),
+            massive.replacen("[0.1, ", "[0.2, ", 1),
+            payload("1.0"),
+            payload("0.0"),
+        ];
+        for text in heavier {
+            let edited = digest(&text);
+            assert!(!seen.contains(&edited), "{text}");
+            seen.push(edited);
+        }
         let modified = digest(&TEXT.replace("dh = ", "mdh = "));
         let (head, tail) = TEXT.split_at(TEXT.rfind("[[joint]]").unwrap());
         let swapped = TEXT.replace("name = \"a\"", "name = \"x\"").replace("name = \"b\"", "name = \"a\"");
@@ -191,6 +243,19 @@ mod tests {
             assert!(text.contains(from), "{from:?} stands nowhere");
             text = text.replacen(from, to, 1);
             assert_eq!(digest(&text), digest(TEXT), "{from:?} -> {to:?}");
+        }
+    }
+
+    /// Goal: what only weighs proven motions against each other makes no trajectory file useless.
+    #[test]
+    fn digest_keeps_through_gravity_and_moments_of_inertia() {
+        let massive =
+            TEXT.replace("link_radius_m", "link_mass_kg = 2.0\nlink_center_m = [0.1, 0, 0]\nlink_radius_m");
+        let spread =
+            massive.replace("link_radius_m", "link_inertia_kg_m2 = [1, 1, 1, 0, 0, 0]\nlink_radius_m");
+        let on_a_wall = spread.replacen("name", "gravity_m_s2 = [9.81, 0, 0]\nname", 1);
+        for text in [spread, on_a_wall] {
+            assert_eq!(digest(&text), digest(&massive), "{text}");
         }
     }
 

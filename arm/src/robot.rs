@@ -1,5 +1,6 @@
 //! A robot: its chain, limits and collision shapes.
 use crate::description::{Description, Geometry};
+use crate::mass::LinkMass;
 use crate::reader::Book;
 use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
@@ -32,19 +33,6 @@ pub struct LinkShape {
     pub shape: Shape,
 }
 
-/// The mass of one link; kept for what needs it later, nothing here does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinkMass {
-    /// Index of the link in [`Robot::links`].
-    pub link: usize,
-    /// Index into [`Chain::frames`].
-    pub frame: usize,
-    /// The mass.
-    pub mass_kg: f64,
-    /// Its centre in that frame.
-    pub center_m: Point3<f64>,
-}
-
 /// A checked robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
@@ -60,8 +48,10 @@ pub struct Robot {
     pub links: Vec<String>,
     /// Collision shapes. Where they stand in a pose: `chain.frames(pose)[shape.frame] * shape.pose`.
     pub shapes: Vec<LinkShape>,
-    /// Masses of the links that state one.
+    /// Masses of the links that state one, and of the payload.
     pub masses: Vec<LinkMass>,
+    /// Where gravity points, in the base's frame.
+    pub gravity_m_s2: Vector3<f64>,
     /// Names of the links without a shape: nothing keeps them from being hit.
     pub bare_links: Vec<String>,
     /// The URDF's link whose frame is the base, and the one whose frame is the tip; none for rows.
@@ -119,6 +109,8 @@ impl Robot {
             let link = parts.shapes.get(shape).and_then(|shape| parts.links.get(shape.link));
             book.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
         });
+        let tip = (chain.joints(), Pose::identity());
+        let payload = description.payload.map(|weight| LinkMass::placed(&weight, parts.tip_link, tip));
         let joints = description.joints.iter();
         Some(Self {
             name: description.name.clone(),
@@ -126,7 +118,8 @@ impl Robot {
             joints: joints.map(|j| RobotJoint { name: j.name.clone(), limits: j.limits }).collect(),
             links: parts.links,
             shapes: parts.shapes,
-            masses: parts.masses,
+            masses: parts.masses.into_iter().chain(payload).collect(),
+            gravity_m_s2: Vector3::from(description.gravity_m_s2),
             bare_links: parts.bare_links,
             ends: parts.ends,
             notices: [parts.notices, description.notices.clone()].concat(),
@@ -176,6 +169,8 @@ struct Parts {
     links: Vec<String>,
     shapes: Vec<LinkShape>,
     masses: Vec<LinkMass>,
+    /// The link that carries the payload.
+    tip_link: usize,
     bare_links: Vec<String>,
     ends: Option<[String; 2]>,
     neighbours: Vec<(usize, usize)>,
@@ -192,6 +187,7 @@ impl Parts {
                 links: arm.links(),
                 shapes: arm.shapes(),
                 masses: arm.masses(),
+                tip_link: arm.tip,
                 bare_links: arm.bare_links(),
                 ends: arm.ends(),
                 neighbours: arm.neighbours(),
@@ -210,13 +206,19 @@ impl Parts {
             bare_links: (0..links.len()).filter(is_bare).map(link_name).collect(),
             links,
             shapes,
-            masses: Vec::new(),
+            masses: rows.iter().enumerate().filter_map(|(i, row)| link_mass(i + 1, row)).collect(),
+            tip_link: rows.len(),
             ends: None,
             neighbours: (0..rows.len()).map(|link| (link, link + 1)).collect(),
             allowed: Vec::new(),
             notices: Vec::new(),
         }
     }
+}
+
+/// The mass of the link behind a joint; its frame moves with the joint in both conventions.
+fn link_mass(joint: usize, row: &Row) -> Option<LinkMass> {
+    row.weight.map(|weight| LinkMass::placed(&weight, joint, (joint, Pose::identity())))
 }
 
 fn chain_joint(row: &Row) -> ChainJoint {

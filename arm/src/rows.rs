@@ -1,4 +1,5 @@
 //! Denavit-Hartenberg rows: geometry as a robot file states it itself.
+use crate::mass::{self, Weight};
 use crate::reader::{Book, Bounds, Table};
 use std::f64::consts::TAU;
 
@@ -20,6 +21,8 @@ pub(crate) struct Row {
     pub(crate) d_m: f64,
     pub(crate) theta_offset_rad: f64,
     pub(crate) link_radius_m: f64,
+    /// Of the link behind the joint.
+    pub(crate) weight: Option<Weight>,
 }
 
 /// Arms of this project reach a few metres; more is a slip of the unit (millimetres).
@@ -31,8 +34,10 @@ const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
 pub(crate) fn read(table: &mut Table<'_>) -> Option<Row> {
     let row = read_row(table);
     let link_radius_m = table.number("link_radius_m", &RADIUS_M);
+    let weight = Weight::read(table, mass::LINK);
     let (kind, [a_m, alpha_rad, d_m, theta_offset_rad]) = row?;
-    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m: link_radius_m? })
+    let (link_radius_m, weight) = (link_radius_m?, weight?);
+    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, weight })
 }
 
 /// The row of exactly one of the two conventions.
@@ -61,6 +66,18 @@ fn read_row(table: &mut Table<'_>) -> Option<(RowKind, [f64; 4])> {
     let theta_offset_rad = row.number("theta_offset_rad", &ANGLE_RAD);
     row.done();
     Some((kind, [a_m?, alpha_rad?, d_m?, theta_offset_rad?]))
+}
+
+/// An arm whose links weigh something in part only would make every energy wrong, and silently so.
+pub(crate) fn check_weights(book: &Book, rows: &[Option<(&str, &Row)>]) {
+    let weighs = |row: &Option<(&str, &Row)>| row.is_some_and(|(_, row)| row.weight.is_some());
+    if !rows.iter().any(weighs) {
+        return;
+    }
+    for (i, _) in rows.iter().enumerate().filter(|(_, row)| row.is_some() && !weighs(row)) {
+        let expected = "a mass for each link, or for none (0 kg is one)";
+        book.add(None, &format!("joint[{i}].link_mass_kg"), "missing", expected);
+    }
 }
 
 /// One arm has one convention: a mixed table is a copying mistake, and a silent one. `rows` are joints' names with their rows.

@@ -8,9 +8,11 @@
 pub mod arguments;
 pub mod collide;
 pub mod cost;
+pub mod dynamics;
 pub mod foraging;
 pub mod kind;
 pub mod leave;
+pub mod objective;
 pub mod optimize;
 pub mod papers;
 pub mod pipeline;
@@ -31,6 +33,7 @@ pub use taustream_arm::draw;
 
 pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
 pub use kind::{Improvement, PlannerKind};
+pub use objective::Objective;
 pub use plan::{Plan, PlanError, PlanOptions, PoseOf, StartMargin, plan};
 pub use position::{PositionError, PositionTask, Reached, plan_to_position};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -1,14 +1,15 @@
 //! The stages of planning, one after the other, each on a budget of evaluations.
 //!
 //! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> improvement -> timing with rounded corners
-//! -> proof. From the first proven motion on there is an answer; later stages can only replace it by a shorter one.
+//! -> proof. From the first proven motion on there is an answer; later stages can only replace it by a better one.
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::draw::Draw;
 use crate::kind::{Improvement, PlannerKind};
 use crate::leave::Leaving;
-use crate::optimize::{Method, Optimizer, Setup};
+use crate::objective::{Judge, Objective};
+use crate::optimize::{METHODS, Method, Optimizer, Setup};
 use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions};
-use crate::refine::{self, refine};
+use crate::refine::{self, PathProblem, refine};
 use crate::search::Searcher;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
@@ -72,17 +73,32 @@ fn searched(searcher: Searcher) -> String {
     format!("{} with shortcuts", searcher.title())
 }
 
+/// What a refinement of the straight line starts from, for users.
+const LINE: &str = "the straight line";
+/// The method that looks for less cost or energy when the options name none.
+const BY_OBJECTIVE: &str = "ibfoa";
+
+/// The best verified motion so far.
+struct Best {
+    trajectory: Trajectory,
+    proof: Proof,
+    how: String,
+    /// By the objective; less is better.
+    score: f64,
+}
+
 /// One planning run.
 pub struct Pipeline<'a> {
     space: Space<'a>,
     options: &'a PlanOptions,
     /// Set when the motion must leave a margin before the pipeline's own path begins.
     leaving: Option<Leaving<'a>>,
+    judge: &'a Judge<'a>,
     budget: Budget,
     limits: [JointLimits; MAX_JOINTS],
     /// What was done, in words.
     tried: Vec<String>,
-    best: Option<(Trajectory, Proof, String)>,
+    best: Option<Best>,
     /// Why the latest motion was not proven.
     violation: Option<Violation>,
 }
@@ -90,11 +106,17 @@ pub struct Pipeline<'a> {
 impl<'a> Pipeline<'a> {
     /// Prepares a run.
     #[must_use]
-    pub fn new(world: &'a World<'a>, work: &'a Work<'a>, options: &'a PlanOptions) -> Self {
+    pub fn new(
+        world: &'a World<'a>,
+        work: &'a Work<'a>,
+        options: &'a PlanOptions,
+        judge: &'a Judge<'a>,
+    ) -> Self {
         Self {
             space: Space::new(world, work),
             options,
             leaving: None,
+            judge,
             budget: Budget::of(options),
             limits: world.robot().limits(),
             tried: Vec::new(),
@@ -131,6 +153,9 @@ impl<'a> Pipeline<'a> {
             PlannerKind::Auto => {
                 if !self.straight(&line) {
                     self.around(&line);
+                } else if self.judge.objective != Objective::Time {
+                    // Nothing is shorter in time than the line; by another measure something may be better.
+                    self.by_objective(&[(&line, LINE)]);
                 }
             }
             PlannerKind::RrtConnect => self.search_alone(Searcher::RrtConnect, &line),
@@ -141,7 +166,7 @@ impl<'a> Pipeline<'a> {
                 let evaluations = self.budget.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
                 let optimizer = (method.make)(setup);
-                if let Some(refined) = self.refine(&line, &*optimizer, evaluations, "the straight line") {
+                if let Some(refined) = self.refine(&line, &*optimizer, evaluations, LINE) {
                     let source = optimizer.name().to_uppercase();
                     self.propose(&refined, &source);
                     self.round(&refined, &source);
@@ -168,6 +193,9 @@ impl<'a> Pipeline<'a> {
         let source = searched(searcher);
         self.propose(&path, &source);
         match self.options.improvement {
+            _ if self.judge.objective != Objective::Time => {
+                self.by_objective(&[(&path, "that"), (line, LINE)]);
+            }
             Improvement::Nothing => {}
             Improvement::Searches => {
                 let more = SEARCHES..SEARCHES + MORE_SEARCHES;
@@ -176,21 +204,31 @@ impl<'a> Pipeline<'a> {
                     self.round(&better, &source);
                 }
             }
-            Improvement::Method(method) => self.refine_around(method, [&path, line]),
+            Improvement::Method(method) => self.refine_around(method, &[(&path, "that"), (line, LINE)]),
         }
         self.round(&path, &source);
     }
 
-    /// Refinements from the path and from the straight line, since each stays near where it starts.
-    fn refine_around(&mut self, method: &Method, from: [&[JointArray]; 2]) {
-        let each = self.budget.refinements / 2;
+    /// Looks for motions that are better by another measure than time.
+    fn by_objective(&mut self, starts: &[(&[JointArray], &str)]) {
+        let method = match self.options.improvement {
+            Improvement::Method(method) => Some(method),
+            Improvement::Nothing | Improvement::Searches => METHODS.iter().find(|m| m.name == BY_OBJECTIVE),
+        };
+        if let Some(method) = method {
+            self.refine_around(method, starts);
+        }
+    }
+
+    /// Refinements from several paths, since each stays near where it starts.
+    fn refine_around(&mut self, method: &Method, starts: &[(&[JointArray], &str)]) {
+        let each = self.budget.refinements / starts.len().max(1);
         let optimizer = (method.make)(Setup { reading: self.options.reading, evaluations: Some(each) });
         let source = optimizer.name().to_uppercase();
-        let [path, line] = from;
-        let from_path = self.refine(path, &*optimizer, each, "that");
-        let from_line = self.refine(line, &*optimizer, each, "the straight line");
-        for refined in [from_path, from_line].into_iter().flatten() {
-            self.round(&refined, &source);
+        let refined: Vec<_> =
+            starts.iter().filter_map(|(path, from)| self.refine(path, &*optimizer, each, from)).collect();
+        for path in refined {
+            self.round(&path, &source);
         }
     }
 
@@ -201,7 +239,7 @@ impl<'a> Pipeline<'a> {
     fn stay(&mut self, pose_rad: &JointArray) {
         let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
         match verify_in(self.space.world, &trajectory, self.space.work) {
-            Ok(proof) => self.best = Some((trajectory, proof, "already there".to_owned())),
+            Ok(proof) => self.keep(trajectory, proof, "already there".to_owned()),
             Err(violation) => self.violation = Some(violation),
         }
     }
@@ -317,7 +355,9 @@ impl<'a> Pipeline<'a> {
         from: &str,
     ) -> Option<Vec<JointArray>> {
         let name = optimizer.name().to_uppercase();
-        let refined = refine(&self.space, path, optimizer, evaluations_max, self.options.seed);
+        let [Some(start), Some(goal)] = [path.first(), path.last()] else { return None };
+        let problem = PathProblem::new(&self.space, *start, *goal).by_energy(self.judge.energy());
+        let refined = refine(&problem, path, optimizer, evaluations_max, self.options.seed);
         let (mut corners, found) = match refined {
             Ok(refined) => refined?,
             Err(refusal) => {
@@ -389,6 +429,14 @@ impl<'a> Pipeline<'a> {
         }
     }
 
+    /// Keeps a verified motion if it is better than what there is.
+    fn keep(&mut self, trajectory: Trajectory, proof: Proof, how: String) {
+        let score = self.judge.score(&trajectory, &proof);
+        if self.best.as_ref().is_none_or(|best| score < best.score) {
+            self.best = Some(Best { trajectory, proof, how, score });
+        }
+    }
+
     /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is shorter
     /// than what there is.
     fn prove(&mut self, corners: &[JointArray], mut timed: Timed, how: &str) {
@@ -398,13 +446,9 @@ impl<'a> Pipeline<'a> {
             let left_s = stretches.first().map(|s| s.span_s[1]);
             match verify_stretches(&stretches, &timed.trajectory, self.space.work) {
                 Ok(proof) => {
-                    let shorter = self.best.as_ref().is_none_or(|(_, b, _)| proof.duration_s < b.duration_s);
-                    if shorter {
-                        let note = self.leaving.as_ref().and_then(|l| l.note.as_ref());
-                        let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
-                        self.best = Some((timed.trajectory, proof, format!("{note}{how}")));
-                    }
-                    return;
+                    let note = self.leaving.as_ref().and_then(|l| l.note.as_ref());
+                    let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
+                    return self.keep(timed.trajectory, proof, format!("{note}{how}"));
                 }
                 Err(violation) => {
                     let limit = matches!(violation, Violation::Limit { .. });
@@ -423,7 +467,7 @@ impl<'a> Pipeline<'a> {
         let cut = work.was_cut();
         let tried = self.tried.join(", ");
         match (self.best, self.violation) {
-            (Some((trajectory, proof, last)), _) => {
+            (Some(Best { trajectory, proof, how: last, score }), _) => {
                 // What won comes first: messages hold 240 bytes.
                 let mut how = last;
                 if cut {
@@ -432,7 +476,9 @@ impl<'a> Pipeline<'a> {
                 if !tried.is_empty() && tried != how {
                     how = format!("{how} (tried: {tried})");
                 }
-                Ok(Plan { trajectory, how, proof, planning_s: work.elapsed_s(), checks: self.space.checks() })
+                let (energy_j, checks) = (self.judge.energy_j(&trajectory), self.space.checks());
+                let planning_s = work.elapsed_s();
+                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, checks })
             }
             (None, Some(violation)) => Err(PlanError::Unproven { tried, violation }),
             (None, None) => Err(PlanError::NotFound { tried, cut_short: cut }),

@@ -1,6 +1,8 @@
 //! From two poses to a verified motion.
+use crate::dynamics::NoMasses;
 use crate::kind::{Improvement, PlannerKind};
 use crate::leave::{Leaving, Relaxed, is_clear, way_out};
+use crate::objective::{Judge, Objective};
 use crate::optimize::Reading;
 use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
@@ -28,6 +30,8 @@ pub struct PlanOptions {
     pub reading: Reading,
     /// How the default planner improves what it found.
     pub improvement: Improvement,
+    /// What makes one motion better than another.
+    pub objective: Objective,
     /// True when the clock aborts at the deadline. Without it only the budget that is derived from the deadline ends the
     /// work, so that one seed gives one answer on any machine, however busy: for comparisons, not for arms.
     pub keeps_deadline: bool,
@@ -37,7 +41,15 @@ impl Default for PlanOptions {
     fn default() -> Self {
         let (deadline, planner) = (Duration::from_millis(2000), PlannerKind::Auto);
         let (reading, improvement) = (Reading::Corrected, Improvement::default());
-        Self { seed: 0, deadline, planner, reading, improvement, keeps_deadline: true }
+        let objective = Objective::default();
+        Self { seed: 0, deadline, planner, reading, improvement, objective, keeps_deadline: true }
+    }
+}
+
+impl PlanOptions {
+    /// When the clock aborts.
+    pub(crate) fn clock(&self) -> Duration {
+        if self.keeps_deadline { self.deadline } else { Duration::MAX }
     }
 }
 
@@ -50,6 +62,10 @@ pub struct Plan {
     pub how: String,
     /// What was proven about it.
     pub proof: Proof,
+    /// What it is worth by the objective: seconds, cost or joules; less is better.
+    pub score: f64,
+    /// Mechanical energy of the motion ([`crate::dynamics`]); `None` when the robot states no masses.
+    pub energy_j: Option<f64>,
     /// How long planning took.
     pub planning_s: f64,
     /// Poses that searches, shortcuts and refinements checked: the measure of work that every machine agrees on.
@@ -130,6 +146,9 @@ pub enum PlanError {
         /// The link or obstacle.
         name: String,
     },
+    /// Energy counts, and no masses are known.
+    #[error(transparent)]
+    NoMasses(#[from] NoMasses),
     /// Nothing was found.
     #[error(
         "no path found: {tried}{}; try a longer deadline, another seed, planner or goal",
@@ -201,9 +220,10 @@ pub fn plan_until(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Plan, PlanError> {
-    let work = Work::until(if options.keeps_deadline { options.deadline } else { Duration::MAX }, cancel);
+    let work = Work::until(options.clock(), cancel);
     check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
     check_pose(task.robot, PoseOf::Goal, &task.goal_rad)?;
+    let judge = Judge::new(options.objective, task.robot)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
     let (start_rad, goal_rad) = (&task.start_rad, &task.goal_rad);
     let relaxed = match (task.margin, world.contact(start_rad)) {
@@ -215,16 +235,16 @@ pub fn plan_until(
         return Err(PlanError::too_close(PoseOf::Goal, contact));
     }
     if is_clear(&world, start_rad) {
-        return Pipeline::new(&world, &work, options).run(start_rad, goal_rad);
+        return Pipeline::new(&world, &work, options, &judge).run(start_rad, goal_rad);
     }
-    plan_out(&world, relaxed.as_ref(), &work, (task, options))
+    plan_out(&world, relaxed.as_ref(), (&work, &judge), (task, options))
 }
 
 /// Plans from a start inside the margin or at its edge: out of it first.
 fn plan_out(
     world: &World,
     relaxed: Option<&Relaxed>,
-    work: &Work,
+    (work, judge): (&Work, &Judge),
     (task, options): (&Task, &PlanOptions),
 ) -> Result<Plan, PlanError> {
     let ends = [&task.start_rad, &task.goal_rad];
@@ -233,14 +253,17 @@ fn plan_out(
     for (near, note) in full.into_iter().chain(reduced) {
         if let Some(pose_rad) = way_out([near, world], ends, options.seed, work) {
             let leaving = Leaving { near, start_rad: task.start_rad, note };
-            return Pipeline::new(world, work, options).leaving(leaving).run(&pose_rad, &task.goal_rad);
+            return Pipeline::new(world, work, options, judge)
+                .leaving(leaving)
+                .run(&pose_rad, &task.goal_rad);
         }
     }
     // No way out nearby: the reduced margin all the way, rather than an arm that nobody can move.
     let Some(relaxed) = relaxed else {
-        return Pipeline::new(world, work, options).run(&task.start_rad, &task.goal_rad);
+        return Pipeline::new(world, work, options, judge).run(&task.start_rad, &task.goal_rad);
     };
-    let mut plan = Pipeline::new(&relaxed.world, work, options).run(&task.start_rad, &task.goal_rad)?;
+    let mut plan =
+        Pipeline::new(&relaxed.world, work, options, judge).run(&task.start_rad, &task.goal_rad)?;
     plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
     Ok(plan)
 }

@@ -5,7 +5,9 @@
 //! out is a proposal: its edges are proven like any other path's.
 use crate::cost::CostModel;
 use crate::draw::Draw;
+use crate::dynamics::Dynamics;
 use crate::optimize::{Found, Optimizer, Problem, Progress, Refusal, Run};
+use crate::timing::Path;
 use crate::tree::Space;
 use crate::work::Work;
 use crate::world::{Snapshot, World};
@@ -23,34 +25,34 @@ pub const POSES: usize = (CONTROL_POINTS + 1) * POSES_PER_SEGMENT as usize;
 const SCATTER_RAD: f64 = 0.15;
 const SCATTERED: usize = 5;
 
-/// Proposes a path near a given one (which may collide) with any optimiser, or none when the run was cut before its
-/// first evaluation.
+/// Proposes a path near a given one (which may collide, and has the problem's ends) with any optimiser, or none when the
+/// run was cut before its first evaluation.
 ///
 /// # Errors
 /// When the optimiser's numbers make no sense, or the robot's limits are no box.
 pub fn refine(
-    space: &Space,
+    problem: &PathProblem,
     path: &[JointArray],
     optimizer: &dyn Optimizer,
     evaluations_max: usize,
     seed: u64,
 ) -> Result<Option<(Vec<JointArray>, Found)>, Refusal> {
-    let [Some(start), Some(goal)] = [path.first(), path.last()] else { return Ok(None) };
-    let problem = PathProblem::new(space, *start, *goal);
     let guesses = problem.guesses(path, seed);
-    let (is_over, mut watch) = (|| space.work.is_over(), |_: &Progress| ());
+    let (is_over, mut watch) = (|| problem.work.is_over(), |_: &Progress| ());
     let run = Run { seed, evaluations_max, guesses: &guesses, is_over: &is_over, watch: &mut watch };
-    let found = optimizer.minimise(&problem, run)?;
+    let found = optimizer.minimise(problem, run)?;
     Ok((!found.x.is_empty()).then(|| (problem.corners(&found.x), found)))
 }
 
-/// The paper's problem: where to put the control points.
+/// The paper's problem: where to put the control points. With an arm's dynamics the energy of the motion takes the place
+/// of the ways of tip and joints.
 pub struct PathProblem<'a> {
     world: &'a World<'a>,
     work: &'a Work<'a>,
     start_rad: JointArray,
     goal_rad: JointArray,
     weights: [f64; 3],
+    energy: Option<&'a Dynamics<'a>>,
     bounds: Vec<[f64; 2]>,
     /// Scratch memory; the trait's evaluation takes no mutable access.
     snapshot: RefCell<Snapshot>,
@@ -64,7 +66,14 @@ impl<'a> PathProblem<'a> {
         let one = world.robot().joints.iter().map(|j| j.limits.position_rad);
         let bounds = one.cycle().take(CONTROL_POINTS * world.joints()).collect();
         let (weights, snapshot) = (CostModel::default().weights, RefCell::default());
-        Self { world, work, start_rad, goal_rad, weights, bounds, snapshot }
+        Self { world, work, start_rad, goal_rad, weights, energy: None, bounds, snapshot }
+    }
+
+    /// The same for the energy of the motion.
+    #[must_use]
+    pub fn by_energy(mut self, energy: Option<&'a Dynamics<'a>>) -> Self {
+        self.energy = energy;
+        self
     }
 
     /// Start, control points and goal of a decision vector.
@@ -78,6 +87,14 @@ impl<'a> PathProblem<'a> {
         }
         corners.push(self.goal_rad);
         corners
+    }
+
+    /// Energy of the motion that passes the corners without stopping, as timing would make it; infinite when there is
+    /// none.
+    fn energy_j(&self, dynamics: &Dynamics, corners_rad: &[JointArray]) -> f64 {
+        let limits = self.world.robot().limits();
+        let path = Path { corners_rad, joints: self.world.joints(), limits: &limits };
+        path.rough().map_or(f64::INFINITY, |timed| dynamics.spent_roughly_j(&timed.trajectory))
     }
 
     /// The path with three control points, some scattered around it, and the straight line.
@@ -129,7 +146,11 @@ impl Problem for PathProblem<'_> {
         }
         let [length, travel, weight] = self.weights;
         let penalty = if collides { weight * penalty } else { 0.0 };
-        length * length_m + travel * travel_rad + penalty
+        let way = match self.energy {
+            Some(dynamics) => self.energy_j(dynamics, &corners),
+            None => length * length_m + travel * travel_rad,
+        };
+        way + penalty
     }
 }
 

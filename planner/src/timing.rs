@@ -17,6 +17,8 @@ const SLACK: f64 = 1e-3;
 const SPACING: f64 = 8.0;
 /// Kernel widths that are tried, in units of the arm's natural one ([`natural_kernel_s`]).
 const KERNELS: [f64; 11] = [0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 1.15, 1.4, 1.8, 2.4, 3.5];
+/// The one of them that is best most often.
+const ROUGH_KERNEL: f64 = 0.8;
 /// Exponents that are tried: bench.md 9 finds k from 0.12 to 0.24 within a few percent of each other.
 const EXPONENTS: [u32; 3] = [5, 6, 8];
 
@@ -94,6 +96,18 @@ impl Path<'_> {
         }
         let (_, shape) = best?;
         self.fit(&shape)
+    }
+
+    /// A motion that stops at no corner, near the limits and quickly made: what [`Self::fastest`] would make of the path,
+    /// roughly.
+    #[must_use]
+    pub fn rough(&self) -> Option<Timed> {
+        let natural_s = self.natural_kernel_s().max(self.least_kernel_s()?);
+        let waits = vec![0.0; self.corners_rad.len().saturating_sub(2)];
+        let shape = Shape { n: EXPONENTS[1], kernel_s: ROUGH_KERNEL * natural_s, waits };
+        let strokes = self.strokes(&shape)?;
+        let scale = self.scale(&strokes, shape.kernel_s / 16.0);
+        self.scaled(&strokes, &shape, scale)
     }
 
     /// Kernel that takes a joint from full speed to rest within its limits: the slowest joint's.

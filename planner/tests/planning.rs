@@ -239,7 +239,7 @@ fn refinement_takes_every_optimiser_by_name() {
     for method in METHODS {
         let optimizer =
             by_name(method.name, Setup { evaluations: Some(150), ..Setup::default() }).expect("named");
-        let (corners, found) = refine(&space, &line, optimizer.as_ref(), 150, 1)
+        let (corners, found) = refine(&problem, &line, optimizer.as_ref(), 150, 1)
             .expect("sane")
             .expect("something was evaluated");
         assert_eq!((corners.len(), [corners[0], corners[4]]), (5, line), "{}", method.name);

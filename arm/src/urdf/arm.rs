@@ -2,16 +2,17 @@
 //!
 //! Links are gathered by the frame that they are rigid with: frame 0 is the base link, frame i the link behind the i-th
 //! joint of the arm, and the last frame the tip link. Joints off the chain do not move.
-use super::model::{Joint, Kind, Model, Origin, Solid};
+use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid};
 use super::tree::Tree;
 use super::xml::{self, Context, Element};
 use super::{package, srdf};
 use crate::document::{self, Value, shown};
+use crate::mass::{LinkMass, Weight};
 use crate::reader::{Book, Table};
-use crate::robot::{LinkMass, LinkShape};
+use crate::robot::LinkShape;
 use crate::scene::{self, Shape};
 use crate::{hull, mesh};
-use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use taustream_motion::MAX_JOINTS;
@@ -108,6 +109,7 @@ impl UrdfArm {
         let (parts, mut notices) = parts?;
         let held = held(&model, &moving, &mut notices);
         say_bare_links(&model, &mut notices);
+        say_odd_moments(&model, &mut notices);
         let arm = Self { model, tree, base, tip, path, moving, held, parts, allowed, notices };
         top.book().is_clean().then_some(arm)
     }
@@ -215,10 +217,11 @@ impl UrdfArm {
     pub(crate) fn masses(&self) -> Vec<LinkMass> {
         let placed = self.placed();
         let links = self.model.links.iter().zip(placed).enumerate();
-        let mass = |(index, (link, (frame, link_pose))): (usize, (&super::model::Link, (usize, Pose)))| {
+        let mass = |(index, (link, (frame, link_pose))): (usize, (&Link, (usize, Pose)))| {
             let inertial = link.inertial?;
-            let center_m = link_pose * Point3::from(inertial.origin.xyz_m);
-            Some(LinkMass { link: index, frame, mass_kg: inertial.mass_kg, center_m })
+            let own = weight(&inertial);
+            let moments = if own.is_possible() { own } else { Weight { inertia_kg_m2: [0.0; 6], ..own } };
+            Some(LinkMass::placed(&moments, index, (frame, link_pose * pose(&inertial.origin))))
         };
         links.filter_map(mass).collect()
     }
@@ -238,6 +241,23 @@ impl UrdfArm {
         }
         pairs.sort_unstable();
         pairs
+    }
+}
+
+/// The weight of a link in the frame of its origin.
+fn weight(inertial: &Inertial) -> Weight {
+    let Inertial { mass_kg, origin: _, inertia_kg_m2 } = *inertial;
+    Weight { mass_kg, center_m: [0.0; 3], inertia_kg_m2 }
+}
+
+/// Moments that no body has: files that nobody simulates are full of them, and no setpoint depends on them.
+fn say_odd_moments(model: &Model, notices: &mut Vec<String>) {
+    let is_odd = |link: &&Link| link.inertial.is_some_and(|inertial| !weight(&inertial).is_possible());
+    for link in model.links.iter().filter(is_odd) {
+        let name = shown(&link.name);
+        notices.push(format!(
+            "link {name}: its moments of inertia belong to no body; its mass counts as a point for energies"
+        ));
     }
 }
 

@@ -47,7 +47,8 @@ fn put_link(out: &mut Vec<u8>, link: &Link) {
     put_text(out, name);
     match inertial {
         None => out.push(0),
-        Some(Inertial { mass_kg, origin }) => {
+        // How a mass is spread weighs proven motions against each other, and changes none: not in the digest.
+        Some(Inertial { mass_kg, origin, inertia_kg_m2: _ }) => {
             out.push(1);
             put_number(out, *mass_kg);
             put_origin(out, origin);

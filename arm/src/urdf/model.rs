@@ -1,6 +1,7 @@
 //! What a URDF file says: links with their solid parts, and joints between them. Nothing is derived here.
 use super::xml::{Context, Element};
 use crate::document::shown;
+use crate::mass::{MASS_KG, MOMENT_KG_M2};
 use crate::reader::Bounds;
 use crate::scene::Shape;
 use std::collections::BTreeSet;
@@ -46,11 +47,13 @@ pub(crate) struct Link {
     pub(crate) inertial: Option<Inertial>,
 }
 
-/// The mass of a link and where its centre is.
+/// The mass of a link, where its centre is, and its moments of inertia along the origin's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inertial {
     pub(crate) mass_kg: f64,
     pub(crate) origin: Origin,
+    /// xx, yy, zz, xy, xz, yz.
+    pub(crate) inertia_kg_m2: [f64; 6],
 }
 
 /// How a joint moves.
@@ -124,7 +127,6 @@ const SCALE: Bounds = Bounds::within(-1e4, 1e4, "");
 const AXIS: Bounds = Bounds::within(-1e6, 1e6, "");
 const POSITION: Bounds = Bounds::within(-1e9, 1e9, "rad or m");
 const VELOCITY: Bounds = Bounds::within(0.0, 1e9, "rad/s or m/s");
-const MASS_KG: Bounds = Bounds::within(0.0, 1e5, "kg");
 
 impl Model {
     /// Reads the whole file; complete only when no fault was noted.
@@ -191,7 +193,18 @@ fn read_origin(element: &Element<'_, '_, '_>) -> Option<Origin> {
 fn read_inertial(element: &Element<'_, '_, '_>) -> Option<Inertial> {
     let origin = read_origin(element);
     let mass = element.need("mass", "<mass value=\"kg\"/>").and_then(|mass| mass.number("value", &MASS_KG));
-    Some(Inertial { mass_kg: mass?, origin: origin? })
+    let inertia = read_moments(element);
+    Some(Inertial { mass_kg: mass?, origin: origin?, inertia_kg_m2: inertia? })
+}
+
+/// Moments of inertia; those of a point when there are none.
+fn read_moments(element: &Element<'_, '_, '_>) -> Option<[f64; 6]> {
+    let Some(inertia) = element.child("inertia") else { return Some([0.0; 6]) };
+    // Every one is looked at, so that two bad ones are two faults.
+    let read =
+        ["ixx", "iyy", "izz", "ixy", "ixz", "iyz"].map(|key| inertia.number_or(key, 0.0, &MOMENT_KG_M2));
+    let [xx, yy, zz, xy, xz, yz] = read;
+    Some([xx?, yy?, zz?, xy?, xz?, yz?])
 }
 
 fn read_part(element: &Element<'_, '_, '_>) -> Option<Part> {

@@ -5,8 +5,8 @@ use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
-use taustream_planner::PlannerKind;
 use taustream_planner::optimize::{METHODS, Method, Reading};
+use taustream_planner::{Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\
 Examples:
@@ -14,6 +14,7 @@ Examples:
       --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
   taustream plan ... --planner ibfoa --seed 7 --deadline-ms 5000 --json
   taustream plan ... --planner bfoa --reading printed
+  taustream plan ... --objective energy --deadline-ms 5000
   taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
@@ -54,6 +55,9 @@ pub(crate) struct PlanArgs {
     /// Which planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
+    /// What makes one verified motion better than another.
+    #[arg(long, value_name = "WHAT", default_value = "time", value_parser = objective())]
+    pub(crate) objective: Objective,
     /// Where a paper cannot be meant as printed: which reading the optimisers follow.
     #[arg(long, value_name = "READING", default_value = "corrected", value_parser = reading())]
     pub(crate) reading: Reading,
@@ -133,7 +137,8 @@ Examples:
 
 The paper's model: links are bare segments between frame origins, obstacles are spheres only, each stroke is
 sampled at equal time steps plus the end, strokes must not overlap.
-cost = w1 path_length_m + w2 joint_travel_rad + w3 penalty (the penalty counts only in collision).";
+cost = w1 path_length_m + w2 joint_travel_rad + w3 penalty (the penalty counts only in collision).
+energy_J, the mechanical work of the joints, is added for robots whose file states masses; it is no part of the cost.";
 
 /// `taustream cost`
 #[derive(Args, Debug)]
@@ -300,6 +305,12 @@ pub(super) fn planner_kind() -> impl TypedValueParser<Value = PlannerKind> {
 fn method() -> impl TypedValueParser<Value = &'static Method> {
     PossibleValuesParser::new(METHODS.iter().map(|m| PossibleValue::new(m.name).help(m.about)))
         .try_map(|name| METHODS.iter().find(|m| m.name == name).ok_or("no such optimiser"))
+}
+
+/// The objectives by name.
+fn objective() -> impl TypedValueParser<Value = Objective> {
+    PossibleValuesParser::new(Objective::ALL.map(|o| PossibleValue::new(o.name()).help(o.about())))
+        .map(|name| Objective::from_name(&name).unwrap_or_default())
 }
 
 /// The readings of the papers by name.

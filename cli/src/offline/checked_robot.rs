@@ -83,7 +83,7 @@ pub(super) struct CheckedRobot {
     links_without_shape: Vec<String>,
     /// What was left out of a URDF, or deserves a look.
     notices: Vec<String>,
-    /// Of the links that state a mass; null when none does.
+    /// Of the links that state a mass, and of the payload; null when none does.
     mass_kg: Option<f64>,
     may_touch_by_rule: Vec<[String; 2]>,
     may_touch_by_file: Vec<[String; 2]>,
@@ -179,7 +179,7 @@ impl CheckedRobot {
             writeln!(f, "  base link {base}, tip link {tip}")?;
         }
         if let Some(mass_kg) = self.mass_kg {
-            writeln!(f, "  {mass_kg:.3} kg by the links that state a mass (not used yet)")?;
+            writeln!(f, "  {mass_kg:.3} kg by the links that state a mass (for the energy of motions)")?;
         }
         for link in &self.links {
             match &link.moved_by {

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
+use taustream_planner::dynamics::Dynamics;
 use taustream_planner::{CostError, CostModel, paper_cost};
 
 /// The cost and its parts.
@@ -15,6 +16,9 @@ struct Answer {
     penalty: f64,
     collision: u8,
     cost: f64,
+    /// Left out for a robot that states no masses.
+    #[serde(rename = "energy_J", skip_serializing_if = "Option::is_none")]
+    energy_j: Option<f64>,
     poses: usize,
     waypoints_per_segment: usize,
     expansion_m: f64,
@@ -28,6 +32,9 @@ impl fmt::Display for Answer {
         writeln!(f, "penalty           {}", self.penalty)?;
         writeln!(f, "collision         {}", self.collision)?;
         writeln!(f, "cost              {}", self.cost)?;
+        if let Some(energy_j) = self.energy_j {
+            writeln!(f, "energy_J          {energy_j}")?;
+        }
         write!(f, "({} poses in the paper's model; `taustream verify` says what may move)", self.poses)
     }
 }
@@ -56,6 +63,7 @@ pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
         penalty: cost.penalty,
         collision: u8::from(cost.collision),
         cost: cost.cost,
+        energy_j: Dynamics::new(&robot).ok().map(|dynamics| dynamics.spent_j(&file.trajectory)),
         poses: cost.poses,
         waypoints_per_segment: model.waypoints_per_segment,
         expansion_m: model.expansion_m,

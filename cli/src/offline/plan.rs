@@ -26,7 +26,11 @@ struct Summary {
     planner: String,
     seed: u64,
     planning_s: f64,
+    objective: &'static str,
     duration_s: f64,
+    /// Mechanical work of the joints; null for a robot that states no masses.
+    #[serde(rename = "energy_J")]
+    energy_j: Option<f64>,
     strokes: usize,
     clearance_m: f64,
     clearance_at_s: f64,
@@ -43,6 +47,9 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s (seed {})", self.planner, self.planning_s, self.seed)?;
         writeln!(f, "duration      {:.3} s, {} strokes", self.duration_s, self.strokes)?;
+        if let Some(energy_j) = self.energy_j {
+            writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
+        }
         let [a, b] = &self.clearance_between;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
         if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
@@ -68,6 +75,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         deadline: Duration::from_millis(args.deadline_ms.into()),
         planner: args.planner,
         reading: args.reading,
+        objective: args.objective,
         ..PlanOptions::default()
     };
     let end = End::of(args, &robot)?;
@@ -174,7 +182,9 @@ fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &P
         planner: found.how,
         seed: args.seed,
         planning_s: found.planning_s,
+        objective: args.objective.name(),
         duration_s: found.proof.duration_s,
+        energy_j: found.energy_j,
         strokes: found.trajectory.strokes().len(),
         clearance_m: found.proof.clearance_m,
         clearance_at_s: found.proof.clearance_at_s,

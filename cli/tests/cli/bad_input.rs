@@ -67,6 +67,16 @@ fn words_that_are_wrong_are_refused_by_name() {
                 2,
                 &["literal", "printed", "corrected"],
             ),
+            (
+                "plan --robot ur5 --scene open --start HOME --goal HOME --objective beauty",
+                2,
+                &["beauty", "energy", "time"],
+            ),
+            (
+                "plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --goal 0,1,-1,0,0,0 --objective energy",
+                1,
+                &["`piper`", "no mass", "link_mass_kg"],
+            ),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --deadline-ms 0", 2, &["--deadline-ms"]),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --seed -1", 2, &["--seed"]),
             ("replan --goal HOME --at-once --after-current", 2, &["--at-once", "--after-current"]),

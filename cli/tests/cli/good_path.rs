@@ -1,5 +1,5 @@
 //! What users do every day: plan, check, sample, verify, rate.
-use crate::common::{HOME, Scratch, stroke, trajectory};
+use crate::common::{HOME, Scratch, config, stroke, trajectory};
 use std::fs;
 
 const GOAL: &str = "1.0,-1.2,1.3,-1.6,-1.57,0.4";
@@ -75,6 +75,35 @@ fn plan_to_a_position_says_pose_and_error_and_writes_a_file_that_verifies() {
     assert!((0.0..=2e-6).contains(&error_m), "{summary}");
     assert_eq!(summary["goal_rad"].as_array().map(Vec::len), Some(6), "{summary}");
     assert_eq!(summary["target_m"][1], -0.3, "{summary}");
+}
+
+/// Goal: energy is stated for robots with masses, chosen by on request, and left out for robots without.
+#[test]
+fn energy_is_stated_for_robots_with_masses_and_chosen_by_on_request() {
+    let scratch = Scratch::new();
+    let by_time = planned(&scratch);
+    let energy_j = by_time["energy_J"].as_f64().expect("a number");
+    assert!(energy_j > 0.0 && by_time["objective"] == "time", "{by_time}");
+    let ends = ["--start", HOME, "--goal", GOAL];
+    let words =
+        [&["plan", "--robot", "ur5", "--scene", "open", "--objective", "energy", "--json"][..], &ends]
+            .concat();
+    let by_energy = scratch.run(&words).json();
+    assert_eq!(by_energy["objective"], "energy");
+    assert!(by_energy["energy_J"].as_f64().expect("a number") <= energy_j * (1.0 + 1e-12), "{by_energy}");
+
+    scratch.write("empty.toml", "margin_m = 0.02\n");
+    scratch.write("one.json", &trajectory(&stroke("10", "0.25", "0.5")));
+    let shipped = fs::read_to_string(config().join("robots/ur5.toml")).unwrap();
+    let is_light = |line: &&str| !line.starts_with("link_mass_kg") && !line.starts_with("link_center_m");
+    scratch.write("light.toml", &shipped.lines().filter(is_light).collect::<Vec<_>>().join("\n"));
+    let cost = |robot| ["cost", "--robot", robot, "--scene", "empty.toml", "--trajectory", "one.json"];
+    let text = scratch.run(&cost("ur5")).done().to_owned();
+    assert!(text.lines().any(|line| line.starts_with("energy_J ")), "{text}");
+    let json = scratch.run(&[&cost("ur5")[..], &["--json"]].concat()).json();
+    assert!(json["energy_J"].as_f64().is_some_and(|j| j > 0.0), "{json}");
+    let light = scratch.run(&[&cost("light.toml")[..], &["--json"]].concat()).json();
+    assert!(light["energy_J"].is_null() && light["cost"] == json["cost"], "{light}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ pub mod benchmarks;
 pub mod control_points;
 mod linear;
 pub mod planar;
-mod quadrature;
+pub(crate) mod quadrature;
 pub mod reach;
 pub mod spline;
 pub mod spline_time;

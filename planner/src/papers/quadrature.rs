@@ -10,7 +10,7 @@ const GAUSS: [[f64; 2]; 5] = [
 ];
 
 /// The integral of `f` from `a` to `b`.
-pub(super) fn gauss(a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn gauss(a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     let (half, middle) = (0.5 * (b - a), 0.5 * (a + b));
     GAUSS.iter().map(|[x, w]| half * w * f(middle + half * x)).sum()
 }

@@ -7,6 +7,7 @@ mod polish;
 mod swarm;
 
 use crate::leave::is_clear;
+use crate::objective::Objective;
 use crate::optimize::{METHODS, Method, Refusal};
 use crate::plan::{
     CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, plan_until,
@@ -157,7 +158,7 @@ pub fn plan_to_position(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Reached, PositionError> {
-    let work = Work::until(options.deadline, cancel);
+    let work = Work::until(options.clock(), cancel);
     for (axis, value_m) in ['x', 'y', 'z'].into_iter().zip(task.target_m) {
         if !value_m.is_finite() {
             return Err(PositionError::BadTarget { axis, value_m });
@@ -286,17 +287,17 @@ fn best_motion(
             break;
         }
         let PositionTask { robot, scene, start_rad, margin, .. } = *task;
-        let duration_s = best.as_ref().map_or(f64::INFINITY, |(plan, _)| plan.proof.duration_s);
-        if time_s(robot, &start_rad, goal_rad) >= duration_s {
+        let score = best.as_ref().map_or(f64::INFINITY, |(plan, _)| plan.score);
+        if options.objective == Objective::Time && time_s(robot, &start_rad, goal_rad) >= score {
             break;
         }
         planned += 1;
-        let left = options.deadline.saturating_sub(Duration::from_secs_f64(work.elapsed_s()));
+        let left = options.clock().saturating_sub(Duration::from_secs_f64(work.elapsed_s()));
         cut |= left < budget.each_plan;
         let each = PlanOptions { deadline: budget.each_plan.min(left), ..*options };
         let task = Task { robot, scene, start_rad, goal_rad: *goal_rad, margin };
         match plan_until(&task, &each, cancel) {
-            Ok(plan) if plan.proof.duration_s < duration_s => best = Some((plan, *goal_rad)),
+            Ok(plan) if plan.score < score => best = Some((plan, *goal_rad)),
             Ok(_) => {}
             Err(error) => failure = Some(error),
         }

@@ -1,0 +1,115 @@
+//! What makes one verified motion better than another, by the words that users write.
+use crate::cost::CostModel;
+use crate::dynamics::{Dynamics, NoMasses};
+use crate::verify::Proof;
+use taustream_arm::Robot;
+use taustream_motion::{JointArray, Trajectory};
+
+/// What makes one verified motion better than another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Objective {
+    /// It is shorter in time.
+    #[default]
+    Time,
+    /// It is cheaper by the cost of seed paper 000, whose penalty is nothing for a motion that touches nothing.
+    Cost,
+    /// Its joints do less work.
+    Energy,
+}
+
+impl Objective {
+    /// Every objective.
+    pub const ALL: [Self; 3] = [Self::Time, Self::Cost, Self::Energy];
+
+    /// The word that users write.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Cost => "cost",
+            Self::Energy => "energy",
+        }
+    }
+
+    /// One line for a list.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Time => "shortest in time",
+            Self::Cost => "shortest way of tip and joints, weighed as in seed paper 000",
+            Self::Energy => "least mechanical work of the joints; needs masses in the robot file",
+        }
+    }
+
+    /// The objective of a word; `None` for a word that is unknown.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|objective| objective.name() == name)
+    }
+}
+
+/// Samples of a motion's way.
+const SAMPLES: u32 = 1_000;
+
+/// Weighs verified motions.
+pub struct Judge<'a> {
+    /// What counts.
+    pub objective: Objective,
+    robot: &'a Robot,
+    dynamics: Result<Dynamics<'a>, NoMasses>,
+}
+
+impl<'a> Judge<'a> {
+    /// A judge of one arm's motions.
+    ///
+    /// # Errors
+    /// When energy counts and the robot states no masses.
+    pub fn new(objective: Objective, robot: &'a Robot) -> Result<Self, NoMasses> {
+        let dynamics = Dynamics::new(robot);
+        match (objective, dynamics) {
+            (Objective::Energy, Err(none)) => Err(none),
+            (_, dynamics) => Ok(Self { objective, robot, dynamics }),
+        }
+    }
+
+    /// The arm's dynamics, when energy counts.
+    #[must_use]
+    pub fn energy(&self) -> Option<&Dynamics<'a>> {
+        self.dynamics.as_ref().ok().filter(|_| self.objective == Objective::Energy)
+    }
+
+    /// Energy of a motion in J, whatever counts; `None` without masses.
+    #[must_use]
+    pub fn energy_j(&self, motion: &Trajectory) -> Option<f64> {
+        self.dynamics.as_ref().ok().map(|dynamics| dynamics.spent_j(motion))
+    }
+
+    /// Less is better.
+    #[must_use]
+    pub fn score(&self, motion: &Trajectory, proof: &Proof) -> f64 {
+        match self.objective {
+            Objective::Time => proof.duration_s,
+            Objective::Cost => self.way_cost(motion),
+            Objective::Energy => self.energy_j(motion).unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// The paper's cost of a way that touches nothing: its length in space and in joints, weighed.
+    fn way_cost(&self, motion: &Trajectory) -> f64 {
+        let [length, travel, _] = CostModel::default().weights;
+        let at = |i: u32| motion.sample(motion.duration_s() * f64::from(i) / f64::from(SAMPLES)).position_rad;
+        let tip = |q: &JointArray| {
+            let [.., tip] = self.robot.chain.frames(q);
+            tip.translation.vector
+        };
+        let mut last = at(0);
+        let mut cost = 0.0;
+        for i in 1..=SAMPLES {
+            let here = at(i);
+            let turned: f64 = here.iter().zip(&last).map(|(a, b)| (a - b).abs()).sum();
+            cost += travel * turned + length * (tip(&here) - tip(&last)).norm();
+            last = here;
+        }
+        cost
+    }
+}
