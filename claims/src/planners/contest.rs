@@ -102,7 +102,8 @@ impl Contest {
                 | PlanError::OutsideLimits { .. }
                 | PlanError::InCollision { .. }
                 | PlanError::InsideMargin { .. }
-                | PlanError::Shape { .. }),
+                | PlanError::Shape { .. }
+                | PlanError::NoMasses(_)),
             ) => Err(Stop::Refused(format!("problem {}: {error}", problem.id))),
         }
     }
