@@ -128,9 +128,9 @@ fn fast_cost_is_faster_than_the_yardstick_by_a_multiple() {
             fast_best = fast_best.min(time(&|x| fast.rate(x)));
         }
         let ratio = plain_best.as_secs_f64() / fast_best.as_secs_f64();
-        // On the machine of docs/measured.md: 2, 22 and 40.
+        // Measured, quiet: 2.5, 26 and 41 times.
         let least = if level.lanes() == 1 { 1.0 } else { 4.0 };
-        println!("{}: {ratio:.1} times as fast", level.name());
+        println!("{}: {ratio:.1} times as fast as {plain_best:?} for {} of them", level.name(), xs.len());
         assert!(ratio > least, "{}: {ratio:.2} times as fast as the yardstick", level.name());
     }
 }

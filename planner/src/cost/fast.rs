@@ -5,7 +5,7 @@
 use super::flat::Flat;
 use super::level::Level;
 use super::margin::Limits;
-use super::sieve::{Angles, PADDING, Pass, Passed};
+use super::sieve::{Angles, CELL, Cells, PADDING, Pass, Passed, Sweep};
 use super::skeleton::Skeleton;
 use super::{CostModel, Point};
 use crate::optimize::Reading;
@@ -24,6 +24,7 @@ pub(super) struct Fast {
     sums: bool,
     steps: usize,
     phases: Vec<f32>,
+    cells: Cells,
 }
 
 /// What the kernel says about a motion.
@@ -49,7 +50,8 @@ impl Fast {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let mut padded: Vec<f32> = phases.iter().map(|phase| *phase as f32).collect();
         padded.resize((phases.len() / PADDING + 1) * PADDING, 1.0);
-        Some(Self { level: Level::best(), flat, sums, steps: phases.len(), phases: padded })
+        let cells = cells(&padded);
+        Some(Self { level: Level::best(), flat, sums, steps: phases.len(), phases: padded, cells })
     }
 
     /// The same on another level.
@@ -61,15 +63,28 @@ impl Fast {
     pub(super) fn sift(&self, corners: &[JointArray]) -> Option<Sifted> {
         let angles = self.motion_angles(corners)?;
         let limits = Limits::new(&self.flat, &angles, self.sums);
-        Some(self.sift_within(&angles, &limits))
+        Some(self.sift_within(&angles, &self.sweeps(corners), &limits))
+    }
+
+    /// How far each segment moves anything at most.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up before")]
+    fn sweeps(&self, corners: &[JointArray]) -> Vec<Sweep> {
+        let sweep = |pair: &[JointArray]| {
+            let [from, to] = pair else { return f64::INFINITY };
+            let ways = from.iter().zip(to).map(|(p, q)| (q - p).abs());
+            ways.zip(self.flat.bones()).map(|(way, bone)| way * bone.reach_m).sum()
+        };
+        // A cell is called far on the strength of it.
+        corners.windows(2).map(|pair| (sweep(pair) * (1.0 + 1e-6)) as f32).collect()
     }
 
     /// Looks through a motion with given limits.
-    fn sift_within(&self, angles: &[Angles], limits: &Limits) -> Sifted {
+    fn sift_within(&self, angles: &[Angles], sweeps: &[Sweep], limits: &Limits) -> Sifted {
         let row = self.phases.len();
         let mut slack = vec![0.0_f32; row * angles.len()];
         let (flat, phases) = (&self.flat, self.phases.as_slice());
-        let pass = Pass { flat, phases, angles, limits, slack: &mut slack };
+        let cells = &self.cells;
+        let pass = Pass { flat, phases, cells, angles, sweeps, limits, slack: &mut slack };
         let Passed { length_m, has_suspects } = self.level.run(pass);
         let mut suspects = Vec::new();
         if has_suspects {
@@ -111,6 +126,23 @@ impl Fast {
     }
 }
 
+/// The cells of a segment's poses.
+fn cells(phases: &[f32]) -> Cells {
+    /// More than the rounding of a middle.
+    const ROUNDING: f32 = 1e-6;
+    let (mut middles, mut halves) = (Vec::new(), Vec::new());
+    for cell in phases.chunks(CELL) {
+        let least = cell.iter().copied().fold(f32::INFINITY, f32::min);
+        let most = cell.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        middles.push(0.5 * (least + most));
+        halves.push(0.5 * (most - least) + ROUNDING);
+    }
+    let padded = middles.len().next_multiple_of(PADDING);
+    middles.resize(padded, 1.0);
+    halves.resize(padded, 0.0);
+    Cells { middles, halves }
+}
+
 /// An angle in half turns, taken into [-1, 1].
 fn within_one(half_turns: f64) -> f64 {
     half_turns - 2.0 * (0.5 * half_turns).round()
@@ -127,7 +159,8 @@ impl Fast {
             #[expect(clippy::cast_possible_truncation, reason = "this is the fault")]
             let free_from = free_from as f32;
             limit.free_from = free_from;
+            limit.distance = free_from.sqrt();
         }
-        self.sift_within(&angles, &limits)
+        self.sift_within(&angles, &self.sweeps(corners), &limits)
     }
 }

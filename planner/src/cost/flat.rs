@@ -1,6 +1,6 @@
 //! The constants of the kernel: a skeleton, spheres and links rounded to f32, and which steps can be left out.
 use super::Point;
-use super::skeleton::{NOTHING, Skeleton};
+use super::skeleton::{Bone, NOTHING, Skeleton};
 use nalgebra::Vector3;
 
 /// One joint, as the kernel needs it.
@@ -22,6 +22,8 @@ pub(super) struct FlatBone {
     pub(super) tilt: Option<[f32; 2]>,
     /// Which directions are needed behind the tilt: x and y, and z.
     pub(super) wants: [bool; 2],
+    /// Furthest that anything that the joint turns can be from it (m).
+    pub(super) reach_m: f64,
 }
 
 /// A link: the segment between the origins of two frames that follow each other.
@@ -141,6 +143,7 @@ fn flat_bones(skeleton: &Skeleton) -> Vec<FlatBone> {
             #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
             tilt: bone.tilt.map(|[cos, sin]| [cos as f32, sin as f32]),
             wants: [false; 2],
+            reach_m: skeleton.bones.iter().skip(i).map(Bone::length_m).sum(),
         });
     }
     // From the tip back: what is asked of the directions behind each joint.

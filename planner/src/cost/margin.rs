@@ -34,6 +34,8 @@ const REST_M: f64 = 1e-9;
 pub(super) struct Limit {
     /// From this on, as the square of the least distance (m^2) or as the sum of distances (m).
     pub(super) free_from: f32,
+    /// The distance that the least one has then (m).
+    pub(super) distance: f32,
     /// What the links that stand still add to the sum (m).
     pub(super) still_m: f32,
 }
@@ -63,6 +65,7 @@ impl Limits {
                 (sphere.limit_m + 2.0 * e_m + rounds_m).powi(2) + (8.0 * e_m).powi(2)
             };
             Limit {
+                distance: (free_from.sqrt() * (1.0 + 1e-6)) as f32,
                 free_from: (free_from * (1.0 + 4.0 * U)) as f32,
                 still_m: sphere.still_m.unwrap_or(0.0) as f32,
             }

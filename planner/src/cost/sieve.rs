@@ -4,9 +4,12 @@
 //! surely free, and whoever calls it looks at the others exactly. "Surely" is the distance in f32 against a limit
 //! that is wider by what f32 can be wrong, see [`super::margin`].
 //!
+//! Before that, cells of neighbouring poses are looked at as one: half of a segment's poses lie in its first and last
+//! hundredth, and most spheres are far from most of a motion.
+//!
 //! The arm is seen from behind its first joint, whose turn moves the spheres instead. Behind that, a parallel joint
 //! moves points by the sum of its group's angles; only a tilted axis takes a rotation of the directions.
-use super::flat::{Flat, FlatBone};
+use super::flat::{Flat, FlatBone, FlatSphere};
 use super::lanes::{Lanes, Vector, Vector3};
 use super::margin::Limits;
 use pulp::{Simd, WithSimd};
@@ -18,14 +21,33 @@ pub(super) const PADDING: usize = 16;
 /// Every angle of a segment in half turns: where it starts, and how far it goes.
 pub(super) type Angles = [[f32; 2]; MAX_JOINTS];
 
+/// Poses of a cell.
+pub(super) const CELL: usize = 8;
+
+/// Neighbouring poses, [`CELL`] of them together; padded to a multiple of [`PADDING`].
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    /// The profile in the middle of each.
+    pub(super) middles: Vec<f32>,
+    /// How far it is from there to either end, at most.
+    pub(super) halves: Vec<f32>,
+}
+
+/// How far a segment moves any point of the arm against any other or a sphere, at most (m).
+pub(super) type Sweep = f32;
+
 /// One motion to look through.
 pub(super) struct Pass<'a> {
     /// Arm and spheres.
     pub(super) flat: &'a Flat,
     /// The profile at the poses of a segment, then 1 up to a multiple of [`PADDING`], once at least.
     pub(super) phases: &'a [f32],
+    /// The cells of those poses.
+    pub(super) cells: &'a Cells,
     /// A row a segment.
     pub(super) angles: &'a [Angles],
+    /// One a segment.
+    pub(super) sweeps: &'a [Sweep],
     /// When a pose is surely free.
     pub(super) limits: &'a Limits,
     /// Out: below 0 where a pose is not surely free; as many a segment as there are phases.
@@ -47,22 +69,30 @@ impl WithSimd for Pass<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Passed {
         let lanes = Lanes(simd);
+        let Self { flat, limits, cells, .. } = self;
         let (mut length_m, mut least) = (0.0, lanes.all(f32::MAX));
         let mut arm = Arm::new(lanes);
         let (phases, _) = S::as_simd_f32s(self.phases);
         // The tip at every pose and one vector more: steps go from each pose to the next one.
         let row = self.phases.len() + PADDING;
         let mut tips = vec![0.0_f32; 3 * row];
-        for (angles, slack) in self.angles.iter().zip(self.slack.chunks_exact_mut(self.phases.len())) {
+        let mut far = vec![-1.0_f32; flat.spheres.len() * cells.middles.len()];
+        let segments =
+            self.angles.iter().zip(self.sweeps).zip(self.slack.chunks_exact_mut(self.phases.len()));
+        for ((angles, sweep), slack) in segments {
+            if !limits.sums {
+                arm.scout(lanes, (flat, limits), (angles, *sweep), (cells, &mut far));
+            }
             let (slacks, _) = S::as_mut_simd_f32s(slack);
             let [x, y, z] = rows(&mut tips, row);
             let ((xs, _), (ys, _), (zs, _)) =
                 (S::as_mut_simd_f32s(x), S::as_mut_simd_f32s(y), S::as_mut_simd_f32s(z));
-            for ((((phase, slack), x), y), z) in phases.iter().zip(slacks).zip(xs).zip(ys).zip(zs) {
-                arm.place(lanes, self.flat, angles, *phase);
-                *slack = arm.slack(lanes, self.flat, self.limits);
+            let poses = phases.iter().zip(slacks).enumerate();
+            for ((((block, (phase, slack)), x), y), z) in poses.zip(xs).zip(ys).zip(zs) {
+                arm.place(lanes, flat, angles, *phase);
+                *slack = arm.slack(lanes, (flat, limits), &far, block);
                 least = lanes.min(least, *slack);
-                [*x, *y, *z] = arm.tip(lanes, self.flat);
+                [*x, *y, *z] = arm.tip(lanes, flat);
             }
             length_m += f64::from(path_m(lanes, &mut tips, row));
         }
@@ -173,9 +203,67 @@ impl<S: Simd> Arm<S> {
         [x, y, z]
     }
 
-    /// How far beyond its limit the nearest sphere is, in a measure that is below 0 when it may be inside.
+    /// Looks at the middle of each cell, for each sphere: `far` is above 0 where the whole cell is surely free of it.
+    ///
+    /// Within a cell nothing moves further from the middle than the cell's half of the segment's sweep: joint j
+    /// moves what it turns by its angle times its reach at most.
     #[inline(always)]
-    fn slack(&mut self, lanes: Lanes<S>, flat: &Flat, limits: &Limits) -> Vector<S> {
+    fn scout(
+        &mut self,
+        lanes: Lanes<S>,
+        (flat, limits): (&Flat, &Limits),
+        (angles, sweep): (&Angles, Sweep),
+        (cells, far): (&Cells, &mut [f32]),
+    ) {
+        let (middles, halves) = (S::as_simd_f32s(&cells.middles).0, S::as_simd_f32s(&cells.halves).0);
+        for (i, (middle, half)) in middles.iter().zip(halves).enumerate() {
+            self.place(lanes, flat, angles, *middle);
+            self.stretch(lanes, flat);
+            let spheres = flat.spheres.iter().zip(&limits.spheres);
+            for ((sphere, limit), row) in spheres.zip(far.chunks_exact_mut(cells.middles.len())) {
+                let reach = lanes.mul_add(*half, lanes.all(sweep), lanes.all(limit.distance));
+                let nearest = self.nearest(lanes, flat, sphere, None);
+                if let Some(slot) = S::as_mut_simd_f32s(row).0.get_mut(i) {
+                    *slot = lanes.sub_mul(reach, reach, nearest);
+                }
+            }
+        }
+    }
+
+    /// How far beyond its limit the nearest sphere is, in a measure that is below 0 when it may be inside. Spheres
+    /// that are far from the block's cells are not asked.
+    #[inline(always)]
+    fn slack(
+        &mut self,
+        lanes: Lanes<S>,
+        (flat, limits): (&Flat, &Limits),
+        far: &[f32],
+        block: usize,
+    ) -> Vector<S> {
+        let first = block * S::F32_LANES / CELL;
+        let behind = first + (S::F32_LANES / CELL).max(1);
+        let row = far.len() / flat.spheres.len().max(1);
+        let mut is_stretched = false;
+        let mut slack = lanes.all(f32::MAX);
+        let spheres = flat.spheres.iter().zip(&limits.spheres).zip(far.chunks_exact(row.max(1)));
+        for ((sphere, limit), far) in spheres {
+            if far.get(first..behind).is_some_and(|cells| cells.iter().all(|beyond| *beyond > 0.0)) {
+                continue;
+            }
+            if !is_stretched {
+                self.stretch(lanes, flat);
+                is_stretched = true;
+            }
+            let still = if limits.sums { Some(limit.still_m) } else { None };
+            let measure = self.nearest(lanes, flat, sphere, still);
+            slack = lanes.min(slack, lanes.sub(measure, lanes.all(limit.free_from)));
+        }
+        slack
+    }
+
+    /// Takes the links from the frames' origins.
+    #[inline(always)]
+    fn stretch(&mut self, lanes: Lanes<S>, flat: &Flat) {
         for (link, (along, share)) in flat.links.iter().zip(&mut self.along) {
             *along = lanes.sub3(self.origins[link.from + 1], self.origins[link.from]);
             *share = if let Some(per_length2) = link.per_length2 {
@@ -186,25 +274,24 @@ impl<S: Simd> Arm<S> {
                 lanes.div(lanes.all(1.0), length2)
             };
         }
-        let mut slack = lanes.all(f32::MAX);
-        for (sphere, limit) in flat.spheres.iter().zip(&limits.spheres) {
-            let center = seen_from_first(lanes, flat, self.first, sphere.center);
-            let (mut least, mut sum) = (lanes.all(f32::MAX), lanes.all(limit.still_m));
-            for (link, (along, share)) in flat.links.iter().zip(&self.along) {
-                let to_center = lanes.sub3(center, self.origins[link.from]);
-                let share = lanes.clamp_to_unit(lanes.mul(lanes.dot(to_center, *along), *share));
-                let across = lanes.against(to_center, *along, share);
-                let distance2 = lanes.dot(across, across);
-                if limits.sums {
-                    sum = lanes.add(sum, lanes.sqrt(distance2));
-                } else {
-                    least = lanes.min(least, distance2);
-                }
-            }
-            let measure = if limits.sums { sum } else { least };
-            slack = lanes.min(slack, lanes.sub(measure, lanes.all(limit.free_from)));
+    }
+
+    /// The square of a sphere's least distance to the links; their sum, where there is something to add to.
+    #[inline(always)]
+    fn nearest(&self, lanes: Lanes<S>, flat: &Flat, sphere: &FlatSphere, still: Option<f32>) -> Vector<S> {
+        let center = seen_from_first(lanes, flat, self.first, sphere.center);
+        let mut measure = lanes.all(still.unwrap_or(f32::MAX));
+        for (link, (along, share)) in flat.links.iter().zip(&self.along) {
+            let to_center = lanes.sub3(center, self.origins[link.from]);
+            let share = lanes.clamp_to_unit(lanes.mul(lanes.dot(to_center, *along), *share));
+            let across = lanes.against(to_center, *along, share);
+            let distance2 = lanes.dot(across, across);
+            measure = match still {
+                Some(_) => lanes.add(measure, lanes.sqrt(distance2)),
+                None => lanes.min(measure, distance2),
+            };
         }
-        slack
+        measure
     }
 }
 

@@ -24,6 +24,13 @@ pub(super) struct Bone {
     pub(super) tilt: Option<[f64; 2]>,
 }
 
+impl Bone {
+    /// The longer one of its shifts.
+    pub(super) fn length_m(&self) -> f64 {
+        self.next_m.norm().max(self.origin_m.norm())
+    }
+}
+
 /// A chain.
 #[derive(Clone, Debug)]
 pub(super) struct Skeleton {
@@ -76,8 +83,7 @@ impl Skeleton {
 
     /// Furthest that anything of the arm can be from the first joint, or the base frame.
     pub(super) fn reach_m(&self) -> f64 {
-        let shifts = self.bones.iter().map(|b| b.next_m.norm().max(b.origin_m.norm()));
-        shifts.sum::<f64>() + self.base_m().norm()
+        self.bones.iter().map(Bone::length_m).sum::<f64>() + self.base_m().norm()
     }
 }
 

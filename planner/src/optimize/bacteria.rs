@@ -262,12 +262,21 @@ impl<H: Heading> Colony<'_, H> {
         let Some(Swarming { attraction: [d, w_a], repulsion: [h, w_r] }) = self.parameters.swarming else {
             return 0.0;
         };
+        // Further away than this both terms are exactly 0: exp(-746) is, in f64.
+        let far2 = 746.0 / w_a.min(w_r);
         let here = &bacteria[i].at.x;
-        let terms = bacteria.iter().map(|b| {
-            let r2: f64 = b.at.x.iter().zip(here).map(|(x, y)| (x - y) * (x - y)).sum();
-            h * (-w_r * r2).exp() - d * (-w_a * r2).exp()
-        });
-        terms.sum()
+        let mut sum = 0.0;
+        'others: for other in bacteria {
+            let mut r2 = 0.0;
+            for (x, y) in other.at.x.iter().zip(here) {
+                r2 += (x - y) * (x - y);
+                if r2 > far2 {
+                    continue 'others;
+                }
+            }
+            sum += h * (-w_r * r2).exp() - d * (-w_a * r2).exp();
+        }
+        sum
     }
 
     fn decay(&self, session: &Session) -> f64 {

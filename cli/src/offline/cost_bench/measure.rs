@@ -45,8 +45,8 @@ pub(super) struct Set {
     pub(super) candidates: &'static str,
     /// How many of them collide.
     pub(super) colliding_percent: f64,
-    /// Time of one by plain f64, median.
-    pub(super) plain_us: f64,
+    /// Time of one by plain f64.
+    pub(super) plain: Time,
     /// The fast cost by levels.
     pub(super) levels: Vec<AtLevel>,
 }
@@ -56,15 +56,23 @@ pub(super) struct Set {
 pub(super) struct AtLevel {
     /// The level.
     pub(super) level: &'static str,
-    /// Time of an evaluation: median, and of the fastest batch.
-    pub(super) p50_us: f64,
-    pub(super) least_us: f64,
-    /// Median of the ratios of plain to fast, batch by batch.
+    /// Time of an evaluation.
+    pub(super) time: Time,
+    /// Ratio of the means, plain over fast.
     pub(super) times_as_fast: f64,
     /// Largest relative error of the cost.
     pub(super) relative_error: f64,
     /// Penalties or collisions that differ in any bit; there must be none.
     pub(super) differing: usize,
+}
+
+/// Times of an evaluation.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Time {
+    /// Of all timed batches: the median.
+    pub(super) p50_us: f64,
+    /// Mean over the set; each batch counts by the median of its rounds.
+    pub(super) mean_us: f64,
 }
 
 /// Whole runs of an optimiser.
@@ -77,7 +85,12 @@ pub(super) struct Runs {
     /// Time of a run: median and least.
     pub(super) median_s: f64,
     pub(super) least_s: f64,
+    /// Time that the median run had the processor; less than its time where others wanted it too.
+    pub(super) processor_s: Option<f64>,
 }
+
+/// One run: its time, its time on the processor, its evaluations.
+type OneRun = (f64, Option<f64>, usize);
 
 /// What to measure.
 pub(super) struct Options {
@@ -137,22 +150,24 @@ fn time_set(
 ) -> Result<Set, Failure> {
     let levels = Level::available();
     let fast: Vec<ControlPointCost> = levels.iter().map(|level| problem.clone().on(*level)).collect();
-    let mut plain_us = Vec::new();
-    let mut fast_us = vec![Vec::new(); levels.len()];
+    let mut rounds: Vec<Vec<f64>> = Vec::new();
     let started = Instant::now();
-    while plain_us.is_empty() || started.elapsed() < share {
-        for batch in points.chunks(BATCH) {
-            plain_us.push(time_batch(batch, |x| problem.rate_exactly(x)));
-            for (fast, us) in fast.iter().zip(&mut fast_us) {
-                us.push(time_batch(batch, |x| fast.rate(x)));
-            }
-        }
+    while rounds.is_empty() || started.elapsed() < share {
+        // Plain first, then each level, batch by batch.
+        let one = |batch: &[Vec<f64>]| {
+            let mut us = vec![time_batch(batch, |x| problem.rate_exactly(x))];
+            us.extend(fast.iter().map(|fast| time_batch(batch, |x| fast.rate(x))));
+            us
+        };
+        rounds.push(points.chunks(BATCH).flat_map(one).collect());
     }
+    let time = |way: usize| Time::of(&rounds, way, levels.len() + 1);
+    let plain = time(0);
     let exact = rated(points, |x| problem.rate_exactly(x))?;
     let colliding = exact.iter().filter(|cost| cost.collision).count();
     let mut at = Vec::with_capacity(levels.len());
-    for ((level, fast), us) in levels.iter().zip(&fast).zip(&fast_us) {
-        let ratios = plain_us.iter().zip(us).map(|(plain, fast)| plain / fast).collect();
+    for (number, (level, fast)) in levels.iter().zip(&fast).enumerate() {
+        let time = time(number + 1);
         let costs = rated(points, |x| fast.rate(x))?;
         let pairs = || exact.iter().zip(&costs);
         let differs = |(a, b): &(&PaperCost, &PaperCost)| {
@@ -160,15 +175,26 @@ fn time_set(
         };
         at.push(AtLevel {
             level: level.name(),
-            p50_us: median(us.clone()),
-            least_us: us.iter().copied().fold(f64::INFINITY, f64::min),
-            times_as_fast: median(ratios),
+            time,
+            times_as_fast: plain.mean_us / time.mean_us,
             relative_error: pairs().map(|(a, b)| (b.cost / a.cost - 1.0).abs()).fold(0.0, f64::max),
             differing: pairs().filter(differs).count(),
         });
     }
     let colliding_percent = 100.0 * colliding as f64 / points.len().max(1) as f64;
-    Ok(Set { candidates, colliding_percent, plain_us: median(plain_us), levels: at })
+    Ok(Set { candidates, colliding_percent, plain, levels: at })
+}
+
+impl Time {
+    /// The times of one of `ways` ways: a round holds each batch by every way in turn.
+    fn of(rounds: &[Vec<f64>], way: usize, ways: usize) -> Self {
+        let batches = rounds.first().map_or(0, Vec::len) / ways.max(1);
+        let of_batch = |batch: usize| -> Vec<f64> {
+            rounds.iter().filter_map(|round| round.get(batch * ways + way)).copied().collect()
+        };
+        let mean_us = (0..batches).map(|batch| median(of_batch(batch))).sum::<f64>() / batches.max(1) as f64;
+        Self { p50_us: median((0..batches).flat_map(of_batch).collect()), mean_us }
+    }
 }
 
 /// Time of one evaluation of a batch, in microseconds.
@@ -191,17 +217,25 @@ fn time_runs(robot: &Robot, parameters: Parameters, runs: usize) -> Result<Runs,
     Ok(timed((1..).take(runs).map(one).collect::<Result<_, _>>()?))
 }
 
-fn time_run(problem: &dyn Problem, parameters: Parameters, seed: u64) -> Result<(f64, usize), Failure> {
-    let started = Instant::now();
+fn time_run(problem: &dyn Problem, parameters: Parameters, seed: u64) -> Result<OneRun, Failure> {
+    let (started, had_s) = (Instant::now(), processor_s());
     let found = optimise(problem, parameters, seed)?;
-    Ok((started.elapsed().as_secs_f64(), found.progress.evaluations))
+    let processor_s = processor_s().zip(had_s).map(|(now, then)| now - then);
+    Ok((started.elapsed().as_secs_f64(), processor_s, found.progress.evaluations))
 }
 
-fn timed(mut runs: Vec<(f64, usize)>) -> Runs {
+/// Time that this thread has had the processor; `None` where the system does not say.
+fn processor_s() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let on_processor_ns: u64 = text.split_whitespace().next()?.parse().ok()?;
+    Some(Duration::from_nanos(on_processor_ns).as_secs_f64())
+}
+
+fn timed(mut runs: Vec<OneRun>) -> Runs {
     runs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (median_s, evaluations) = runs.get(runs.len() / 2).copied().unwrap_or_default();
+    let (median_s, processor_s, evaluations) = runs.get(runs.len() / 2).copied().unwrap_or_default();
     let least_s = runs.first().map_or(0.0, |run| run.0);
-    Runs { runs: runs.len(), evaluations, median_s, least_s }
+    Runs { runs: runs.len(), evaluations, median_s, least_s, processor_s }
 }
 
 fn optimise(problem: &dyn Problem, parameters: Parameters, seed: u64) -> Result<Found, Failure> {
