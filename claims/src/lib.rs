@@ -16,6 +16,7 @@ mod lab;
 mod number;
 mod paper_001;
 pub mod planners;
+mod paper_002;
 mod registry;
 mod report;
 pub mod statistics;

@@ -3,6 +3,7 @@ use crate::claim::Claim;
 use crate::figure::Figure;
 use crate::lab::{Lab, Stop};
 use crate::paper_001;
+use crate::paper_002;
 use crate::table::Table;
 
 /// A seed paper.
@@ -50,5 +51,8 @@ pub struct Experiment {
 }
 
 /// Every experiment, in the order of the papers.
-pub const EXPERIMENTS: &[Experiment] =
-    &[Experiment { paper: 1, name: "benchmark functions", run: paper_001::benchmarks::run }];
+pub const EXPERIMENTS: &[Experiment] = &[
+    Experiment { paper: 1, name: "benchmark functions", run: paper_001::benchmarks::run },
+    Experiment { paper: 2, name: "scenes with and without traps", run: paper_002::journeys::run },
+    Experiment { paper: 2, name: "four robots", run: paper_002::robots::run },
+];

@@ -1,0 +1,72 @@
+//! The scenes with paths and virtual obstacles.
+use super::Way;
+use super::journeys::Visit;
+use crate::chart::{Curve, Filled, Panel, Point, palette};
+use crate::figure::Figure;
+use std::f64::consts::TAU;
+use taustream_planner::papers::planar::{Journey, Obstacle, Shape};
+
+/// Corners of a circle.
+const CORNERS: u32 = 48;
+/// Radius at which a virtual obstacle is drawn (cm).
+const VIRTUAL_CM: f64 = 2.0;
+
+/// A picture with a panel for each scene: the first run of each way.
+pub(super) fn figures(visits: &[Visit]) -> Vec<Figure> {
+    let panels: Vec<Panel> = visits.iter().map(panel).collect();
+    let title = "Paper 002: first run of each way; purple: virtual obstacles of RBF";
+    vec![Figure::of("002-scenes.svg", title, 2, &panels)]
+}
+
+fn panel(visit: &Visit) -> Panel {
+    let mut panel = Panel::new(&format!("{}: x (cm)", visit.scene.name), "y (cm)");
+    panel.is_map = true;
+    for obstacle in &visit.scene.obstacles {
+        outline(&mut panel, obstacle);
+    }
+    for (way, journeys) in Way::ALL.iter().zip(&visit.journeys) {
+        if let Some(journey) = journeys.first() {
+            paths(&mut panel, *way, journey);
+        }
+    }
+    panel
+}
+
+fn outline(panel: &mut Panel, obstacle: &Obstacle) {
+    match &obstacle.shape {
+        Shape::Disc { centre_cm, radius_cm } => {
+            let points = circle(*centre_cm, *radius_cm);
+            panel.filled.push(Filled { points, colour: palette(7), opacity: 0.3 });
+        }
+        Shape::Walls { corners_cm } => {
+            let points = corners_cm.iter().map(|c| (c[0], c[1])).collect();
+            panel.curves.push(curve(String::new(), 7, 3, points));
+        }
+    }
+}
+
+fn paths(panel: &mut Panel, way: Way, journey: &Journey) {
+    let colour = Way::ALL.iter().position(|w| *w == way).unwrap_or(0);
+    for (i, path) in journey.paths_cm.iter().enumerate() {
+        let label = if i == 0 { way.name().to_owned() } else { String::new() };
+        panel.curves.push(curve(label, colour, 1, path.iter().map(|p| (p[0], p[1])).collect()));
+    }
+    if way == Way::Robust {
+        for made in &journey.virtuals {
+            let points = circle(made.centre_cm, VIRTUAL_CM);
+            panel.filled.push(Filled { points, colour: palette(4), opacity: 0.8 });
+        }
+    }
+}
+
+fn curve(label: String, colour: usize, width_px: u32, points: Vec<Point>) -> Curve {
+    Curve { label, colour: palette(colour), width_px, opacity: 1.0, points }
+}
+
+fn circle(centre: [f64; 2], radius: f64) -> Vec<Point> {
+    let at = |i: u32| {
+        let (sin, cos) = (TAU * f64::from(i) / f64::from(CORNERS)).sin_cos();
+        (centre[0] + radius * cos, centre[1] + radius * sin)
+    };
+    (0..CORNERS).map(at).collect()
+}
