@@ -14,6 +14,7 @@ mod claim;
 mod figure;
 mod lab;
 mod number;
+mod paper_000;
 mod paper_001;
 pub mod planners;
 mod paper_002;

@@ -2,6 +2,7 @@
 use crate::claim::Claim;
 use crate::figure::Figure;
 use crate::lab::{Lab, Stop};
+use crate::paper_000;
 use crate::paper_001;
 use crate::paper_002;
 use crate::table::Table;
@@ -52,6 +53,12 @@ pub struct Experiment {
 
 /// Every experiment, in the order of the papers.
 pub const EXPERIMENTS: &[Experiment] = &[
+    Experiment { paper: 0, name: "interpolators", run: paper_000::profiles::run },
+    Experiment { paper: 0, name: "equations at their word", run: paper_000::errata::run },
+    Experiment { paper: 0, name: "case 1", run: paper_000::cases::case_1 },
+    Experiment { paper: 0, name: "case 2", run: paper_000::cases::case_2 },
+    Experiment { paper: 0, name: "three planners", run: paper_000::planners::run },
+    Experiment { paper: 0, name: "number of control points", run: paper_000::count::run },
     Experiment { paper: 1, name: "benchmark functions", run: paper_001::benchmarks::run },
     Experiment { paper: 2, name: "scenes with and without traps", run: paper_002::journeys::run },
     Experiment { paper: 2, name: "four robots", run: paper_002::robots::run },

@@ -104,9 +104,12 @@ impl<'a> PathProblem<'a> {
             let inner = corners.iter().skip(1).take(CONTROL_POINTS);
             inner.flat_map(|c| c.iter().take(joints).copied()).collect()
         };
-        let seeded = flat(&with_control_points(path));
+        let seeded = flat(&with_control_points(path, CONTROL_POINTS));
         let mut draw = Draw::new(seed, 1);
-        let mut guesses = vec![seeded.clone(), flat(&with_control_points(&[self.start_rad, self.goal_rad]))];
+        let mut guesses = vec![
+            seeded.clone(),
+            flat(&with_control_points(&[self.start_rad, self.goal_rad], CONTROL_POINTS)),
+        ];
         for _ in 0..SCATTERED {
             guesses.push(seeded.iter().map(|x| x + draw.within(-SCATTER_RAD, SCATTER_RAD)).collect());
         }
@@ -154,14 +157,14 @@ impl Problem for PathProblem<'_> {
     }
 }
 
-/// The same path with exactly three inner corners: the longest segments are halved, or the corner whose removal
-/// changes least goes.
-fn with_control_points(path: &[JointArray]) -> Vec<JointArray> {
+/// The same path with a number of inner corners: the longest segments are halved, or the corner whose removal changes
+/// least goes.
+pub(crate) fn with_control_points(path: &[JointArray], count: usize) -> Vec<JointArray> {
     let distance = |a: &JointArray, b: &JointArray| -> f64 {
         a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
     };
     let mut corners = path.to_vec();
-    while corners.len() < CONTROL_POINTS + 2 {
+    while corners.len() < count + 2 {
         let longest = (1..corners.len())
             .max_by(|a, b| {
                 let length = |i: usize| distance(&corners[i - 1], &corners[i]);
@@ -170,7 +173,7 @@ fn with_control_points(path: &[JointArray]) -> Vec<JointArray> {
             .unwrap_or(1);
         corners.insert(longest, Space::between(&corners[longest - 1], &corners[longest], 0.5));
     }
-    while corners.len() > CONTROL_POINTS + 2 {
+    while corners.len() > count + 2 {
         let detour = |i: usize| {
             distance(&corners[i - 1], &corners[i]) + distance(&corners[i], &corners[i + 1])
                 - distance(&corners[i - 1], &corners[i + 1])
@@ -191,7 +194,7 @@ mod tests {
             let path: Vec<JointArray> = (0..corners)
                 .map(|i| std::array::from_fn(|j| (f64::from(i) * (j as f64 + 1.0)).sin()))
                 .collect();
-            let five = with_control_points(&path);
+            let five = with_control_points(&path, CONTROL_POINTS);
             assert_eq!(five.len(), CONTROL_POINTS + 2);
             assert_eq!((five.first(), five.last()), (path.first(), path.last()));
         }

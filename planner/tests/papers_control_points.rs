@@ -3,6 +3,7 @@
 mod common;
 use common::{pose, ur5};
 use taustream_planner::optimize::{End, Found, Parallel, Problem, Progress, Run, Setup, by_name};
+use taustream_planner::papers::control_point_count::Growth;
 use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
 use taustream_planner::{CostModel, paper_cost};
 
@@ -70,5 +71,43 @@ fn paper_problem_is_improved_by_its_methods_alike_on_any_number_of_threads() {
         assert_eq!(found, spread, "{method}");
         let first = go(method, &problem).progress;
         assert!(found.end != End::Cut && found.cost < 1e9 && first == found.progress, "{method}: {found:?}");
+    }
+}
+
+/// Goal: the criterion takes one control point where the straight line is free, more where it pays, and never an answer
+/// that is dearer than one it left out by more than what it asks another to save.
+#[test]
+fn growth_takes_as_many_control_points_as_pay() {
+    let (robot, model) = (ur5(), CostModel::default());
+    let greedy = by_name("greedy-bfoa", Setup::default()).expect("registered");
+    let growth = Growth { control_points_max: 4, evaluations_each: 150, saves: 0.02 };
+    let mut counts = Vec::new();
+    for seed in 0..8 {
+        let case = case(seed);
+        let problem = |count: usize| case.problem(&robot, count, model);
+        let chosen = growth.choose(&problem, greedy.as_ref(), 1, &|| false).expect("sane");
+        let one = problem(1).expect("sane");
+        let straight = one.rate_exactly(&one.straight()).expect("rated");
+        assert!(chosen.cost <= straight.cost + 1e-6, "seed {seed}: dearer than the straight line");
+        let own = problem(chosen.control_points).expect("sane").rate_exactly(&chosen.x).expect("rated");
+        assert!((own.cost - chosen.cost).abs() <= 0.0 && own.collision == chosen.collides, "seed {seed}");
+        assert!(chosen.evaluations <= 150 * 4, "seed {seed}");
+        if !straight.collision {
+            // Its joint travel is the least there is, and the rest of the cost is small beside it.
+            assert_eq!((chosen.control_points, chosen.collides), (1, false), "seed {seed}");
+            assert!(chosen.evaluations <= 300, "seed {seed}: went on though nothing paid");
+        }
+        counts.push(chosen.control_points);
+        assert_eq!(growth.choose(&problem, greedy.as_ref(), 1, &|| false).expect("sane"), chosen);
+    }
+    assert!(counts.iter().any(|c| *c == 1) && counts.iter().any(|c| *c > 1), "{counts:?}");
+    let case = case(0);
+    let problem = |count: usize| case.problem(&robot, count, model);
+    for bad in [
+        Growth { control_points_max: 0, ..growth },
+        Growth { evaluations_each: 0, ..growth },
+        Growth { saves: f64::NAN, ..growth },
+    ] {
+        assert!(bad.choose(&problem, greedy.as_ref(), 1, &|| false).is_err(), "{bad:?}");
     }
 }

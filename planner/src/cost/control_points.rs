@@ -74,7 +74,8 @@ impl<'a> ControlPointCost<'a> {
     }
 
     /// Start, control points and goal of a decision vector; `None` when it is none.
-    fn corners(&self, x: &[f64]) -> Option<Vec<JointArray>> {
+    #[must_use]
+    pub fn corners(&self, x: &[f64]) -> Option<Vec<JointArray>> {
         if x.len() != self.bounds_rad.len() || x.iter().any(|q| !q.is_finite()) {
             return None;
         }
@@ -149,6 +150,12 @@ impl<'a> ControlPointCost<'a> {
         });
         let strokes: Vec<Stroke> = strokes.collect();
         Trajectory::new(self.robot.joints.len(), self.ends_rad[0], &strokes).ok()
+    }
+
+    /// How many joints the arm has.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.robot.joints.len()
     }
 
     /// The straight joint-space line as a decision vector: control points evenly along it.

@@ -3,6 +3,7 @@
 //! The methods are in [`crate::optimize`]; here are the problems they are tried on, and the papers' own ways of using
 //! them. Nothing here moves an arm: motions for metal come from [`crate::plan()`].
 pub mod benchmarks;
+pub mod control_point_count;
 pub mod control_points;
 mod linear;
 pub mod planar;

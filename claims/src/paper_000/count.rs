@@ -1,0 +1,119 @@
+//! The paper's first wish: a criterion for the number of control points, held against fixed numbers.
+use super::contenders::GREEDY;
+use super::{Unit, case, ours, refused, ur5};
+use crate::claim::Claim;
+use crate::lab::{Lab, Stop};
+use crate::number::figures;
+use crate::registry::Outcome;
+use crate::statistics::{Summary, wilcoxon};
+use crate::table::{Cell, Table};
+use taustream_planner::optimize::{End, Parameters, Progress, Reading, Run};
+use taustream_planner::papers::control_point_count::{Chosen, Growth};
+
+const RUNS: usize = 60;
+const QUICK_EVALUATIONS: usize = 40;
+/// Fixed numbers of control points; the paper's is 3.
+const FIXED: std::ops::RangeInclusive<usize> = 1..=6;
+
+/// What one way of choosing brought: cost and whether it collides.
+type Brought = (f64, bool);
+
+struct Scene {
+    chosen: Chosen,
+    fixed: Vec<Brought>,
+}
+
+/// Runs them.
+pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+    let runs = lab.runs(RUNS, 2).min(RUNS);
+    lab.say(&format!("  the number of control points, {runs} scenes .."));
+    let scenes = lab.each(runs, |run| one(lab, run))?;
+    let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
+    let Growth { control_points_max, evaluations_each, saves } = growth(lab);
+    outcome.ours.push(format!(
+        "greedy BFOA, case 1's numbers; from one control point upwards, {evaluations_each} evaluations each, until another \
+         saves less than {} % of the cost of a free path, {control_points_max} at most; fixed numbers get as many evaluations \
+         as the criterion took in the same scene, and begin with the straight line too",
+        figures(100.0 * saves)
+    ));
+    let criterion: Vec<Brought> = scenes.iter().map(|s| (s.chosen.cost, s.chosen.collides)).collect();
+    let columns = [
+        "",
+        "control points",
+        "free of collision",
+        "cost of the free ones",
+        "criterion less:more",
+        "evaluations",
+    ];
+    let note = "Costs with L in m; median [quartiles]. The signed-rank test is over all scenes, collisions included.";
+    let mut table = Table::new("The number of control points", "cost J_c", note, &columns);
+    let evaluations = Summary::of(&scenes.iter().map(|s| s.chosen.evaluations as f64).collect::<Vec<_>>());
+    let counts = Summary::of(&scenes.iter().map(|s| s.chosen.control_points as f64).collect::<Vec<_>>());
+    table.row("criterion", row(Cell::Median(counts), &criterion, Cell::None, Cell::Mean(evaluations)));
+    let (mut never_worse, mut words) = (true, Vec::new());
+    for (i, count) in FIXED.enumerate() {
+        let fixed: Vec<Brought> = scenes.iter().filter_map(|s| s.fixed.get(i).copied()).collect();
+        let test = wilcoxon(&costs(&criterion), &costs(&fixed));
+        let worse = wilcoxon(&costs(&fixed), &costs(&criterion)).is_less();
+        never_worse &= !worse;
+        words.push(format!("M = {count}: {} less, {} more, p = {}", test.less, test.more, figures(test.p)));
+        table.row(
+            format!("fixed, M = {count}"),
+            row(Cell::Number(count as f64), &fixed, Cell::Test(test), Cell::Mean(evaluations)),
+        );
+    }
+    outcome.tables.push(table);
+    let rule =
+        "no fixed number from 1 to 6 is better by the signed-rank test at 5 %, at the same evaluations";
+    let says =
+        "Wish of section 6: a criterion finds the best number of control points (ours: grow while it pays)";
+    outcome.claims.push(Claim::judged(says, rule, never_worse, words.join("; ")));
+    Ok(outcome)
+}
+
+fn growth(lab: &Lab) -> Growth {
+    let ours = Growth::OURS;
+    Growth { evaluations_each: lab.choose(ours.evaluations_each, QUICK_EVALUATIONS), ..ours }
+}
+
+fn one(lab: &Lab, run: usize) -> Result<Scene, Stop> {
+    let robot = ur5()?;
+    let case = case(lab, &robot, run)?;
+    let model = Unit::Metres.model(Reading::Corrected);
+    let problem = |count: usize| case.problem(&robot, count, model);
+    let optimizer = (GREEDY.make)(Parameters::CASE_1);
+    let is_over = || lab.is_over();
+    let chosen = growth(lab).choose(&problem, optimizer.as_ref(), lab.seed(run), &is_over);
+    let chosen = chosen.map_err(|e| Stop::Refused(e.to_string()))?;
+    let mut fixed = Vec::new();
+    for count in FIXED {
+        let problem = problem(count).map_err(refused)?;
+        let guesses = [problem.straight()];
+        let mut watch = |_: &Progress| ();
+        let evaluations_max = chosen.evaluations;
+        let run = Run {
+            seed: lab.seed(run),
+            evaluations_max,
+            guesses: &guesses,
+            is_over: &is_over,
+            watch: &mut watch,
+        };
+        let found = optimizer.minimise(&problem, run)?;
+        if found.end == End::Cut {
+            return Err(Stop::Interrupted);
+        }
+        let collides = problem.rate_exactly(&found.x).is_none_or(|c| c.collision);
+        fixed.push((found.cost, collides));
+    }
+    Ok(Scene { chosen, fixed })
+}
+
+fn costs(brought: &[Brought]) -> Vec<f64> {
+    brought.iter().map(|(cost, _)| *cost).collect()
+}
+
+fn row(count: Cell, brought: &[Brought], test: Cell, evaluations: Cell) -> Vec<Cell> {
+    let free: Vec<f64> = brought.iter().filter(|(_, collides)| !collides).map(|(cost, _)| *cost).collect();
+    let cost = if free.is_empty() { Cell::None } else { Cell::Median(Summary::of(&free)) };
+    vec![count, Cell::Share { count: free.len(), of: brought.len() }, cost, test, evaluations]
+}

@@ -1,0 +1,75 @@
+//! Joint space as the paper's collision test sees it, for a tree to grow in.
+use crate::lab::Lab;
+use std::cell::Cell;
+use std::f64::consts::PI;
+use taustream_arm::{Robot, Scene};
+use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::CostModel;
+use taustream_planner::cost::ControlPointCost;
+use taustream_planner::draw::Draw;
+use taustream_planner::optimize::Reading;
+use taustream_planner::tree::Field;
+
+/// Length of an edge of the tree, and between two poses of it that are checked (rad).
+pub(super) const STEP_RAD: f64 = 0.4;
+pub(super) const CHECKED_RAD: f64 = 0.02;
+
+/// The space of one scene.
+pub(super) struct PaperField<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) scene: &'a Scene,
+    pub(super) checks: Cell<usize>,
+    pub(super) lab: &'a Lab<'a>,
+}
+
+impl Field for PaperField<'_> {
+    fn step(&self) -> f64 {
+        STEP_RAD
+    }
+
+    fn distance(&self, a: &JointArray, b: &JointArray) -> f64 {
+        distance_rad(a, b)
+    }
+
+    fn is_edge_free(&self, a: &JointArray, b: &JointArray) -> bool {
+        let steps = (distance_rad(a, b) / CHECKED_RAD).ceil().clamp(1.0, 1e4);
+        let poses = (1..=10_000).map(f64::from).take_while(|i| *i <= steps);
+        let mut poses = poses.map(|i| std::array::from_fn(|j| a[j] + i / steps * (b[j] - a[j])));
+        poses.all(|pose| {
+            self.checks.set(self.checks.get() + 1);
+            !touches(self.robot, self.scene, &pose, Reading::Corrected)
+        })
+    }
+
+    fn checks(&self) -> usize {
+        self.checks.get()
+    }
+
+    fn is_over(&self) -> bool {
+        self.lab.is_over()
+    }
+
+    fn draw_pose(&self, draw: &mut Draw) -> JointArray {
+        random_pose(self.robot, draw)
+    }
+}
+
+/// Uniform in ±π.
+pub(super) fn random_pose(robot: &Robot, draw: &mut Draw) -> JointArray {
+    let mut pose = [0.0; MAX_JOINTS];
+    pose.iter_mut().take(robot.joints.len()).for_each(|q| *q = draw.within(-PI, PI));
+    pose
+}
+
+/// Euclidean distance of two poses.
+pub(super) fn distance_rad(a: &JointArray, b: &JointArray) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
+/// One pose by the paper's test in a reading.
+pub(super) fn touches(robot: &Robot, scene: &Scene, pose: &JointArray, reading: Reading) -> bool {
+    let model = CostModel { waypoints_per_segment: 1, reading, ..CostModel::default() };
+    let still = ControlPointCost::new(robot, scene, [*pose; 2], 1, model);
+    let rated = still.ok().and_then(|c| c.rate_exactly(&pose[..robot.joints.len()]));
+    rated.is_none_or(|cost| cost.collision)
+}

@@ -1,0 +1,263 @@
+//! Section 5.3: IBFOA-Tau-J*, BFOA-Tau-J and RRT on the same scenes, and what their motions ask of an arm.
+use super::contenders::{BFOA, Contender, IBFOA};
+use super::course::follow;
+use super::paper_field::{CHECKED_RAD, PaperField, STEP_RAD};
+use super::pictures::views;
+use super::way::{Way, Worth};
+use super::{K, SEGMENT_S, Unit, case, ours, refused, ur5};
+use crate::chart::Panel;
+use crate::claim::{Claim, better};
+use crate::figure::Figure;
+use crate::lab::{Lab, Stop};
+use crate::registry::Outcome;
+use crate::statistics::Summary;
+use crate::table::{Cell, Table};
+use crate::trial::Sample;
+use std::cell::Cell as Count;
+use taustream_arm::Robot;
+use taustream_motion::profile::{Profile, TauJ, TauJStar};
+use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::CostModel;
+use taustream_planner::draw::Draw;
+use taustream_planner::optimize::{Parameters, Reading};
+use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_planner::tree::rrt;
+
+const RUNS: usize = 100;
+const QUICK_EVALUATIONS: usize = 200;
+/// Most way points of a tree's path that its rating takes.
+const WAY_POINTS_MAX: usize = 100;
+
+/// The paper's three.
+const WAYS: [&str; 3] = ["IBFOA-Tau-J*", "BFOA-Tau-J", "RRT"];
+
+/// What the three found in one scene; a tree may find nothing.
+struct Run {
+    case: Case,
+    found: [Option<(Way, Worth)>; 3],
+}
+
+/// Runs them.
+pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+    let robot = ur5()?;
+    let runs = lab.runs(RUNS, 2);
+    lab.say(&format!("  IBFOA-Tau-J*, BFOA-Tau-J, RRT, {runs} scenes .."));
+    let all = lab.each(runs, |run| one(lab, &robot, run))?;
+    let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
+    outcome.ours.push(format!(
+        "RRT: steps of {STEP_RAD} rad, poses checked every {CHECKED_RAD} rad, 5 % of the poses are the goal, as many poses \
+         as the bacteria's evaluations have; its way is timed by Tau-J* strokes that share the paper's 24 s for equal peaks of the jerk"
+    ));
+    outcome.tables.push(table(&all));
+    outcome.claims = claims(&robot, &all);
+    outcome.figures = figures(&robot, &all);
+    Ok(outcome)
+}
+
+fn one(lab: &Lab, robot: &Robot, run: usize) -> Result<Run, Stop> {
+    let case = case(lab, robot, run)?;
+    let profiles: [Box<dyn Profile + Send>; 3] = [
+        Box::new(TauJStar::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
+        Box::new(TauJ::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
+        Box::new(TauJStar::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
+    ];
+    let (ibfoa, evaluations) = bacteria(lab, robot, &case, &IBFOA, run)?;
+    let (bfoa, _) = bacteria(lab, robot, &case, &BFOA, run)?;
+    let field = PaperField { robot, scene: &case.scene, checks: Count::new(0), lab };
+    let checks_max = evaluations * poses();
+    let [start, goal] = &case.ends_rad;
+    let tree = rrt(&field, start, goal, checks_max, &mut Draw::new(lab.seed(run), 7)).path;
+    if lab.is_over() {
+        return Err(Stop::Interrupted);
+    }
+    let ways = [Some(ibfoa), Some(bfoa), tree.filter(|p| p.len() <= WAY_POINTS_MAX)];
+    let mut found = [None, None, None];
+    for ((found, corners), profile) in found.iter_mut().zip(ways).zip(profiles) {
+        if let Some(corners) = corners {
+            let way = Way { corners, profile };
+            let worth = way.worth(robot, &case.scene)?;
+            *found = Some((way, worth));
+        }
+    }
+    Ok(Run { case, found })
+}
+
+/// Poses of one evaluation.
+fn poses() -> usize {
+    CostModel::default().waypoints_per_segment * (CONTROL_POINTS + 1) + 1
+}
+
+fn bacteria(
+    lab: &Lab,
+    robot: &Robot,
+    case: &Case,
+    contender: &Contender,
+    run: usize,
+) -> Result<(Vec<JointArray>, usize), Stop> {
+    let model = Unit::Metres.model(Reading::Corrected);
+    let problem = case.problem(robot, CONTROL_POINTS, model).map_err(refused)?;
+    let budget = lab.choose(usize::MAX, QUICK_EVALUATIONS);
+    let course = follow(lab, (contender.make)(Parameters::CASE_1).as_ref(), &problem, lab.seed(run), budget)?;
+    let corner = |x: &[f64]| {
+        let mut corner = [0.0; MAX_JOINTS];
+        corner.iter_mut().zip(x).for_each(|(c, x)| *c = *x);
+        corner
+    };
+    let [start, goal] = case.ends_rad;
+    let inner = course.found.x.chunks(robot.joints.len()).map(corner);
+    let corners = std::iter::once(start).chain(inner).chain([goal]).collect();
+    Ok((corners, course.found.progress.evaluations))
+}
+
+fn worths(all: &[Run], way: usize) -> Vec<Worth> {
+    all.iter().filter_map(|r| r.found.get(way)?.as_ref().map(|(_, w)| *w)).collect()
+}
+
+fn table(all: &[Run]) -> Table {
+    let columns = [
+        "",
+        "free of collision",
+        "path of the tip (m)",
+        "joint travel (rad)",
+        "clearance of the links' axes (m)",
+        "peak velocity (rad/s)",
+        "peak acceleration (rad/s²)",
+        "peak jerk (rad/s³)",
+        "jump of the jerk at a corner (rad/s³)",
+    ];
+    let note = format!(
+        "{} scenes, median [quartiles] of what was found; clearance from the spheres' surfaces, at most 1 m; 0.1 m is asked \
+         for. Between control points both strokes follow the same straight joint lines: their paths differ by what was \
+         optimised only.",
+        all.len()
+    );
+    let mut table = Table::new("Three planners", "", &note, &columns);
+    for (way, name) in WAYS.into_iter().enumerate() {
+        let worths = worths(all, way);
+        let free = worths.iter().filter(|w| !w.cost.collision).count();
+        let mut cells = vec![Cell::Share { count: free, of: all.len() }];
+        let mut median = |figure: &dyn Fn(&Worth) -> f64| {
+            let values: Vec<f64> = worths.iter().map(figure).collect();
+            cells.push(if values.is_empty() { Cell::None } else { Cell::Median(Summary::of(&values)) });
+        };
+        median(&|w| w.cost.path_length_m);
+        median(&|w| w.cost.joint_travel_rad);
+        median(&|w| w.clearance_m);
+        for order in 0..4 {
+            median(&|w| w.peaks[order]);
+        }
+        table.row(name, cells);
+    }
+    table
+}
+
+fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
+    let free = |way: usize| worths(all, way).iter().filter(|w| !w.cost.collision).count();
+    // Pairs: scenes in which both found something free.
+    let compare = |other: usize, figure: fn(&Worth) -> f64| -> (bool, String) {
+        let pairs = all.iter().filter_map(|run| {
+            let of = |way: usize| run.found.get(way)?.as_ref().map(|(_, w)| w).filter(|w| !w.cost.collision);
+            Some((figure(of(0)?), figure(of(other)?)))
+        });
+        let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs.unzip();
+        if ours.is_empty() {
+            return (false, format!("no scene in which both {} and {} are free", WAYS[0], WAYS[other]));
+        }
+        better(WAYS[0], &Sample::of(ours), WAYS[other], &Sample::of(theirs))
+    };
+    let against_both = |says: &str, rule: &str, figure: fn(&Worth) -> f64| {
+        let results = [1, 2].map(|other| compare(other, figure));
+        let text = results.iter().map(|(_, text)| text.clone()).collect::<Vec<_>>().join("; ");
+        Claim::judged(says, rule, results.iter().all(|(holds, _)| *holds), text)
+    };
+    vec![
+        Claim::judged(
+            "All three find collision-free trajectories",
+            "in every scene, by the least distance of the links to the spheres",
+            (0..3).all(|way| free(way) == all.len()),
+            (0..3)
+                .map(|way| format!("{} {} of {}", WAYS[way], free(way), all.len()))
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+        against_both(
+            "IBFOA-Tau-J* finds the shortest path of the tip",
+            "shorter than both others' by the signed-rank test at 5 %, in scenes where both are free",
+            |w| w.cost.path_length_m,
+        ),
+        against_both(
+            "IBFOA-Tau-J*'s motion is the most compliant: no jump of the jerk at control points",
+            "the largest jump is less than both others' by the signed-rank test at 5 % (our RRT is timed by Tau-J* too)",
+            |w| w.peaks[3],
+        ),
+        against_both(
+            "IBFOA-Tau-J*'s motion is the most compliant: lowest peak of the jerk",
+            "the peak is less than both others' by the signed-rank test at 5 %",
+            |w| w.peaks[2],
+        ),
+        unbounded(robot, &worths(all, 0)),
+    ]
+}
+
+/// Whether anything keeps the motions inside an arm's limits.
+fn unbounded(robot: &Robot, worths: &[Worth]) -> Claim {
+    let limits = robot.limits();
+    let exceeds = |w: &Worth| {
+        let of = |j: usize| &limits[j].motion;
+        (0..robot.joints.len()).any(|j| {
+            w.peaks[0] > of(j).velocity_rad_s
+                || w.peaks[1] > of(j).acceleration_rad_s2
+                || w.peaks[2] > of(j).jerk_rad_s3
+        })
+    };
+    let beyond = worths.iter().filter(|w| exceeds(w)).count();
+    let [v, j] = TauJStar::new(K).map_or([f64::NAN; 2], |star| {
+        let (peaks, widest) = (star.peaks(), 2.0 * std::f64::consts::PI);
+        [widest * peaks.c_v / SEGMENT_S, widest * peaks.c_j / SEGMENT_S.powi(3)]
+    });
+    Claim::judged(
+        "Velocity, acceleration and jerk are reasonable by design: no constraints need to be evaluated",
+        "no motion of IBFOA-Tau-J* exceeds the arm's limits, and the largest step within ±π could not either",
+        beyond == 0
+            && limits
+                .iter()
+                .take(robot.joints.len())
+                .all(|l| v <= l.motion.velocity_rad_s && j <= l.motion.jerk_rad_s3),
+        format!(
+            "{beyond} of {} exceed the UR5's limits; a step of 2π asks for {} rad/s and {} rad/s³ whatever the arm: it is \
+             T = 6 s that keeps them low, not the method",
+            worths.len(),
+            crate::figures(v),
+            crate::figures(j)
+        ),
+    )
+}
+
+fn figures(robot: &Robot, all: &[Run]) -> Vec<Figure> {
+    // A scene in which all three found something says most.
+    let shown = all.iter().find(|r| r.found.iter().all(Option::is_some)).or(all.first());
+    let Some(run) = shown else { return Vec::new() };
+    let ways =
+        WAYS.iter().zip(&run.found).filter_map(|(name, f)| f.as_ref().map(|(found, _)| (*name, found)));
+    let paths: Vec<(&str, Vec<JointArray>)> =
+        ways.clone().map(|(name, f)| (name, f.corners.clone())).collect();
+    let scene = Figure::of(
+        "000-paths.svg",
+        "Paper 000: the tip's paths among the spheres",
+        2,
+        &views(robot, &run.case.scene, &paths),
+    );
+    let names = ["angle (rad)", "velocity (rad/s)", "acceleration (rad/s²)", "jerk (rad/s³)"];
+    let panels = ways.take(2).flat_map(|(name, found)| {
+        names.iter().enumerate().map(move |(order, quantity)| {
+            let mut panel = Panel::new("t (s)", &format!("{name}: {quantity}"));
+            for joint in 0..robot.joints.len() {
+                panel.line(&format!("joint {}", joint + 1), found.curve(joint, order));
+            }
+            panel
+        })
+    });
+    let panels: Vec<Panel> = panels.collect();
+    let motion = Figure::of("000-motions.svg", "Paper 000, figures 6 and 7: joints over time", 4, &panels);
+    vec![scene, motion]
+}
