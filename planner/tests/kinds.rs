@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use taustream_arm::Scene;
 use taustream_planner::optimize::{METHODS, Reading};
-use taustream_planner::{PlanError, PlanOptions, PlannerKind, plan, verify};
+use taustream_planner::{Improvement, PlanError, PlanOptions, PlannerKind, plan, verify};
 
 const DEADLINE_MS: u64 = 1_000;
 
@@ -35,6 +35,42 @@ fn every_registered_method_is_a_planner_and_words_are_unique() {
         assert_eq!(Reading::from_name(reading.name()), Some(reading));
     }
     assert_eq!(Reading::from_name("literal"), None);
+}
+
+/// Goal: what the default does with a path that it has found can only shorten the motion, whichever improvement it is;
+/// and where the clock does not cut, one seed gives one motion on any machine.
+#[test]
+fn improvements_never_lengthen_a_motion_and_repeat_without_the_clock() {
+    let (robot, scene) = (ur5(), common::scene("pillars"));
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    let found = |improvement, seed| {
+        let deadline = Duration::from_millis(200);
+        let options =
+            PlanOptions { seed, deadline, improvement, keeps_deadline: false, ..PlanOptions::default() };
+        let plan = plan(&robot, &scene, &start, &goal, &options).expect("found");
+        assert!(!plan.how.contains("cut short"), "{}", plan.how);
+        plan
+    };
+    let read = |name: &str| Improvement::from_name(name).expect("known");
+    assert!(matches!(Improvement::default(), Improvement::Method(_)), "the default improves by a method");
+    assert_eq!(Improvement::from_name("teleport"), None);
+    let mut shortened = 0;
+    for seed in 0..3 {
+        let plain = found(read("none"), seed);
+        for name in ["searches", "ibfoa", "greedy-bfoa", "iwo"] {
+            let better = found(read(name), seed);
+            let (with_s, without_s) = (better.proof.duration_s, plain.proof.duration_s);
+            assert!(with_s <= without_s, "{name}, seed {seed}: {with_s} s against {without_s} s");
+            assert!(better.checks > plain.checks, "{name}, seed {seed}: no work was done");
+            shortened += u32::from(with_s < without_s);
+            if seed == 0 {
+                let again = found(read(name), seed);
+                assert_eq!((again.trajectory, again.checks), (better.trajectory, better.checks), "{name}");
+            }
+        }
+    }
+    assert!(shortened > 0, "no improvement improved anything");
 }
 
 /// Goal: whatever the word, what comes back is a proven motion round the balls, or a refusal that says what to try;
