@@ -84,7 +84,7 @@ pub enum Improvement {
 
 impl Default for Improvement {
     fn default() -> Self {
-        Self::from_name("ibfoa").unwrap_or(Self::Nothing)
+        Self::from_name("iwo").unwrap_or(Self::Nothing)
     }
 }
 
