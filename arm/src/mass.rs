@@ -101,3 +101,48 @@ impl Weight {
 /// What moments must be.
 pub(crate) const POSSIBLE: &str =
     "moments [xx, yy, zz, xy, xz, yz] of a body: none negative, none above the sum of the two others";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Vector3};
+    use std::f64::consts::FRAC_PI_2;
+
+    fn weight(inertia_kg_m2: [f64; 6]) -> Weight {
+        Weight { mass_kg: 2.0, center_m: [0.1, 0.0, 0.0], inertia_kg_m2 }
+    }
+
+    #[test]
+    fn moments_of_bodies_are_possible_and_others_are_not() {
+        // A point, a rod, a plate, a turned plate, and a rod whose file rounds.
+        for moments in [
+            [0.0; 6],
+            [0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+            [1.0, 1.0, 2.0, 0.0, 0.0, 0.0],
+            [1.5, 1.5, 1.0, 0.5, 0.0, 0.0],
+            [0.0, 0.134, 0.133, 0.0, 0.0, 0.0],
+        ] {
+            assert!(weight(moments).is_possible(), "{moments:?}");
+        }
+        for moments in [
+            [-1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+            [1.0, 1.0, 3.0, 0.0, 0.0, 0.0],
+            [1.0, 1.0, 1.0, 2.0, 0.0, 0.0],
+            [f64::NAN, 1.0, 1.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        ] {
+            assert!(!weight(moments).is_possible(), "{moments:?}");
+        }
+    }
+
+    /// Goal: a weight that is stated in a turned frame is where and how that frame has it.
+    #[test]
+    fn weight_turns_with_the_frame_that_it_is_stated_in() {
+        let pose = Isometry3::new(Vector3::new(0.0, 0.0, 1.0), Vector3::z() * FRAC_PI_2);
+        let placed = LinkMass::placed(&weight([1.0, 2.0, 2.5, 0.0, 0.3, 0.0]), 3, (2, pose));
+        assert!((placed.center_m - Point3::new(0.0, 0.1, 1.0)).norm() < 1e-15);
+        // x becomes y, and y becomes -x.
+        let turned = Matrix3::new(2.0, 0.0, 0.0, 0.0, 1.0, 0.3, 0.0, 0.3, 2.5);
+        assert!((placed.inertia_kg_m2 - turned).norm() < 1e-15, "{}", placed.inertia_kg_m2);
+    }
+}

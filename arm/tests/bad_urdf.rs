@@ -119,6 +119,19 @@ const CASES: &[Case] = &[
         &["link root.collision[0].geometry.box.size[1] = 0.0"],
     ),
     ("two.urdf", "value=\"1.5\"", "value=\"-1.5\"", &["link arm.inertial.mass.value = -1.5"]),
+    (
+        "two.urdf",
+        "value=\"1.5\"/>",
+        "value=\"1.5\"/><inertia ixx=\"nan\"/>",
+        &["link arm.inertial.inertia.ixx", "NaN"],
+    ),
+    (
+        "two.urdf",
+        "value=\"1.5\"/>",
+        "value=\"1.5\"/><inertia ixx=\"1\" iyz=\"much\"/>",
+        &["link arm.inertial.inertia.iyz"],
+    ),
+    ("two.urdf", "value=\"1.5\"/>", "value=\"1.5\"/><inertia/><inertia/>", &["given twice"]),
     ("two.urdf", "lower=\"-2\"", "lower=\"5\"", &["joint one.limit.lower = 5.0", "at most the upper limit"]),
     ("two.urdf", "velocity=\"3\"", "velocity=\"-3\"", &["joint one.limit.velocity = -3.0"]),
     (

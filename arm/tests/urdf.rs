@@ -1,5 +1,6 @@
 //! Robots from URDF files: the chain, the geometry that hangs on it, and what is said about the rest.
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use std::fs;
 use std::path::{Path, PathBuf};
 use taustream_arm::{Robot, Shape};
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -98,6 +99,40 @@ fn geometry_of_each_link_goes_with_the_frame_that_carries_it() {
     let plinth = robot.shapes.iter().find(|shape| robot.links[shape.link] == "plinth").unwrap();
     assert!((plinth.pose.translation.vector - Vector3::new(0.0, 0.0, -0.2)).norm() < 1e-12);
     assert_eq!(robot.masses.iter().map(|m| (m.frame, m.mass_kg)).collect::<Vec<_>>(), [(0, 4.5), (4, 0.4)]);
+}
+
+#[test]
+fn moments_of_a_urdf_are_read_and_those_of_no_body_are_said_and_left_out() {
+    let robot = load("nasty.toml");
+    let moments: Vec<f64> = robot.masses.iter().map(|m| m.inertia_kg_m2.trace()).collect();
+    assert_eq!(moments.len(), 2);
+    assert!((moments[0] - 3.0).abs() < 1e-12 && moments[1] == 0.0, "{moments:?}");
+
+    let folder = std::env::temp_dir().join(format!("taustream-urdf-moments-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let urdf = fs::read_to_string(robots().join("ur5_balls.urdf")).unwrap();
+    // The upper arm's mass, and moments that no body has.
+    let odd = urdf.replacen("0.28\"/><inertia ixx=\"0.01\"", "0.28\"/><inertia ixx=\"-0.5\"", 1);
+    assert_ne!(odd, urdf);
+    fs::write(folder.join("ur5_balls.urdf"), odd).unwrap();
+    let toml = fs::read_to_string(robots().join("ur5_balls.toml")).unwrap();
+    let payload = "payload = { mass_kg = 2.5, center_m = [0.0, 0.0, 0.1] }\n";
+    let toml = format!("{payload}{toml}").replace("srdf = \"", &format!("srdf = \"{}/", robots().display()));
+    let read = Robot::from_toml(&folder.join("ur5_balls.toml"), &toml);
+    fs::remove_dir_all(&folder).unwrap();
+    let robot = read.unwrap_or_else(|faults| panic!("{faults}"));
+    assert!(robot.notices.iter().any(|n| n.contains("belong to no body")), "{:?}", robot.notices);
+    let zeros = robot.masses.iter().filter(|m| m.inertia_kg_m2.trace() == 0.0);
+    assert_eq!(
+        zeros.map(|m| m.mass_kg).collect::<Vec<_>>(),
+        [8.4, 2.5],
+        "the odd one, and the payload's point"
+    );
+    let payload = robot.masses.last().unwrap();
+    assert_eq!(
+        (payload.frame, robot.links[payload.link].clone()),
+        (6, robot.ends.clone().unwrap()[1].clone())
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod swarm;
 
 use crate::leave::is_clear;
 use crate::objective::Objective;
-use crate::optimize::{METHODS, Method, Refusal};
+use crate::optimize::{METHODS, Method, Reading, Refusal};
 use crate::plan::{
     CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, plan_until,
 };
@@ -166,7 +166,7 @@ pub fn plan_to_position(
     }
     check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
-    let reach_m = check_reach(task)?;
+    let reach_m = check_reach(task.robot, &task.target_m)?;
     let budget = Budget::of(options.deadline);
     let search = Search {
         world: &world,
@@ -183,14 +183,37 @@ pub fn plan_to_position(
     Ok(reached)
 }
 
+/// One polished run of one method: the pose, clear or not, when it is there, and the time to it from the start at full
+/// speed. What the best methods are measured by.
+///
+/// # Errors
+/// When the position is out of reach or the method's numbers make no sense.
+pub fn one_try(
+    world: &World,
+    start_rad: JointArray,
+    target_m: [f64; 3],
+    method: &'static Method,
+    seed: u64,
+) -> Result<Option<(JointArray, f64)>, PositionError> {
+    let (robot, work) = (world.robot(), Work::unbounded());
+    let reach_m = check_reach(robot, &target_m)?;
+    let reading = Reading::Corrected;
+    let search = Search { world, work: &work, start_rad, target_m, reach_m, reading };
+    let Some(rough) = search.run(method, seed)? else { return Ok(None) };
+    let target_m = Vector3::from(target_m);
+    let pose = polish(robot, &rough, &target_m);
+    let is_there = error_m(robot, &pose, &target_m) <= ERROR_M_MAX;
+    Ok(is_there.then(|| (pose, time_s(robot, &start_rad, &pose))))
+}
+
 /// An upper bound of the tip's distance to the first joint, unless the position is farther away.
-fn check_reach(task: &PositionTask) -> Result<f64, PositionError> {
-    let chain = &task.robot.chain;
+fn check_reach(robot: &Robot, target_m: &[f64; 3]) -> Result<f64, PositionError> {
+    let chain = &robot.chain;
     let first = chain.joint(0).map_or_else(Vector3::zeros, |j| j.pre.translation.vector);
     let joints = (0..chain.joints()).filter_map(|i| chain.joint(i));
     let lengths = joints.map(|j| j.pre.translation.vector.norm() + j.post.translation.vector.norm());
     let reach_m = lengths.sum::<f64>() - first.norm();
-    let distance_m = (Vector3::from(task.target_m) - first).norm();
+    let distance_m = (Vector3::from(*target_m) - first).norm();
     if distance_m > reach_m + ERROR_M_MAX {
         return Err(PositionError::TooFar { distance_m, reach_m });
     }
