@@ -197,14 +197,14 @@ fn mesh_becomes_a_hull_that_holds_its_corners_and_is_scaled_and_mirrored() {
 /// Goal: whatever decides where the arm is or what it can hit changes the digest, and nothing else does.
 #[test]
 fn digest_follows_the_meaning_of_a_urdf_and_not_its_writing() {
-    let text = std::fs::read_to_string(robots().join("ur5_balls.urdf")).unwrap();
-    let srdf = std::fs::read_to_string(robots().join("ur5_balls.srdf")).unwrap();
-    let robot = std::fs::read_to_string(robots().join("ur5_balls.toml")).unwrap();
+    let text = fs::read_to_string(robots().join("ur5_balls.urdf")).unwrap();
+    let srdf = fs::read_to_string(robots().join("ur5_balls.srdf")).unwrap();
+    let robot = fs::read_to_string(robots().join("ur5_balls.toml")).unwrap();
     let folder = std::env::temp_dir().join(format!("taustream-urdf-digest-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+    fs::create_dir_all(&folder).unwrap();
     let digest = |urdf: &str, srdf: &str| {
-        std::fs::write(folder.join("ur5_balls.urdf"), urdf).unwrap();
-        std::fs::write(folder.join("ur5_balls.srdf"), srdf).unwrap();
+        fs::write(folder.join("ur5_balls.urdf"), urdf).unwrap();
+        fs::write(folder.join("ur5_balls.srdf"), srdf).unwrap();
         Robot::from_toml(&folder.join("r.toml"), &robot)
             .unwrap_or_else(|faults| panic!("{faults}"))
             .digest_hex()
@@ -239,7 +239,7 @@ fn digest_follows_the_meaning_of_a_urdf_and_not_its_writing() {
         .replace("<link name=\"table\"/>", "<!-- Oak. -->\n<link name=\"table\"></link>\n<gazebo/>");
     assert_ne!(same, text);
     assert_eq!(digest(&same, &srdf), seen[0]);
-    std::fs::remove_dir_all(&folder).unwrap();
+    fs::remove_dir_all(&folder).unwrap();
 }
 
 /// A part of the URDF of the UR5 has the shipped rows' kinematics, seen from another zero.

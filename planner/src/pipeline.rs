@@ -75,8 +75,10 @@ fn searched(searcher: Searcher) -> String {
 
 /// What a refinement of the straight line starts from, for users.
 const LINE: &str = "the straight line";
-/// The method that looks for less cost or energy when the options name none.
-const BY_OBJECTIVE: &str = "ibfoa";
+/// The methods that look for less energy and less cost when the options choose none: the one that measured best
+/// (docs/goals.md), and the paper's.
+const BY_ENERGY: &str = "gwo";
+const BY_COST: &str = "ibfoa";
 
 /// The best verified motion so far.
 struct Best {
@@ -211,9 +213,11 @@ impl<'a> Pipeline<'a> {
 
     /// Looks for motions that are better by another measure than time.
     fn by_objective(&mut self, starts: &[(&[JointArray], &str)]) {
-        let method = match self.options.improvement {
-            Improvement::Method(method) => Some(method),
-            Improvement::Nothing | Improvement::Searches => METHODS.iter().find(|m| m.name == BY_OBJECTIVE),
+        let is_chosen = self.options.improvement != Improvement::default();
+        let method = match (self.options.improvement, self.judge.objective) {
+            (Improvement::Method(method), _) if is_chosen => Some(method),
+            (_, Objective::Energy) => METHODS.iter().find(|m| m.name == BY_ENERGY),
+            (_, Objective::Cost | Objective::Time) => METHODS.iter().find(|m| m.name == BY_COST),
         };
         if let Some(method) = method {
             self.refine_around(method, starts);

@@ -49,7 +49,7 @@ pub(crate) struct PlanArgs {
     /// the tip is turned there is left free.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) to_position: Option<Position>,
-    /// Which optimiser looks for poses at the position; without it `de` and `spso` take turns.
+    /// Which optimiser looks for poses at the position; without it those that measured best take turns.
     #[arg(long, value_name = "NAME", conflicts_with = "goal", value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
     /// Which planner.

@@ -26,11 +26,11 @@ pub use polish::{error_m, polish};
 
 /// A pose counts as there when its tip is no farther off.
 pub const ERROR_M_MAX: f64 = 1e-6;
-/// Methods that take turns: of those of the paper's table these reach it surely and soonest (docs/papers.md).
-const METHODS_IN_TURN: [&str; 2] = ["de", "spso"];
+/// Methods that take turns: once polished, these find clear poses most surely, and near ones (docs/goals.md).
+const METHODS_IN_TURN: [&str; 2] = ["ibfoa", "greedy-bfoa"];
 /// Poses that differ by less in every joint are one.
 const SAME_RAD: f64 = 1e-3;
-/// Most poses to which motions are planned.
+/// Poses to which motions are planned; more only while there is none.
 const GOALS_MAX: usize = 4;
 /// Rounding of forward kinematics, as a share of the arm's reach: a few dozen operations in f64.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -305,8 +305,8 @@ fn best_motion(
     (budget, work, cancel): (&Budget, &Work, Option<&AtomicBool>),
 ) -> Result<Reached, PositionError> {
     let (mut best, mut planned, mut failure, mut cut) = (None::<(Plan, JointArray)>, 0, None, false);
-    for goal_rad in poses.clear.iter().take(GOALS_MAX) {
-        if work.is_over() {
+    for goal_rad in &poses.clear {
+        if work.is_over() || (planned >= GOALS_MAX && best.is_some()) {
             break;
         }
         let PositionTask { robot, scene, start_rad, margin, .. } = *task;
