@@ -17,6 +17,8 @@ mod number;
 mod paper_000;
 mod paper_001;
 mod paper_002;
+mod paper_003;
+mod paper_004;
 pub mod planners;
 mod registry;
 mod report;

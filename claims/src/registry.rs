@@ -2,10 +2,8 @@
 use crate::claim::Claim;
 use crate::figure::Figure;
 use crate::lab::{Lab, Stop};
-use crate::paper_000;
-use crate::paper_001;
-use crate::paper_002;
 use crate::table::Table;
+use crate::{paper_000, paper_001, paper_002, paper_003, paper_004};
 
 /// A seed paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +58,13 @@ pub const EXPERIMENTS: &[Experiment] = &[
     Experiment { paper: 0, name: "three planners", run: paper_000::planners::run },
     Experiment { paper: 0, name: "number of control points", run: paper_000::count::run },
     Experiment { paper: 1, name: "benchmark functions", run: paper_001::benchmarks::run },
+    Experiment { paper: 1, name: "new starts on the diagonal", run: paper_001::diagonal::run },
+    Experiment { paper: 1, name: "spline", run: paper_001::spline::run },
     Experiment { paper: 2, name: "scenes with and without traps", run: paper_002::journeys::run },
     Experiment { paper: 2, name: "four robots", run: paper_002::robots::run },
+    Experiment { paper: 3, name: "the paper's own rows", run: paper_003::printed::run },
+    Experiment { paper: 3, name: "methods", run: paper_003::methods::run },
+    Experiment { paper: 3, name: "reward", run: paper_003::reward::run },
+    Experiment { paper: 4, name: "via points", run: paper_004::via::run },
+    Experiment { paper: 4, name: "energy", run: paper_004::energy::run },
 ];

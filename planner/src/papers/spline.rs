@@ -98,7 +98,7 @@ impl Spline {
         let joints = points_rad.first().map_or(0, Vec::len);
         let rest = vec![vec![0.0; joints]; 2 * ENDS];
         let given: Vec<Vec<f64>> = points_rad.iter().cloned().chain(rest).collect();
-        let solved = solve(equations(&knots, points_rad.len()), given).ok_or_else(|| {
+        let solved = solve(equations(&knots, points_rad.len(), ENDS), given).ok_or_else(|| {
             let shortest_s = intervals_s.iter().copied().fold(f64::INFINITY, f64::min);
             SplineError::Singular { shortest_s, total_s }
         })?;
@@ -172,10 +172,22 @@ fn knots(intervals_s: &[f64], total_s: f64) -> Vec<f64> {
     knots
 }
 
-/// A row a condition, a column a control point: positions, then the three derivatives at the start and at the end.
-fn equations(knots: &[f64], points: usize) -> Vec<Vec<f64>> {
-    let size = points + 2 * ENDS;
-    let mut matrix = vec![vec![0.0; size]; size];
+/// The equations of a curve when only the first `ends` derivatives (up to six) are given at each end: a row a
+/// condition, a column a control point. [`Spline::through`] gives three; the paper lists two, which are too few.
+///
+/// # Errors
+/// When the intervals make no sense.
+pub fn conditions(intervals_s: &[f64], ends: usize) -> Result<Vec<Vec<f64>>, SplineError> {
+    let points = intervals_s.len() + 1;
+    check(&vec![Vec::new(); points], intervals_s)?;
+    let knots = knots(intervals_s, intervals_s.iter().sum());
+    Ok(equations(&knots, points, ends.min(DEGREE - 1)))
+}
+
+/// A row a condition, a column a control point: positions, then the derivatives at the start and at the end.
+fn equations(knots: &[f64], points: usize, ends: usize) -> Vec<Vec<f64>> {
+    let size = points + DEGREE - 1;
+    let mut matrix = vec![vec![0.0; size]; points + 2 * ends];
     for column in 0..size {
         let mut unit = vec![0.0; size];
         unit[column] = 1.0;
@@ -183,10 +195,10 @@ fn equations(knots: &[f64], points: usize) -> Vec<Vec<f64>> {
         for point in 0..points {
             matrix[point][column] = de_boor(knots, &curves[0], DEGREE, knots[DEGREE + point]);
         }
-        for order in 1..=ENDS {
+        for order in 1..=ends {
             let inner = &knots[order..knots.len() - order];
             for (end, u) in [0.0, 1.0].into_iter().enumerate() {
-                let row = points + ENDS * end + order - 1;
+                let row = points + ends * end + order - 1;
                 matrix[row][column] = de_boor(inner, &curves[order], DEGREE - order, u);
             }
         }

@@ -1,0 +1,285 @@
+//! Table 5 and figures 4, 7 to 9: which method comes how near, how fast, at what cost.
+use super::printed::TABLE_5;
+use super::watched::{Contender, Objective, Reaching, reach};
+use crate::chart::Panel;
+use crate::claim::{Claim, better};
+use crate::figure::Figure;
+use crate::lab::{Lab, Stop};
+use crate::number::figures;
+use crate::registry::Outcome;
+use crate::statistics::{quantile, wilcoxon};
+use crate::table::{Cell, Table};
+use crate::trial::Sample;
+use taustream_planner::optimize::{De, Ga, Iepso, Pso, Reading, Setup};
+use taustream_planner::papers::reach::{FiveJointArm, Reach};
+
+/// Runs, and evaluations of the paper's 1000 generations of 40 after the first one.
+pub(super) const RUNS: usize = 30;
+pub(super) const BUDGET: usize = 40 + 40 * 1000;
+pub(super) const QUICK: usize = 4_000;
+
+/// The rows: name, which row of table 5, reading of method and objective.
+const ROWS: [(&str, Option<usize>, Reading); 9] = [
+    ("pso", Some(0), Reading::Corrected),
+    ("spso", Some(1), Reading::Corrected),
+    ("pso, inertia 0.9 to 0.4", None, Reading::Corrected),
+    ("iepso", Some(2), Reading::Printed),
+    ("iepso", Some(2), Reading::Corrected),
+    ("elimination only", None, Reading::Corrected),
+    ("exchange only", None, Reading::Corrected),
+    ("ga", Some(3), Reading::Corrected),
+    ("de", Some(4), Reading::Corrected),
+];
+/// What the corrected IEPSO is in [`ROWS`].
+const IEPSO: usize = 4;
+/// Rows that a claim compares it with: the paper's other four.
+const OTHERS: [usize; 4] = [0, 1, 7, 8];
+/// Generations at which the paper's curves of F and of the error have come to rest.
+const PRINTED_GENERATIONS: [usize; 2] = [45, 180];
+
+/// A method of the table with a schedule that fits the budget.
+pub(super) fn contender(name: &str, reading: Reading, budget: usize) -> Result<Contender, Stop> {
+    let setup = Setup { reading, evaluations: Some(budget) };
+    let population = Pso::PAPER_003.population;
+    let swarm = |constants| Pso { constants, ..Pso::standard(setup) };
+    let iepso = Iepso::set_up(setup);
+    let plain = Pso::PAPER_003.fitted(Some(budget), population);
+    let all = |optimizer| Contender { optimizer, per_generation: population };
+    Ok(match name {
+        "pso" => all(Box::new(Pso::original(setup))),
+        "spso" => all(Box::new(Pso::standard(setup))),
+        "pso, inertia 0.9 to 0.4" => all(Box::new(swarm(Iepso::CONSTANTS))),
+        "iepso" => Contender { optimizer: Box::new(iepso), per_generation: population + Iepso::REPLACED },
+        "elimination only" => Contender {
+            optimizer: Box::new(Iepso { weight: [0.0; 2], ..iepso }),
+            per_generation: population + Iepso::REPLACED,
+        },
+        "exchange only" => all(Box::new(Iepso { replaced: 0, schedule: plain, ..iepso })),
+        "ga" => all(Box::new(Ga::set_up(setup))),
+        "de" => all(Box::new(De::set_up(setup))),
+        other => return Err(Stop::Refused(format!("there is no contender named {other}"))),
+    })
+}
+
+/// All runs of one row.
+struct Ran {
+    label: String,
+    runs: Vec<Reaching>,
+}
+
+impl Ran {
+    fn sample(&self, figure: impl Fn(&Reaching) -> f64) -> Sample {
+        Sample::of(self.runs.iter().map(figure).collect())
+    }
+
+    fn cost(&self) -> Sample {
+        self.sample(|r| r.trial.found.cost)
+    }
+
+    /// Lower quartile, median and upper quartile of cost (0) or error (1) over generations.
+    fn curve(&self, which: usize) -> Vec<(f64, [f64; 3])> {
+        let generations = self.runs.iter().map(|r| r.best.len()).max().unwrap_or(0);
+        let step = (generations / 200).max(1);
+        let at = |g: usize| {
+            let here = |r: &Reaching| r.best.get(g).or(r.best.last()).map(|b| b[which]);
+            let values: Vec<f64> = self.runs.iter().filter_map(here).collect();
+            (g as f64, [0.25, 0.5, 0.75].map(|q| quantile(&values, q)))
+        };
+        (0..generations).step_by(step).map(at).collect()
+    }
+}
+
+/// Runs them.
+pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+    let (runs, budget) = (lab.runs(RUNS, 4), lab.choose(BUDGET, QUICK));
+    let mut ran = Vec::new();
+    for (name, _, reading) in ROWS {
+        let word = match (name, reading) {
+            ("iepso", Reading::Printed) => ", printed",
+            ("iepso", Reading::Corrected) => ", corrected",
+            (_, Reading::Printed | Reading::Corrected) => "",
+        };
+        lab.say(&format!("  {name}{word}, {runs} runs .."));
+        let task = FiveJointArm::task(reading);
+        let one =
+            |run| reach(lab, &contender(name, reading, budget)?, (task, Objective::Reward), run, budget);
+        ran.push(Ran { label: format!("{name}{word}"), runs: lab.each(runs, one)? });
+    }
+    let mut outcome = Outcome::default();
+    outcome.ours.push(
+        "pso: inertia 1, pulls 2; spso: constriction 0.729, 1.494; ga: tournaments of two, blend 0.5, mutation 0.1 of \
+         the box with probability 0.1; de: rand/1/bin, F 0.5, CR 0.9; iepso: four of forty replaced a generation"
+            .to_owned(),
+    );
+    outcome.tables.push(table(&ran, runs, budget));
+    outcome.figures.push(figure(&ran, runs));
+    outcome.claims = claims(&ran);
+    Ok(outcome)
+}
+
+/// The least cost that there can be: the arm is planar but for its first joint, whose angle is the target's bearing
+/// or that turned round; the reward is at most 8 j.
+fn least_cost(task: &Reach) -> f64 {
+    let [x, y, _] = task.target_m;
+    y.atan2(x).abs() / task.speed_rad_s - 8.0 * task.reward.factor
+}
+
+fn table(ran: &[Ran], runs: usize, budget: usize) -> Table {
+    let columns = [
+        "",
+        "paper, F",
+        "paper, error (mm)",
+        "F",
+        "best F",
+        "error (mm)",
+        "worst error (mm)",
+        "runs to 0.005 mm",
+        "generation to 0.005 mm",
+        "F: iepso corrected less:more",
+        "evaluations",
+    ];
+    let note = format!(
+        "{runs} runs of {budget} evaluations (1000 generations of 40 in a full run); median [quartiles]; only IEPSO \
+         has two readings"
+    );
+    let mut table = Table::new("Table 5: methods", "F in s", &note, &columns);
+    let reference = ran.get(IEPSO).map(Ran::cost);
+    for (i, (row, (_, paper, _))) in ran.iter().zip(ROWS).enumerate() {
+        let paper = paper.and_then(|p| TABLE_5.get(p));
+        let (cost, error) = (row.cost(), row.sample(|r| r.error_mm));
+        let reached: Vec<f64> = row.runs.iter().map(|r| r.generation).filter(|g| g.is_finite()).collect();
+        let test = reference.as_ref().filter(|_| i != IEPSO).map(|s| wilcoxon(&s.values, &cost.values));
+        let trials: Vec<_> = row.runs.iter().map(|r| r.trial.clone()).collect();
+        table.row(
+            row.label.clone(),
+            vec![
+                paper.map_or(Cell::None, |p| Cell::Paper(p.cost)),
+                paper.map_or(Cell::None, |p| Cell::Paper(p.error_mm)),
+                Cell::Median(cost.summary()),
+                Cell::number(cost.summary().least),
+                Cell::Median(error.summary()),
+                Cell::number(error.summary().most),
+                Cell::Share { count: reached.len(), of: row.runs.len() },
+                if reached.is_empty() { Cell::None } else { Cell::Median(Sample::of(reached).summary()) },
+                test.map_or(Cell::None, Cell::Test),
+                Cell::maybe(Sample::best(&trials).evaluations),
+            ],
+        );
+    }
+    table
+}
+
+fn figure(ran: &[Ran], runs: usize) -> Figure {
+    let mut error = Panel { is_log: true, ..Panel::new("generation", "error of the best so far (mm)") };
+    let mut above = Panel { is_log: true, ..Panel::new("generation", "F of the best so far - least F (s)") };
+    let least = least_cost(&FiveJointArm::task(Reading::Corrected));
+    for row in ran {
+        error.spread(&row.label, &row.curve(1));
+        let over: Vec<_> = row.curve(0).into_iter().map(|(g, y)| (g, y.map(|y| y - least))).collect();
+        above.spread(&row.label, &over);
+    }
+    let title = format!("Paper 003, figures 4 and 7 to 9: median and quartiles of {runs} runs");
+    Figure::of("003-convergence.svg", &title, 1, &[error, above])
+}
+
+fn claims(ran: &[Ran]) -> Vec<Claim> {
+    let Some(iepso) = ran.get(IEPSO) else { return Vec::new() };
+    let others: Vec<&Ran> = OTHERS.iter().filter_map(|i| ran.get(*i)).collect();
+    let against = |figure: fn(&Reaching) -> f64| -> (bool, String) {
+        let ours = iepso.sample(figure);
+        let verdicts: Vec<(bool, String)> =
+            others.iter().map(|o| better("iepso", &ours, &o.label, &o.sample(figure))).collect();
+        let text: Vec<String> = verdicts.iter().map(|(_, text)| text.clone()).collect();
+        (verdicts.iter().all(|(is_better, _)| *is_better), text.join("; "))
+    };
+    let rule = "IEPSO corrected, equal evaluations: median less than each of the other four by the signed-rank test at 5 %";
+    let error = against(|r| r.error_mm);
+    let generation = against(|r| r.generation);
+    let cost = against(|r| r.trial.found.cost);
+    let mut claims = vec![
+        Claim::judged("IEPSO's error is the least of the five", rule, error.0, error.1),
+        Claim::judged("IEPSO converges fastest: first within 0.005 mm", rule, generation.0, generation.1),
+        Claim::judged("IEPSO plans the most efficient motion (least F)", rule, cost.0, cost.1),
+    ];
+    claims.push(poor_swarms(ran));
+    claims.push(optimum(ran));
+    claims.push(exchange(ran));
+    claims.extend(rest(iepso));
+    claims
+}
+
+fn poor_swarms(ran: &[Ran]) -> Claim {
+    let precision_mm = 1e3 * FiveJointArm::task(Reading::Corrected).reward.threshold_m;
+    let swarms = ran.iter().zip(ROWS).filter(|(_, (name, ..))| ["pso", "spso"].contains(name));
+    let errors: Vec<(&str, f64)> =
+        swarms.map(|(r, _)| (r.label.as_str(), r.sample(|r| r.error_mm).summary().median)).collect();
+    let text: Vec<String> = errors.iter().map(|(name, e)| format!("{name} {} mm", figures(*e))).collect();
+    Claim::judged(
+        "PSO and SPSO are caught in local optima and cannot meet the precision",
+        "the median error of both is above 0.005 mm",
+        errors.iter().all(|(_, e)| *e > precision_mm),
+        text.join(", "),
+    )
+}
+
+fn optimum(ran: &[Ran]) -> Claim {
+    let least = least_cost(&FiveJointArm::task(Reading::Corrected));
+    let best = ran.iter().min_by(|a, b| a.cost().summary().least.total_cmp(&b.cost().summary().least));
+    let found = best.map_or(f64::NAN, |b| b.cost().summary().least);
+    let paper = TABLE_5.iter().map(|row| row.cost).fold(f64::INFINITY, f64::min);
+    Claim::judged(
+        "F = -16.56 is the global optimum",
+        "the printed F is within 0.05 of the least F that can be: |bearing of the target|/ω - 24",
+        (paper - least).abs() <= 0.05,
+        format!(
+            "least possible {}, least found {} by {}: {} s below the printed one",
+            figures(least),
+            figures(found),
+            best.map_or("nobody", |b| b.label.as_str()),
+            figures(paper - least)
+        ),
+    )
+}
+
+/// Does the exchange help, as printed or with its sign?
+fn exchange(ran: &[Ran]) -> Claim {
+    let find = |name: &str| ran.iter().find(|r| r.label == name).map(Ran::cost);
+    let [Some(with), Some(printed), Some(without)] =
+        ["iepso, corrected", "iepso, printed", "elimination only"].map(find)
+    else {
+        return Claim::unchecked("The exchange φ3 helps the global search", "no such runs", String::new());
+    };
+    let (by_sign, signed) = better("with sign", &with, "without φ3", &without);
+    let (by_print, as_printed) = better("as printed", &printed, "without φ3", &without);
+    Claim::judged(
+        "The exchange φ3 helps the global search",
+        "F is less than with c3 = 0 by the signed-rank test at 5 %, in either reading",
+        by_sign || by_print,
+        format!("{signed}; {as_printed}"),
+    )
+}
+
+/// When the median run's curves come to rest.
+fn rest(iepso: &Ran) -> [Claim; 2] {
+    let [cost_at, error_at] = PRINTED_GENERATIONS;
+    let median = |which: usize, g: usize| {
+        let here = |r: &Reaching| r.best.get(g).or(r.best.last()).map(|b| b[which]);
+        quantile(&iepso.runs.iter().filter_map(here).collect::<Vec<_>>(), 0.5)
+    };
+    let (then, end) = (median(0, cost_at), median(0, usize::MAX));
+    let error = median(1, error_at);
+    [
+        Claim::judged(
+            "F has converged at about generation 45 (figure 3)",
+            "the median F is then within 1 % of its end",
+            (then - end).abs() <= 0.01 * end.abs(),
+            format!("{} at generation {cost_at}, {} at the end", figures(then), figures(end)),
+        ),
+        Claim::judged(
+            "The error is zero at about generation 180 (figure 4)",
+            "the median error is then within the precision of 0.005 mm",
+            error <= 0.005,
+            format!("{} mm at generation {error_at}", figures(error)),
+        ),
+    ]
+}

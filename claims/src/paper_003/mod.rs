@@ -1,0 +1,5 @@
+//! Seed paper 003: IEPSO, reward and punishment, on a position without inverse kinematics.
+pub(crate) mod methods;
+pub(crate) mod printed;
+pub(crate) mod reward;
+mod watched;

@@ -1,0 +1,163 @@
+//! The reward by itself, and whether it helps.
+use super::methods::{BUDGET, QUICK, RUNS, contender};
+use super::watched::{Objective, Reaching, reach};
+use crate::claim::{Claim, better};
+use crate::lab::{Lab, Stop};
+use crate::number::figures;
+use crate::registry::Outcome;
+use crate::statistics::{quantile, wilcoxon};
+use crate::table::{Cell, Table};
+use crate::trial::Sample;
+use taustream_planner::optimize::Reading;
+use taustream_planner::papers::reach::{FiveJointArm, Reward};
+
+/// Ranges of the outer and of the inner reward in table 4.
+const RANGES: [[f64; 2]; 2] = [[-12.0, 0.0], [-24.0, -12.0]];
+/// The generation by which the printed run with reward is precise enough.
+const PRINTED_GENERATION: f64 = 19.0;
+/// Errors at which a reward's range is looked for.
+const SCAN: u32 = 20_000;
+
+/// Looks at it.
+pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+    let mut outcome = Outcome::default();
+    ranges(&mut outcome);
+    does_it_help(lab, &mut outcome)?;
+    Ok(outcome)
+}
+
+/// Least and highest value of a reward over errors from `from` to `to`, evenly spread over the logarithm.
+fn range(reward: &Reward, from: f64, to: f64) -> [f64; 2] {
+    let at = |i: u32| from * (to / from).powf(f64::from(i) / f64::from(SCAN));
+    let values = (0..=SCAN).map(|i| reward.of(at(i)));
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| [l.min(s), h.max(s)])
+}
+
+fn ranges(outcome: &mut Outcome) {
+    let columns = ["", "paper, least", "paper, highest", "ours, least", "ours, highest"];
+    let note = "least and highest value of eq. 17 over errors spread evenly over their logarithm";
+    let mut table = Table::new("Table 4, ranges of the rewards", "s", note, &columns);
+    let mut is_kept = Vec::new();
+    for reading in [Reading::Printed, Reading::Corrected] {
+        let reward = Reward { reading, ..Reward::PAPER_003 };
+        // The printed split is at λ = 0.99, a hundredth of the threshold.
+        let (word, split) = match reading {
+            Reading::Printed => ("printed", 0.01 * reward.threshold_m),
+            Reading::Corrected => ("corrected", reward.inner_m),
+        };
+        // Just beyond the split, which belongs to the inner one.
+        let outer = range(&reward, split * (1.0 + 1e-9), reward.threshold_m);
+        let inner = range(&reward, 1e-6 * reward.inner_m, split);
+        for ((name, [least, highest]), paper) in [("outer", outer), ("inner", inner)].into_iter().zip(RANGES)
+        {
+            // What it is short of at the ends of the scan is not a fault.
+            is_kept.push((reading, least >= paper[0] - 1e-4 && highest <= paper[1] + 1e-4, highest));
+            let label = format!("{name}, {word}: split at {} mm", figures(1e3 * split));
+            let ours = [Cell::number(least), Cell::number(highest)];
+            table.row(label, paper.map(Cell::Paper).into_iter().chain(ours).collect());
+        }
+    }
+    outcome.tables.push(table);
+    let kept = |r: Reading| is_kept.iter().filter(|(reading, ..)| *reading == r).all(|(_, kept, _)| *kept);
+    let highest = is_kept.iter().map(|(.., highest)| *highest).fold(f64::NEG_INFINITY, f64::max);
+    outcome.claims.push(Claim::judged(
+        "The rewards run from -12 to 0 and from -24 to -12 (table 4)",
+        "eq. 17 as printed stays within these ranges over all errors of its two pieces",
+        kept(Reading::Printed),
+        format!(
+            "highest \"reward\" as printed: {}; with the split at s the ranges {}",
+            figures(highest),
+            if kept(Reading::Corrected) { "fit" } else { "do not fit either" }
+        ),
+    ));
+    let (reward, eps) = (Reward::PAPER_003, Reward::PAPER_003.threshold_m);
+    let jump = reward.of(eps * (1.0 + 1e-9)) - reward.of(eps);
+    outcome.claims.push(Claim::judged(
+        "The objective is softened where punishment and reward meet",
+        "the cost jumps at the threshold by less than the whole range of the rewards",
+        jump < RANGES[0][1] - RANGES[1][0],
+        format!("it jumps by {} s at {} mm", figures(jump), figures(1e3 * eps)),
+    ));
+}
+
+/// Runs of one method on one objective.
+struct Ran {
+    generation: Sample,
+    error: Sample,
+    evaluations: Option<f64>,
+}
+
+fn ran(lab: &Lab, name: &str, objective: Objective, runs: usize, budget: usize) -> Result<Ran, Stop> {
+    let task = FiveJointArm::task(Reading::Corrected);
+    let all: Vec<Reaching> = lab.each(runs, |run| {
+        reach(lab, &contender(name, Reading::Corrected, budget)?, (task, objective), run, budget)
+    })?;
+    let generation = Sample::of(all.iter().map(|r| r.generation).collect());
+    let error = Sample::of(all.iter().map(|r| r.error_mm).collect());
+    let trials: Vec<_> = all.into_iter().map(|r| r.trial).collect();
+    Ok(Ran { generation, error, evaluations: Sample::best(&trials).evaluations })
+}
+
+fn does_it_help(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
+    let (runs, budget) = (lab.runs(RUNS, 3), lab.choose(BUDGET, QUICK));
+    let columns = [
+        "",
+        "paper, generation",
+        "generation to 0.005 mm",
+        "reached",
+        "error (mm)",
+        "generation, with reward less:more",
+        "evaluations",
+    ];
+    let note = format!(
+        "{runs} runs of {budget} evaluations; median [quartiles]; generation of those that reached it"
+    );
+    let mut table = Table::new("Figure 10: with and without reward", "", &note, &columns);
+    for name in ["iepso", "de"] {
+        lab.say(&format!("  {name} with and without reward .."));
+        let with = ran(lab, name, Objective::Reward, runs, budget)?;
+        let without = ran(lab, name, Objective::TimeAndError, runs, budget)?;
+        let alone = ran(lab, name, Objective::Error, runs, budget)?;
+        let is_paper = name == "iepso";
+        let printed = if is_paper { Cell::Paper(PRINTED_GENERATION) } else { Cell::None };
+        table.row(format!("{name}, reward and punishment"), cells(&with, printed, None));
+        table.row(format!("{name}, time + error, no reward"), cells(&without, Cell::None, Some(&with)));
+        table.row(format!("{name}, error alone"), cells(&alone, Cell::None, Some(&with)));
+        if is_paper {
+            outcome.claims.extend(claims(&with, &without));
+        }
+    }
+    outcome.tables.push(table);
+    Ok(())
+}
+
+fn cells(ran: &Ran, printed: Cell, with: Option<&Ran>) -> Vec<Cell> {
+    let generations = &ran.generation.values;
+    let reached: Vec<f64> = generations.iter().copied().filter(|g| g.is_finite()).collect();
+    let (count, of) = (reached.len(), generations.len());
+    vec![
+        printed,
+        if reached.is_empty() { Cell::None } else { Cell::Median(Sample::of(reached).summary()) },
+        Cell::Share { count, of },
+        Cell::Median(ran.error.summary()),
+        with.map_or(Cell::None, |w| Cell::Test(wilcoxon(&w.generation.values, generations))),
+        Cell::maybe(ran.evaluations),
+    ]
+}
+
+fn claims(with: &Ran, without: &Ran) -> [Claim; 3] {
+    let (is_faster, faster) = better("with reward", &with.generation, "without", &without.generation);
+    let (is_nearer, nearer) = better("with reward", &with.error, "without", &without.error);
+    let median = quantile(&with.generation.values, 0.5);
+    let rule = "IEPSO, corrected: median less by the signed-rank test at 5 %";
+    [
+        Claim::judged("The reward makes IEPSO converge faster", rule, is_faster, faster),
+        Claim::judged("The reward makes IEPSO more accurate", rule, is_nearer, nearer),
+        Claim::judged(
+            "With the reward the precision of 0.005 mm is met at generation 19",
+            "IEPSO, corrected: the median run meets it by then",
+            median <= PRINTED_GENERATION,
+            format!("median generation {}", figures(median)),
+        ),
+    ]
+}

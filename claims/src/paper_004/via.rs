@@ -1,0 +1,227 @@
+//! Figures 4 to 6: do the via points keep clear of the obstacles, and does what joins them?
+use crate::chart::{LimitLine, Panel, palette};
+use crate::claim::Claim;
+use crate::figure::Figure;
+use crate::lab::{Lab, Stop};
+use crate::number::figures;
+use crate::registry::Outcome;
+use crate::statistics::quantile;
+use crate::table::{Cell, Table};
+use crate::trial::Sample;
+use taustream_planner::optimize::{Iwo, Reading};
+use taustream_planner::papers::two_link::TwoLink;
+use taustream_planner::papers::two_link_energy::CubicSearch;
+use taustream_planner::papers::two_link_via::{STEP_RAD, ViaTask};
+
+/// Runs; the paper shows one.
+const RUNS: usize = 100;
+/// Obstacles' radius as printed, which its figure 5 takes for the limit of the distance.
+const PRINTED_LIMIT: f64 = 1.29;
+/// More than IWO's schedule can use.
+const EVALUATIONS: usize = 10_000;
+/// What the paper's penalty lacks: room on the radius of the arm's spheres.
+const MARGIN: f64 = 0.25;
+/// Where a piece is looked at.
+const SAMPLES: u32 = 60;
+/// How long a piece lasts, in the paper.
+pub(super) const PIECE_S: f64 = 1.0;
+
+/// The readings: label, penalty, reading of the unit, margin.
+const READINGS: [(&str, bool, Reading, f64); 4] = [
+    ("no penalty", false, Reading::Corrected, 0.0),
+    ("penalty, angles in degrees (printed)", true, Reading::Printed, 0.0),
+    ("penalty, angles in radians (corrected)", true, Reading::Corrected, 0.0),
+    ("penalty, radians, with a margin", true, Reading::Corrected, MARGIN),
+];
+
+/// One walk and its distances between centres of spheres.
+#[derive(Clone, Debug, PartialEq)]
+struct Walk {
+    via_rad: Vec<[f64; 2]>,
+    reached: bool,
+    /// Least at the via points, on straight pieces, on cubics.
+    least: [f64; 3],
+    /// Over the share of the way, on the cubics.
+    along: Vec<(f64, f64)>,
+}
+
+fn task((_, has_penalty, reading, margin): (&str, bool, Reading, f64)) -> ViaTask {
+    let mut task = ViaTask::paper_004(reading);
+    if !has_penalty {
+        task.weights[2] = 0.0;
+    }
+    task.radii[0] += margin;
+    task
+}
+
+fn walk(task: &ViaTask, seed: u64) -> Result<Walk, Stop> {
+    let path = task.walk(&Iwo::PAPER_004, EVALUATIONS, seed)?;
+    let search = CubicSearch {
+        arm: TwoLink::PAPER_004,
+        piece_s: PIECE_S,
+        optimizer: &Iwo::PAPER_004,
+        evaluations_max: EVALUATIONS,
+        seed,
+        reading: Reading::Corrected,
+    };
+    let cubics = search.through(&path.via_rad)?;
+    let least = |poses: &[[f64; 2]]| poses.iter().map(|q| task.distance(*q)).fold(f64::INFINITY, f64::min);
+    let shares = || (0..=SAMPLES).map(|i| f64::from(i) / f64::from(SAMPLES));
+    let straight = path.via_rad.windows(2).flat_map(|pair| match pair {
+        [a, b] => shares().map(|s| std::array::from_fn(|j| a[j] + s * (b[j] - a[j]))).collect(),
+        _ => Vec::new(),
+    });
+    let end_s = PIECE_S * cubics.pieces.len() as f64;
+    let steps = u32::try_from(cubics.pieces.len()).unwrap_or(0) * SAMPLES;
+    let timed = (0..=steps).filter_map(|i| {
+        let at_s = end_s * f64::from(i) / f64::from(steps.max(1));
+        cubics.at(at_s).map(|moving| (at_s, moving.angle_rad))
+    });
+    let timed: Vec<(f64, [f64; 2])> = timed.collect();
+    let on_cubics: Vec<[f64; 2]> = timed.iter().map(|(_, q)| *q).collect();
+    Ok(Walk {
+        least: [least(&path.via_rad), least(&straight.collect::<Vec<_>>()), least(&on_cubics)],
+        along: timed.iter().map(|(t, q)| (*t, task.distance(*q))).collect(),
+        via_rad: path.via_rad,
+        reached: path.reached,
+    })
+}
+
+/// Walks.
+pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+    let runs = lab.runs(RUNS, 4);
+    let contact: f64 = ViaTask::paper_004(Reading::Corrected).radii.iter().sum();
+    let columns = [
+        "",
+        "paper, least distance",
+        "reached the goal",
+        "via points touch",
+        "straight pieces touch",
+        "cubics touch",
+        "via points",
+        "least distance at via points",
+        "least distance on cubics",
+    ];
+    let note = format!(
+        "{runs} runs; distances between centres; spheres touch below R1 + R2 = {}; the paper's figure takes 1.29 as \
+         the limit; median [quartiles]",
+        figures(contact)
+    );
+    let mut table = Table::new("Figures 4 to 6: via points by IWO", "relative units", &note, &columns);
+    let mut all = Vec::new();
+    for reading in READINGS {
+        lab.say(&format!("  {}, {runs} runs ..", reading.0));
+        let walks = lab.each(runs, |run| walk(&task(reading), lab.seed(run)))?;
+        let touching = |which: usize| walks.iter().filter(|w| w.least[which] < contact - 1e-6).count();
+        let share = |count| Cell::Share { count, of: runs };
+        let sample = |figure: &dyn Fn(&Walk) -> f64| Sample::of(walks.iter().map(figure).collect()).summary();
+        let is_papers = reading.1 && reading.3 == 0.0;
+        table.row(
+            reading.0,
+            vec![
+                if is_papers { Cell::Paper(PRINTED_LIMIT) } else { Cell::None },
+                share(walks.iter().filter(|w| w.reached).count()),
+                share(touching(0)),
+                share(touching(1)),
+                share(touching(2)),
+                Cell::Median(sample(&|w| w.via_rad.len() as f64)),
+                Cell::Median(sample(&|w| w.least[0])),
+                Cell::Median(sample(&|w| w.least[2])),
+            ],
+        );
+        all.push(walks);
+    }
+    let ours = vec![
+        "five spheres a link, at its tenths 1, 3, 5, 7, 9".to_owned(),
+        "the goal is reached within 0.01 rad".to_owned(),
+        format!("margin {MARGIN} on the radius of the arm's spheres, in the last row"),
+    ];
+    let claims = claims(&all, contact);
+    Ok(Outcome { ours, tables: vec![table], figures: vec![figure(&all, contact)], claims })
+}
+
+fn claims(all: &[Vec<Walk>], contact: f64) -> Vec<Claim> {
+    let [free, degrees, radians, margin] = all else { return Vec::new() };
+    let touching =
+        |walks: &[Walk], which: usize| walks.iter().filter(|w| w.least[which] < contact - 1e-6).count();
+    let of = |walks: &[Walk], which: usize| format!("{} of {}", touching(walks, which), walks.len());
+    let median = |walks: &[Walk]| quantile(&walks.iter().map(|w| w.least[0]).collect::<Vec<_>>(), 0.5);
+    let rule = "no run has a via point whose spheres touch";
+    let near = |walks: &[Walk]| (median(walks) - PRINTED_LIMIT).abs() <= 0.1 * PRINTED_LIMIT;
+    let bends = bends(radians);
+    vec![
+        Claim::judged(
+            "With K = 10, 10, 100 the via points avoid the obstacles (angles in degrees, as table I has them)",
+            rule,
+            touching(degrees, 0) == 0,
+            format!("touching: {}", of(degrees, 0)),
+        ),
+        Claim::judged(
+            "With K = 10, 10, 100 the via points avoid the obstacles (angles in radians)",
+            rule,
+            touching(radians, 0) == 0,
+            format!("touching: {}", of(radians, 0)),
+        ),
+        Claim::judged(
+            "The fitted trajectory avoids the obstacles",
+            "no run's cubics touch, in the reading whose via points do not",
+            touching(radians, 2) == 0,
+            format!(
+                "cubics touch in {}, straight pieces in {}; with a margin of {MARGIN} in {} and {}",
+                of(radians, 2),
+                of(radians, 1),
+                of(margin, 2),
+                of(margin, 1)
+            ),
+        ),
+        Claim::judged(
+            "The least distance stays near 1.29 (figure 5)",
+            "the median least distance at the via points is within a tenth of it, in either reading",
+            near(degrees) || near(radians),
+            format!("{} in degrees, {} in radians", figures(median(degrees)), figures(median(radians))),
+        ),
+        Claim::judged(
+            "Without the penalty the distance falls below 1.29 (figure 6)",
+            "in every run",
+            free.iter().all(|w| w.least[0] < PRINTED_LIMIT),
+            format!("median least distance {}", figures(median(free))),
+        ),
+        Claim::judged(
+            "θ goes on as without obstacles, φ bends away (figure 4)",
+            "radians: φ is farther from the way without obstacles than θ, in more than half of the runs",
+            2 * bends > radians.len(),
+            format!("in {bends} of {}", radians.len()),
+        ),
+    ]
+}
+
+/// Runs in which φ leaves the undisturbed way (both angles a full step at a time) farther than θ.
+fn bends(walks: &[Walk]) -> usize {
+    let goal = ViaTask::paper_004(Reading::Corrected).goal_rad;
+    let off = |walk: &Walk, j: usize| {
+        let free = |i: usize| (i as f64 * STEP_RAD).min(goal[j]);
+        walk.via_rad.iter().enumerate().map(|(i, q)| (q[j] - free(i)).abs()).fold(0.0, f64::max)
+    };
+    walks.iter().filter(|w| off(w, 1) > off(w, 0)).count()
+}
+
+fn figure(all: &[Vec<Walk>], contact: f64) -> Figure {
+    let mut path = Panel::new("θ (degrees)", "φ (degrees)");
+    let mut distance = Panel::new("time (s)", "least distance between centres, on the cubics");
+    for (walks, (label, ..)) in all.iter().zip(READINGS) {
+        let Some(walk) = walks.first() else { continue };
+        path.line(label, walk.via_rad.iter().map(|[a, b]| (a.to_degrees(), b.to_degrees())).collect());
+        distance.line(label, walk.along.clone());
+    }
+    for (i, (value, label)) in
+        [(contact, "spheres touch"), (PRINTED_LIMIT, "the paper's limit")].into_iter().enumerate()
+    {
+        distance.limits.push(LimitLine { value, colour: palette(6 + i), label: label.to_owned() });
+    }
+    Figure::of(
+        "004-via-points.svg",
+        "Paper 004, figures 4 to 6: the first run of each reading",
+        1,
+        &[path, distance],
+    )
+}
