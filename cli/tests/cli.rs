@@ -11,13 +11,10 @@ mod doctor;
 mod good_path;
 #[path = "cli/manual.rs"]
 mod manual;
-<<<<<<< HEAD
-#[path = "cli/planners.rs"]
-mod planners;
-=======
 #[path = "cli/papers.rs"]
 mod papers;
->>>>>>> 364d294 (Judge the claims of papers 001, 003 and 004: their tables beside ours)
+#[path = "cli/planners.rs"]
+mod planners;
 #[path = "cli/plot.rs"]
 mod plot;
 #[path = "cli/urdf.rs"]

@@ -121,7 +121,7 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
 /// or that turned round; the reward is at most 8 j.
 fn least_cost(task: &Reach) -> f64 {
     let [x, y, _] = task.target_m;
-    y.atan2(x).abs() / task.speed_rad_s - 8.0 * task.reward.factor
+    y.atan2(x).abs() / FiveJointArm::SPEED_RAD_S - 8.0 * task.reward.factor
 }
 
 fn table(ran: &[Ran], runs: usize, budget: usize) -> Table {
