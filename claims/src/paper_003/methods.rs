@@ -10,7 +10,7 @@ use crate::registry::Outcome;
 use crate::statistics::{quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
-use taustream_planner::optimize::{De, Ga, Iepso, Pso, Reading, Setup};
+use taustream_planner::optimize::{De, Exchange, Ga, Iepso, Pso, Reading, Setup};
 use taustream_planner::papers::reach::{FiveJointArm, Reach};
 
 /// Runs, and evaluations of the paper's 1000 generations of 40 after the first one.
@@ -19,7 +19,7 @@ pub(super) const BUDGET: usize = 40 + 40 * 1000;
 pub(super) const QUICK: usize = 4_000;
 
 /// The rows: name, which row of table 5, reading of method and objective.
-const ROWS: [(&str, Option<usize>, Reading); 9] = [
+const ROWS: [(&str, Option<usize>, Reading); 10] = [
     ("pso", Some(0), Reading::Corrected),
     ("spso", Some(1), Reading::Corrected),
     ("pso, inertia 0.9 to 0.4", None, Reading::Corrected),
@@ -29,6 +29,7 @@ const ROWS: [(&str, Option<usize>, Reading); 9] = [
     ("exchange only", None, Reading::Corrected),
     ("ga", Some(3), Reading::Corrected),
     ("de", Some(4), Reading::Corrected),
+    ("iepso with φ3 as printed", None, Reading::Corrected),
 ];
 /// What the corrected IEPSO is in [`ROWS`].
 const IEPSO: usize = 4;
@@ -50,6 +51,10 @@ pub(super) fn contender(name: &str, reading: Reading, budget: usize) -> Result<C
         "spso" => all(Box::new(Pso::standard(setup))),
         "pso, inertia 0.9 to 0.4" => all(Box::new(swarm(Iepso::CONSTANTS))),
         "iepso" => Contender { optimizer: Box::new(iepso), per_generation: population + Iepso::REPLACED },
+        "iepso with φ3 as printed" => Contender {
+            optimizer: Box::new(Iepso { exchange: Exchange::Magnitude, ..iepso }),
+            per_generation: population + Iepso::REPLACED,
+        },
         "elimination only" => Contender {
             optimizer: Box::new(Iepso { weight: [0.0; 2], ..iepso }),
             per_generation: population + Iepso::REPLACED,
@@ -245,7 +250,7 @@ fn optimum(ran: &[Ran]) -> Claim {
 fn exchange(ran: &[Ran]) -> Claim {
     let find = |name: &str| ran.iter().find(|r| r.label == name).map(Ran::cost);
     let [Some(with), Some(printed), Some(without)] =
-        ["iepso, corrected", "iepso, printed", "elimination only"].map(find)
+        ["iepso, corrected", "iepso with φ3 as printed", "elimination only"].map(find)
     else {
         return Claim::unchecked("The exchange φ3 helps the global search", "no such runs", String::new());
     };
@@ -253,7 +258,7 @@ fn exchange(ran: &[Ran]) -> Claim {
     let (by_print, as_printed) = better("as printed", &printed, "without φ3", &without);
     Claim::judged(
         "The exchange φ3 helps the global search",
-        "F is less than with c3 = 0 by the signed-rank test at 5 %, in either reading",
+        "on the corrected objective, F is less than with c3 = 0 by the signed-rank test at 5 %, with or without its sign",
         by_sign || by_print,
         format!("{signed}; {as_printed}"),
     )
