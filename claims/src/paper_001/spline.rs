@@ -52,7 +52,8 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
 /// How many independent rows a matrix has: elimination with the largest pivot there is, rows scaled to one.
 fn rank(mut rows: Vec<Vec<f64>>) -> usize {
     for row in &mut rows {
-        let largest = row.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        // A row of nothing stays one.
+        let largest = row.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
         row.iter_mut().for_each(|x| *x /= largest);
     }
     let columns = rows.first().map_or(0, Vec::len);
