@@ -75,10 +75,10 @@ fn searched(searcher: Searcher) -> String {
 
 /// What a refinement of the straight line starts from, for users.
 const LINE: &str = "the straight line";
-/// The methods that look for less energy and less cost when the options choose none: the one that measured best
-/// (docs/goals.md), and the paper's.
+/// The methods that look for less energy and less cost when the options choose none: those that measured best
+/// (docs/goals.md, docs/planner.md).
 const BY_ENERGY: &str = "gwo";
-const BY_COST: &str = "ibfoa";
+const BY_COST: &str = "iwo";
 
 /// The best verified motion so far.
 struct Best {
@@ -215,7 +215,9 @@ impl<'a> Pipeline<'a> {
     fn by_objective(&mut self, starts: &[(&[JointArray], &str)]) {
         let is_chosen = self.options.improvement != Improvement::default();
         let method = match (self.options.improvement, self.judge.objective) {
-            (Improvement::Method(method), _) if is_chosen => Some(method),
+            (Improvement::Method(method), objective) if is_chosen || objective != Objective::Energy => {
+                Some(method)
+            }
             (_, Objective::Energy) => METHODS.iter().find(|m| m.name == BY_ENERGY),
             (_, Objective::Cost | Objective::Time) => METHODS.iter().find(|m| m.name == BY_COST),
         };
