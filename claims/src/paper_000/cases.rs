@@ -276,7 +276,7 @@ impl Trials<'_> {
         if self.runs < PAIRS_MIN || raw[0] <= 0.0 || bfoa.sd <= 0.0 {
             return Claim::unchecked(
                 &says,
-                "two runs at least, and runs that differ",
+                "six runs at least, and runs that differ",
                 format!("{} runs", self.runs),
             );
         }
