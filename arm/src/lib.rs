@@ -1,4 +1,4 @@
-//! Robot, scene, settings and trajectory files: reading, checking, and the robot digest.
+//! Robot, scene, settings, path, table and trajectory files: reading, checking, and the robot digest.
 //!
 //! Every file is hostile until checked. A reader collects every fault and reports them all at once, each with file,
 //! key, value and what was expected; unknown keys are faults.
@@ -22,6 +22,8 @@ pub mod last_pose;
 pub mod lookup;
 pub mod mass;
 mod mesh;
+pub mod motion_table;
+pub mod path_file;
 pub mod protocol;
 mod reader;
 pub mod robot;
@@ -38,6 +40,8 @@ pub use bus_load::BusLoad;
 pub use fault::{Fault, Faults};
 pub use lookup::{Kind, find};
 pub use mass::LinkMass;
+pub use motion_table::MotionTable;
+pub use path_file::{PathFile, PathPoint};
 pub use protocol::{Cia402, Damiao, DamiaoMode, Protocol};
 pub use robot::{LinkShape, Robot, RobotJoint};
 pub use runtime::RuntimeError;

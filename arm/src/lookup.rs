@@ -12,6 +12,8 @@ pub enum Kind {
     Scene,
     /// A settings file.
     Settings,
+    /// A path file.
+    Path,
 }
 
 impl Kind {
@@ -22,6 +24,7 @@ impl Kind {
             Self::Robot => "robots",
             Self::Scene => "scenes",
             Self::Settings => "settings",
+            Self::Path => "paths",
         }
     }
     fn word(self) -> &'static str {
@@ -29,6 +32,7 @@ impl Kind {
             Self::Robot => "robot",
             Self::Scene => "scene",
             Self::Settings => "settings",
+            Self::Path => "path",
         }
     }
 }

@@ -85,7 +85,7 @@ impl Bounds {
         let low_kept = if self.low_excluded { number > self.low } else { number >= self.low };
         number.is_finite() && low_kept && number <= self.high
     }
-    fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let (low, high, unit) = (self.low, self.high, self.unit);
         let range = if self.low_excluded {
             format!("above {low} up to {high}")

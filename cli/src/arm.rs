@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::output::note;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
-use taustream_arm::{Kind, Robot, Scene, Settings, TrajectoryFile};
+use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile};
 use taustream_messages::service::is_arm_name;
 use taustream_streamer::names::{BusName, Names};
 
@@ -122,6 +122,11 @@ pub(crate) fn robot(given: &Path) -> Result<Robot, Failure> {
 /// A scene by path or shipped name.
 pub(crate) fn scene(given: &Path) -> Result<Scene, Failure> {
     Ok(Scene::load(&find(Kind::Scene, given)?)?)
+}
+
+/// A path by path or shipped name.
+pub(crate) fn path(given: &Path) -> Result<PathFile, Failure> {
+    Ok(PathFile::load(&find(Kind::Path, given)?)?)
 }
 
 /// A trajectory file that fits a robot: same number of joints, and the same digest where the file has one.

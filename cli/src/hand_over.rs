@@ -206,6 +206,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Status
         | Action::Watch(_) => true,
         Action::Plan(_)
+        | Action::Import(_)
         | Action::Sample(_)
         | Action::Plot(_)
         | Action::Cost(_)

@@ -56,6 +56,7 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
     let settings = cli.settings.as_deref();
     match &cli.action {
         Action::Plan(args) => offline::plan::run(form, args),
+        Action::Import(args) => offline::import::run(form, args),
         Action::Sample(args) => offline::sample::run(form, args),
         Action::Plot(args) => offline::plot::run(form, args),
         Action::Cost(args) => offline::cost::run(form, args),

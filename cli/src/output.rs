@@ -42,6 +42,31 @@ impl Form {
     }
 }
 
+/// Writes a result where `-o` says: to a file, with the summary on stdout; to stdout for `-`, with the summary on stderr; or
+/// nowhere.
+pub(crate) fn deliver(
+    form: Form,
+    output: Option<&Path>,
+    text: &str,
+    summary: &(impl Serialize + Display),
+) -> Result<(), Failure> {
+    match output {
+        None => form.print(summary),
+        Some(path) if path == Path::new("-") => {
+            let mut out = io::stdout().lock();
+            writeln!(out, "{}", text.trim_end())
+                .and_then(|()| out.flush())
+                .map_err(|e| Failure::writing("standard output", e))?;
+            form.progress(summary);
+            Ok(())
+        }
+        Some(path) => {
+            write_whole(path, text)?;
+            form.print(summary)
+        }
+    }
+}
+
 /// Writes a line to stderr. A stderr that is closed is no reason to stop.
 pub(crate) fn note(text: impl Display) {
     let _closed = writeln!(io::stderr(), "{text}");

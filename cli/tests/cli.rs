@@ -9,6 +9,8 @@ mod common;
 mod doctor;
 #[path = "cli/good_path.rs"]
 mod good_path;
+#[path = "cli/imports.rs"]
+mod imports;
 #[path = "cli/manual.rs"]
 mod manual;
 #[path = "cli/papers.rs"]

@@ -10,6 +10,7 @@ pub mod collide;
 pub mod cost;
 pub mod dynamics;
 pub mod foraging;
+pub mod import;
 pub mod kind;
 pub mod leave;
 pub mod objective;

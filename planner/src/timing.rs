@@ -12,7 +12,7 @@ use taustream_motion::stroke::{DURATION_S_MIN, Phi};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Stroke, Trajectory};
 
 /// Share of the limits that is left unused, so that rounding never decides.
-const SLACK: f64 = 1e-3;
+pub(crate) const SLACK: f64 = 1e-3;
 /// Strokes a kernel: at a coarser spacing the ripple of the sum eats the limits.
 const SPACING: f64 = 8.0;
 /// Kernel widths that are tried, in units of the arm's natural one ([`natural_kernel_s`]).
@@ -106,7 +106,7 @@ impl Path<'_> {
         let waits = vec![0.0; self.corners_rad.len().saturating_sub(2)];
         let shape = Shape { n: EXPONENTS[1], kernel_s: ROUGH_KERNEL * natural_s, waits };
         let strokes = self.strokes(&shape)?;
-        let scale = self.scale(&strokes, shape.kernel_s / 16.0);
+        let scale = scale_to_fit(&strokes, self.joints, self.limits, shape.kernel_s / 16.0);
         self.scaled(&strokes, &shape, scale)
     }
 
@@ -173,39 +173,8 @@ impl Path<'_> {
     fn duration_s(&self, shape: &Shape, samples: u32) -> Option<f64> {
         let strokes = self.strokes(shape)?;
         let end_s = strokes.last()?.end_s();
-        let scale = self.scale(&strokes, shape.kernel_s / f64::from(samples));
+        let scale = scale_to_fit(&strokes, self.joints, self.limits, shape.kernel_s / f64::from(samples));
         Some(end_s * scale).filter(|s| s.is_finite() && *s > 0.0)
-    }
-
-    /// Factor on all times after which the sampled peaks fit the limits.
-    fn scale(&self, strokes: &[Stroke], every_s: f64) -> f64 {
-        let end_s = strokes.last().map_or(0.0, Stroke::end_s);
-        let mut scale: f64 = 0.0;
-        let (mut first, mut t_s) = (0, every_s * 0.5);
-        while t_s < end_s {
-            while strokes.get(first).is_some_and(|s| s.has_ended(t_s)) {
-                first += 1;
-            }
-            let (mut v, mut a, mut j) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
-            for stroke in strokes.iter().skip(first).take_while(|s| s.start_s < t_s) {
-                let (phi, rate) = (stroke.phi(t_s), 1.0 / stroke.duration_s);
-                let (d1, d2, d3) = scaled(&phi, rate);
-                for (i, delta) in stroke.delta_rad.iter().enumerate().take(self.joints) {
-                    v[i] += delta * d1;
-                    a[i] += delta * d2;
-                    j[i] += delta * d3;
-                }
-            }
-            for (i, limits) in self.limits.iter().enumerate().take(self.joints) {
-                let m = limits.motion;
-                scale = scale
-                    .max(used(v[i], m.velocity_rad_s))
-                    .max(used(a[i], m.acceleration_rad_s2).sqrt())
-                    .max(used(j[i], m.jerk_rad_s3).cbrt());
-            }
-            t_s += every_s;
-        }
-        scale
     }
 
     /// The motion of a shape, scaled to the limits less the slack.
@@ -213,7 +182,7 @@ impl Path<'_> {
     pub fn fit(&self, shape: &Shape) -> Option<Timed> {
         let strokes = self.strokes(shape)?;
         // Fine enough that the peaks between samples stay far inside the slack.
-        let scale = self.scale(&strokes, shape.kernel_s / 256.0) * (1.0 + SLACK);
+        let scale = scale_to_fit(&strokes, self.joints, self.limits, shape.kernel_s / 256.0) * (1.0 + SLACK);
         self.scaled(&strokes, shape, scale)
     }
 
@@ -238,11 +207,51 @@ impl Path<'_> {
     }
 }
 
+/// Factor on all times after which peaks, sampled every so often while something runs, fit the motion limits.
+pub(crate) fn scale_to_fit(
+    strokes: &[Stroke],
+    joints: usize,
+    limits: &[JointLimits; MAX_JOINTS],
+    every_s: f64,
+) -> f64 {
+    let end_s = strokes.last().map_or(0.0, Stroke::end_s);
+    let mut scale: f64 = 0.0;
+    let (mut first, mut t_s) = (0, every_s * 0.5);
+    while t_s < end_s {
+        while strokes.get(first).is_some_and(|s| s.has_ended(t_s)) {
+            first += 1;
+        }
+        if let Some(next) = strokes.get(first).filter(|next| next.start_s >= t_s) {
+            // Nothing runs: a long rest costs nothing.
+            t_s = next.start_s + every_s * 0.5;
+        }
+        let (mut v, mut a, mut j) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for stroke in strokes.iter().skip(first).take_while(|s| s.start_s < t_s) {
+            let (phi, rate) = (stroke.phi(t_s), 1.0 / stroke.duration_s);
+            let (d1, d2, d3) = scaled(&phi, rate);
+            for (i, delta) in stroke.delta_rad.iter().enumerate().take(joints) {
+                v[i] += delta * d1;
+                a[i] += delta * d2;
+                j[i] += delta * d3;
+            }
+        }
+        for (i, limits) in limits.iter().enumerate().take(joints) {
+            let m = limits.motion;
+            scale = scale
+                .max(used(v[i], m.velocity_rad_s))
+                .max(used(a[i], m.acceleration_rad_s2).sqrt())
+                .max(used(j[i], m.jerk_rad_s3).cbrt());
+        }
+        t_s += every_s;
+    }
+    scale
+}
+
 fn scaled(phi: &Phi, rate: f64) -> (f64, f64, f64) {
     (phi.d1 * rate, phi.d2 * rate * rate, phi.d3 * rate * rate * rate)
 }
 
 /// Share of a limit that is used; something over nothing is infinite, nothing over nothing is nothing.
-fn used(value: f64, limit: f64) -> f64 {
+pub(crate) fn used(value: f64, limit: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value.abs() / limit }
 }

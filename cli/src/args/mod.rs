@@ -1,9 +1,11 @@
 //! The words of the command line. Units stand in every name; every default stands in the help.
+mod import;
 mod live;
 mod offline;
 mod papers;
 mod planners;
 
+pub(crate) use import::ImportArgs;
 pub(crate) use live::{
     CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
 };
@@ -76,6 +78,8 @@ pub(crate) struct Cli {
 pub(crate) enum Action {
     /// Plan a collision-free motion offline and write it down.
     Plan(PlanArgs),
+    /// Make a verified trajectory file of a motion from elsewhere: a table of positions, or way points and a profile.
+    Import(ImportArgs),
     /// Print a trajectory file as a table of positions, velocities, accelerations and jerks.
     Sample(SampleArgs),
     /// Draw a trajectory as SVG: joint curves with limits, arm, obstacles and path in three views.

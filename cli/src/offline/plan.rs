@@ -4,11 +4,9 @@ use crate::angles::Position;
 use crate::args::PlanArgs;
 use crate::arm;
 use crate::failure::Failure;
-use crate::output::{Form, write_whole};
+use crate::output::{Form, deliver};
 use serde::Serialize;
 use std::fmt;
-use std::io::{self, Write};
-use std::path::Path;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
@@ -89,21 +87,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     .to_json();
 
     let summary = summarise(&robot, found, args);
-    match args.output.as_deref() {
-        None => form.print(&summary),
-        Some(path) if path == Path::new("-") => {
-            let mut out = io::stdout().lock();
-            writeln!(out, "{}", json.trim_end())
-                .and_then(|()| out.flush())
-                .map_err(|e| Failure::writing("standard output", e))?;
-            form.progress(&summary);
-            Ok(())
-        }
-        Some(path) => {
-            write_whole(path, &json)?;
-            form.print(&summary)
-        }
-    }
+    deliver(form, args.output.as_deref(), &json, &summary)
 }
 
 /// What a motion is planned to.

@@ -209,8 +209,8 @@ fn completions_and_help_are_there_for_every_command() {
     let help = scratch.run(&["--help"]);
     assert!(help.done().contains("Exit codes"), "{}", help.out);
     for command in [
-        "plan", "sample", "plot", "cost", "verify", "check", "replan", "run", "enable", "speed", "stop",
-        "status", "watch", "doctor", "bench", "man", "demo",
+        "plan", "import", "sample", "plot", "cost", "verify", "check", "replan", "run", "enable", "speed",
+        "stop", "status", "watch", "doctor", "bench", "man", "demo",
     ] {
         assert!(scratch.run(&[command, "--help"]).done().contains("--json"), "{command}");
     }

@@ -125,6 +125,15 @@ impl Spline {
         self.knots[DEGREE..self.knots.len() - DEGREE].iter().map(|u| u * self.total_s).collect()
     }
 
+    /// A bound of a derivative's magnitude over the whole curve: its control points enclose it. Nothing for a joint that is
+    /// not there and for orders above the sixth.
+    #[must_use]
+    pub fn bound(&self, joint: usize, order: usize) -> f64 {
+        let control = self.control.get(joint).and_then(|orders| orders.get(order));
+        let most = control.map_or(0.0, |points| points.iter().fold(0.0, |most: f64, p| most.max(p.abs())));
+        most / self.total_s.powi(i32::try_from(order).unwrap_or(0))
+    }
+
     /// Position (order 0), velocity, acceleration, jerk (order 3) or a higher derivative of a joint at a time, which
     /// is held to the curve's. Nothing for a joint that is not there; derivatives above the degree are 0.
     #[must_use]

@@ -1,0 +1,240 @@
+//! `taustream import`: a motion made elsewhere as a verified trajectory file.
+use super::verify::{PeakTable, PeakUse, clearance_words, peak_use};
+use crate::args::ImportArgs;
+use crate::arm;
+use crate::failure::Failure;
+use crate::output::{Form, deliver};
+use serde::Serialize;
+use std::fmt;
+use std::io;
+use std::path::Path;
+use taustream_arm::{MotionTable, Robot, Scene, TrajectoryFile};
+use taustream_motion::JointArray;
+use taustream_planner::import::{
+    ImportError, Imported, Reference, TimedBy, Via, ViaProfile, fitted_durations_s, import, import_strokes,
+    optimised_durations_s, poses_of,
+};
+use taustream_planner::papers::spline_time::SplineCost;
+
+/// Speeds at the ends of a table that are worth a word (rad/s).
+const AT_REST_RAD_S: f64 = 0.01;
+
+/// The summary of an import.
+#[derive(Debug, Serialize)]
+struct Summary {
+    robot: String,
+    digest: String,
+    file: Option<String>,
+    source: String,
+    exact: bool,
+    original_s: f64,
+    duration_s: f64,
+    time_added_s: f64,
+    time_scale: f64,
+    strokes: usize,
+    n: Option<u32>,
+    kernel_s: Option<f64>,
+    delay_s: f64,
+    deviation_rad: f64,
+    deviation_joint: String,
+    deviation_at_s: f64,
+    notes: Vec<String>,
+    clearance_m: f64,
+    clearance_at_s: f64,
+    clearance_between: [String; 2],
+    peak_use: Vec<PeakUse>,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "imported      {}", self.source)?;
+        let (original_s, added_s) = (self.original_s, self.time_added_s);
+        writeln!(
+            f,
+            "duration      {:.3} s, {} strokes; the original takes {original_s:.3} s, {added_s:+.3} s",
+            self.duration_s, self.strokes
+        )?;
+        if self.time_scale > 1.0 {
+            writeln!(f, "SLOWED DOWN   {:.4} times, to keep the motion limits", self.time_scale)?;
+        }
+        if self.exact {
+            writeln!(f, "deviation     none: it is made of strokes as it stands")?;
+        } else {
+            let (joint, at_s) = (&self.deviation_joint, self.deviation_at_s);
+            writeln!(f, "deviation     at most {:.6} rad, {joint} at t = {at_s:.3} s", self.deviation_rad)?;
+        }
+        for note in &self.notes {
+            writeln!(f, "note          {note}")?;
+        }
+        let [a, b] = &self.clearance_between;
+        writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        write!(f, "{}", PeakTable(&self.peak_use))?;
+        match &self.file {
+            Some(file) => write!(f, "written to    {file}"),
+            None => write!(f, "not saved; -o FILE writes the trajectory file"),
+        }
+    }
+}
+
+/// What is imported, in words, and what is worth saying about it.
+struct Source {
+    words: String,
+    notes: Vec<String>,
+}
+
+/// Imports, and writes file and summary.
+pub(crate) fn run(form: Form, args: &ImportArgs) -> Result<(), Failure> {
+    let robot = arm::robot(&args.robot)?;
+    let scene = arm::scene(&args.scene)?;
+    let (imported, source) = match &args.table {
+        Some(table) => from_table(args, table, &robot, &scene)?,
+        None => from_points(args, &robot, &scene)?,
+    };
+    let file = TrajectoryFile {
+        robot: robot.name.clone(),
+        digest: Some(robot.digest_hex()),
+        trajectory: imported.trajectory.clone(),
+    };
+    let summary = summarise(&robot, &imported, source, args);
+    deliver(form, args.output.as_deref(), &file.to_json(), &summary)
+}
+
+fn from_table(
+    args: &ImportArgs,
+    path: &Path,
+    robot: &Robot,
+    scene: &Scene,
+) -> Result<(Imported, Source), Failure> {
+    let table = if path == Path::new("-") {
+        MotionTable::read(Path::new("standard input"), io::stdin().lock())?
+    } else {
+        MotionTable::load(path)?
+    };
+    let mut notes = Vec::new();
+    if !table.ignored.is_empty() {
+        notes.push(format!("columns that were let go: {}", table.ignored.join(", ")));
+    }
+    if table.began_s != 0.0 {
+        notes.push(format!("its clock begins at {} s; that is 0 here", table.began_s));
+    }
+    let words = format!("{} rows of {}", table.t_s.len(), path.display());
+    let reference = Reference::of_table(table).map_err(|e| refused(&e))?;
+    let imported = import(robot, scene, &reference, args.tolerance_rad).map_err(|e| refused(&e))?;
+    Ok((imported, Source { words, notes }))
+}
+
+fn from_points(args: &ImportArgs, robot: &Robot, scene: &Scene) -> Result<(Imported, Source), Failure> {
+    let path = args.path.as_deref().map(arm::path).transpose()?;
+    let by_file = path.as_ref().and_then(|path| path.profile.clone());
+    let Some(name) = args.profile.clone().or(by_file) else {
+        let names = ViaProfile::NAMES.join(", ");
+        return Err(Failure::Usage(format!("points need a --profile to be moved through with: {names}")));
+    };
+    let profile = ViaProfile::from_name(&name, args.k).map_err(|e| Failure::Usage(e.to_string()))?;
+    let points_rad: Vec<JointArray> = match &path {
+        Some(path) => poses_of(robot, path).map_err(|e| refused(&e))?,
+        None => args.via.iter().map(|angles| angles.pose_of(robot, "--via")).collect::<Result<_, _>>()?,
+    };
+    let joints = robot.joints.len();
+    if points_rad.len() < 2 {
+        let why = "one --via is no motion; give it once for each of two or more points";
+        return Err(Failure::Usage(why.to_owned()));
+    }
+    let (durations_s, notes) = durations(args, profile, &points_rad, robot)?;
+    let via = Via { points_rad: &points_rad, joints, profile, durations_s: &durations_s };
+    let imported = if let Some(n) = profile.stroke_n() {
+        import_strokes(robot, scene, &via, n)
+    } else {
+        let reference = Reference::through(&via).map_err(|e| refused(&e))?;
+        import(robot, scene, &reference, args.tolerance_rad)
+    };
+    let words = format!("{} points by {}", points_rad.len(), profile.name());
+    Ok((imported.map_err(|e| refused(&e))?, Source { words, notes }))
+}
+
+/// How long each piece takes, with a word on it: as given, as an optimiser finds, or as short as the limits allow.
+fn durations(
+    args: &ImportArgs,
+    profile: ViaProfile,
+    points_rad: &[JointArray],
+    robot: &Robot,
+) -> Result<(Vec<f64>, Vec<String>), Failure> {
+    if let Some(durations) = &args.durations {
+        return Ok((durations.0.clone(), Vec::new()));
+    }
+    let words =
+        |durations_s: &[f64]| durations_s.iter().map(|s| format!("{s:.4}")).collect::<Vec<_>>().join(", ");
+    let Some(method) = &args.timed_by else {
+        let durations_s = fitted_durations_s(points_rad, robot.joints.len(), profile, &robot.limits())
+            .map_err(|e| refused(&e))?;
+        let note = format!("durations as short as the limits allow: {} s", words(&durations_s));
+        return Ok((durations_s, vec![note]));
+    };
+    if profile != ViaProfile::BSpline7 {
+        return Err(Failure::Usage(format!(
+            "--timed-by is for profile b-spline7, not for {}",
+            profile.name()
+        )));
+    }
+    let evaluations = usize::try_from(args.evaluations).unwrap_or(usize::MAX);
+    let by = TimedBy { method, seed: args.seed, evaluations };
+    let (durations_s, cost) = optimised_durations_s(points_rad, robot, &by).map_err(|e| refused(&e))?;
+    let SplineCost { time_s, jerk_rad_s3, broken, cost, .. } = cost;
+    let note = format!(
+        "durations by {method} (seed {}): {} s; time {time_s:.4} s, impact {jerk_rad_s3:.4} rad/s^3, {broken} limits \
+         broken, cost {cost:.6}",
+        args.seed,
+        words(&durations_s)
+    );
+    Ok((durations_s, vec![note]))
+}
+
+/// What does not fit the words or files is bad usage; what is no motion for this arm is refused.
+fn refused(error: &ImportError) -> Failure {
+    let text = format!("not imported: {error}");
+    let is_usage = matches!(
+        error,
+        ImportError::Duration { .. }
+            | ImportError::Durations { .. }
+            | ImportError::Joints { .. }
+            | ImportError::NoNear
+            | ImportError::Optimiser { .. }
+    );
+    if is_usage { Failure::Usage(text) } else { Failure::Refused(text) }
+}
+
+fn summarise(robot: &Robot, imported: &Imported, source: Source, args: &ImportArgs) -> Summary {
+    let (a, b) = imported.proof.clearance_between.clone();
+    let deviation = imported.deviation;
+    let mut notes = source.notes;
+    for (end, speed) in ["begins", "ends"].into_iter().zip(imported.end_speeds_rad_s) {
+        if speed > AT_REST_RAD_S {
+            notes.push(format!(
+                "the original {end} at {speed:.3} rad/s; the import {end} at rest there, rounded"
+            ));
+        }
+    }
+    Summary {
+        robot: robot.name.clone(),
+        digest: robot.digest_hex(),
+        file: args.output.as_ref().map(|p| p.display().to_string()),
+        source: source.words,
+        exact: imported.kernel.is_none(),
+        original_s: imported.original_s,
+        duration_s: imported.proof.duration_s,
+        time_added_s: imported.proof.duration_s - imported.original_s,
+        time_scale: imported.time_scale,
+        strokes: imported.trajectory.strokes().len(),
+        n: imported.kernel.map(|kernel| kernel.n),
+        kernel_s: imported.kernel.map(|kernel| kernel.width_s),
+        delay_s: imported.kernel.map_or(0.0, |kernel| kernel.delay_s),
+        deviation_rad: deviation.rad,
+        deviation_joint: robot.joints.get(deviation.joint).map(|j| j.name.clone()).unwrap_or_default(),
+        deviation_at_s: deviation.at_s,
+        notes,
+        clearance_m: imported.proof.clearance_m,
+        clearance_at_s: imported.proof.clearance_at_s,
+        clearance_between: [a, b],
+        peak_use: peak_use(robot, &imported.proof.peaks),
+    }
+}
