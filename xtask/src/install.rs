@@ -60,7 +60,8 @@ const FILES: [(&str, &str, u32); 12] = [
 
 /// Folders of the source tree that are taken whole: shipped data, and bus files that do nothing before they are copied
 /// to /etc/systemd/network, because a wrong bit rate disturbs a bus that works.
-const FOLDERS: [(&str, &str); 4] = [
+const FOLDERS: [(&str, &str); 5] = [
+    ("config/paths", "usr/share/taustream/paths"),
     ("config/robots", "usr/share/taustream/robots"),
     ("config/scenes", "usr/share/taustream/scenes"),
     ("config/settings", "usr/share/taustream/settings"),
