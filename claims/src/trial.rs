@@ -11,7 +11,7 @@ const CHECKPOINTS: usize = 100;
 pub struct Trial {
     /// What it found.
     pub found: Found,
-    /// Evaluations done and best so far, at up to [`CHECKPOINTS`] iterations that are spread evenly over the budget.
+    /// Evaluations done and best so far, at up to 100 iterations that are spread evenly over the budget.
     pub trace: Vec<(f64, f64)>,
     /// Iterations after which the population's best was worse than before.
     pub rises: usize,

@@ -113,7 +113,7 @@ impl<'a> Space<'a> {
         self.checks.set(self.checks.get() + checks);
     }
 
-    /// Weight of each joint in the distance of two poses, m/rad: never below [`WEIGHT_M_MIN`].
+    /// Weight of each joint in the distance of two poses, m/rad: never below `WEIGHT_M_MIN`.
     #[must_use]
     pub fn weights_m(&self) -> &JointArray {
         &self.weight_m
