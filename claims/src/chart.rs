@@ -1,4 +1,5 @@
 //! One panel of curves. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
+use crate::number;
 use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Color, DashedLineSeries, DrawingArea, LineSeries, PathElement, Polygon, RGBColor,
@@ -131,14 +132,16 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     let Panel { curves, limits, filled, is_log, .. } = &scaled;
     let (across, values) = ranges(area, &scaled);
     let ends = [across.start, across.end - (across.end - across.start) * LEGEND_SHARE / (1.0 + LEGEND_SHARE)];
+    // Marks are sums of steps: what should be zero is what their rounding leaves.
+    let rounding = 1e-9 * (across.end - across.start).min(values.end - values.start);
+    let plain = |at: &f64| number::figures(if at.abs() < rounding { 0.0 } else { *at });
+    let power = |exponent: &f64| format!("{:.1e}", 10_f64.powf(*exponent));
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
         .margin_right(16)
         .x_label_area_size(34)
         .y_label_area_size(74)
         .build_cartesian_2d(across, values)?;
-    let exponent = |y: &f64| format!("1e{y:.1}");
-    let plain = |y: &f64| crate::number::figures(*y);
     chart
         .configure_mesh()
         .x_desc(&panel.x)
@@ -146,7 +149,7 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
         .x_labels(12)
         .y_labels(6)
         .x_label_formatter(&plain)
-        .y_label_formatter(if *is_log { &exponent } else { &plain })
+        .y_label_formatter(if *is_log { &power } else { &plain })
         .label_style(("sans-serif", 14))
         .light_line_style(RGBColor(245, 245, 245))
         .draw()?;
