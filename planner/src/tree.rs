@@ -161,6 +161,11 @@ enum Reached {
 /// Share of the random poses that are the goal, for a single tree; 5 to 10 % are usual.
 const GOAL_BIAS: f64 = 0.05;
 
+/// A search has checked its poses, grown all the nodes that it may, or was told to end.
+fn is_spent(field: &impl Field, nodes: usize, checks_end: usize) -> bool {
+    field.checks() >= checks_end || nodes >= NODES_MAX || field.is_over()
+}
+
 /// Looks for a path between two free poses with one tree that grows from the start, until `checks_max` poses have been
 /// checked.
 ///
@@ -176,7 +181,7 @@ pub fn rrt(
     let mut tree = Tree { nodes: vec![(*start_rad, 0)] };
     loop {
         let nodes = tree.nodes.len();
-        if field.checks() >= end || nodes >= NODES_MAX || field.is_over() {
+        if is_spent(field, nodes, end) {
             return Search { path: None, nodes };
         }
         let is_goal = draw.unit() < GOAL_BIAS;
@@ -202,7 +207,7 @@ pub fn rrt_connect(
     let mut swapped = false;
     loop {
         let nodes = from_start.nodes.len() + from_goal.nodes.len();
-        if field.checks() >= end || nodes >= NODES_MAX || field.is_over() {
+        if is_spent(field, nodes, end) {
             return Search { path: None, nodes };
         }
         let (growing, other) =

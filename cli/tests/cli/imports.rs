@@ -4,19 +4,21 @@ use std::fs;
 
 const THERE: &str = "0.5,-1.4,1.5,-1.6,-1.5,0.2";
 
+/// The words of a line, two poses by their names.
+fn words_of(line: &str) -> Vec<&str> {
+    let pose = |word| match word {
+        "HOME" => HOME,
+        "THERE" => THERE,
+        other => other,
+    };
+    line.split(' ').map(pose).collect()
+}
+
 #[test]
 fn imported_table_verifies_and_its_deviation_is_that_of_the_samples() {
     let scratch = Scratch::new();
     let words = "import --via HOME --via THERE --profile tau-j-star --k 1/8 --robot ur5 --scene open -o a.json --json";
-    let words: Vec<&str> = words
-        .split(' ')
-        .map(|w| match w {
-            "HOME" => HOME,
-            "THERE" => THERE,
-            other => other,
-        })
-        .collect();
-    let exact = scratch.run(&words).json();
+    let exact = scratch.run(&words_of(words)).json();
     assert_eq!(
         (&exact["exact"], &exact["strokes"], &exact["deviation_rad"]),
         (&true.into(), &1.into(), &0.0.into())
@@ -36,7 +38,7 @@ fn imported_table_verifies_and_its_deviation_is_that_of_the_samples() {
 fn shipped_path_is_imported_by_its_name() {
     let scratch = Scratch::new();
     let words = "import --path eight_points --timed-by isma --evaluations 200 --robot ur5 --scene open -o e.json --json";
-    let summary = scratch.run(&words.split(' ').collect::<Vec<_>>()).json();
+    let summary = scratch.run(&words_of(words)).json();
     assert!(summary["deviation_rad"].as_f64().is_some_and(|rad| rad > 0.0 && rad <= 0.005), "{summary}");
     assert!(summary["notes"][0].as_str().is_some_and(|note| note.contains("by isma (seed 1)")), "{summary}");
     assert!(scratch.files().contains("e.json"));
@@ -65,15 +67,7 @@ fn what_is_no_motion_for_the_arm_is_refused_and_nothing_is_written() {
     ];
     for (line, code, expected) in cases {
         let line = format!("{line} --robot ur5 --scene open -o never.json");
-        let words: Vec<&str> = line
-            .split(' ')
-            .map(|w| match w {
-                "HOME" => HOME,
-                "THERE" => THERE,
-                other => other,
-            })
-            .collect();
-        scratch.run(&words).refused(code, expected);
+        scratch.run(&words_of(&line)).refused(code, expected);
         assert_eq!(scratch.files(), before, "`{line}` left files behind");
     }
 }
