@@ -160,7 +160,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
     // An idle bus would be locked, opened and watched for nothing, and is most often a servo with the wrong bus.
     for (i, bus) in buses.iter().enumerate().filter(|(i, _)| !busy.contains(i)) {
         if let Some(bus) = bus {
-            top.book().add(
+            top.fault_list().add(
                 None,
                 &format!("bus[{i}].name"),
                 &shown(&bus.name),
@@ -232,19 +232,24 @@ fn read_servo(
 }
 
 /// An identifier in use, by joint and bus.
-struct Taken {
+struct UsedIdentifier {
     bus: usize,
     joint: usize,
     by: Use,
 }
 
 /// Holds every identifier of a servo against those of the servos before it, and against its own.
-fn check_identifiers(table: &Table<'_>, servo: &Servo, robot: Option<&Robot>, taken: &mut Vec<Taken>) {
+fn check_identifiers(
+    table: &Table<'_>,
+    servo: &Servo,
+    robot: Option<&Robot>,
+    taken: &mut Vec<UsedIdentifier>,
+) {
     let mut clashed = false;
     for mine in identifiers::of(servo.node_id, &servo.protocol) {
         let clash = taken.iter().find(|other| other.bus == servo.bus && other.by.clashes(&mine));
         let Some(other) = clash else {
-            taken.push(Taken { bus: servo.bus, joint: servo.joint, by: mine });
+            taken.push(UsedIdentifier { bus: servo.bus, joint: servo.joint, by: mine });
             continue;
         };
         // One sentence a servo: another id mends all of them.

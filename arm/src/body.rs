@@ -244,7 +244,7 @@ fn encloses(mesh: &TriMesh, point: Vector) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
 
     /// Goal: distances that are iterated are lower bounds, and next to the truth.
     /// Method: capsules about pillars and discs; the distance of a point to a cylinder is convex along a segment, so
@@ -253,13 +253,12 @@ mod tests {
     fn distance_to_a_cylinder_is_a_tight_lower_bound() {
         const RADIUS_M: f64 = 0.01;
         for seed in 0..60_000 {
-            let mut draw = Draw::new(seed, 4);
-            let (half_m, radius_m) = (draw.within(0.02, 0.4), draw.within(0.02, 0.3));
+            let mut rng = SeededRng::new(seed, 4);
+            let (half_m, radius_m) = (rng.within(0.02, 0.4), rng.within(0.02, 0.3));
             let id = chain::Pose::identity();
             let shape = Shape::Cylinder { radius_m, length_m: 2.0 * half_m };
             let cylinder = Body::new(&shape, &id).expect("a shape");
-            let mut end =
-                || Vector::new(draw.within(-0.5, 0.5), draw.within(-0.5, 0.5), draw.within(-0.6, 0.6));
+            let mut end = || Vector::new(rng.within(-0.5, 0.5), rng.within(-0.5, 0.5), rng.within(-0.6, 0.6));
             let (a, b) = (end(), end());
             let (middle, along) = (0.5 * (a + b), b - a);
             let turn = Rot3::from_rotation_arc(Vector::Z, along.normalize());
@@ -287,9 +286,9 @@ mod tests {
     }
 
     /// A hull of random corners, as meshes of robots become.
-    fn hull(draw: &mut Draw) -> Shape {
+    fn hull(rng: &mut SeededRng) -> Shape {
         let mut point =
-            || nalgebra::Point3::new(draw.within(-0.2, 0.2), draw.within(-0.3, 0.3), draw.within(-0.1, 0.1));
+            || nalgebra::Point3::new(rng.within(-0.2, 0.2), rng.within(-0.3, 0.3), rng.within(-0.1, 0.1));
         let points: Vec<_> = (0..30).map(|_| point()).collect();
         let hull = crate::hull::of(&points).expect("not flat");
         Shape::Hull { vertices_m: hull.vertices_m, triangles: hull.triangles, rounding_m: hull.rounding_m }
@@ -313,8 +312,8 @@ mod tests {
         faces.iter().map(distance_m).fold(f64::INFINITY, f64::min)
     }
 
-    fn random_pose(draw: &mut Draw) -> Pose {
-        let mut v = || Vector::new(draw.within(-0.6, 0.6), draw.within(-0.6, 0.6), draw.within(-0.6, 0.6));
+    fn random_pose(rng: &mut SeededRng) -> Pose {
+        let mut v = || Vector::new(rng.within(-0.6, 0.6), rng.within(-0.6, 0.6), rng.within(-0.6, 0.6));
         Pose::from_parts(v(), Rot3::from_scaled_axis(v() * 5.0))
     }
 
@@ -326,13 +325,13 @@ mod tests {
         let id = chain::Pose::identity();
         let (mut apart, mut worst_m) = (0, 0.0_f64);
         for seed in 0..1_500 {
-            let mut draw = Draw::new(seed, 22);
-            let (one, two) = (hull(&mut draw), hull(&mut draw));
+            let mut rng = SeededRng::new(seed, 22);
+            let (one, two) = (hull(&mut rng), hull(&mut rng));
             let (a, b) = (Body::new(&one, &id).unwrap(), Body::new(&two, &id).unwrap());
-            let at = random_pose(&mut draw);
+            let at = random_pose(&mut rng);
             let here = a.placed(&Pose::identity());
 
-            let half_m = draw.within(0.0, 0.3);
+            let half_m = rng.within(0.0, 0.3);
             let capsule = Body::capsule(half_m, 0.02, Pose::identity());
             let along = |t: f64| at.transform_point(Vector::new(0.0, 0.0, half_m * t));
             let (mut low, mut high) = (-1.0, 1.0);

@@ -5,14 +5,14 @@
 //! left. `docs/bus-planning.md` explains the numbers to users.
 pub mod flow;
 pub mod frame;
-mod ways_out;
+mod remedies;
 
 use crate::protocol::Protocol;
 use crate::settings::{Bus, BusKind, Settings};
 pub use flow::{CONTROL_REPEAT_TURNS, HEARTBEAT_MS};
 use flow::{Cia402Bus, Exchange, Flow};
 use frame::{BitRates, Format, Frame};
-pub use ways_out::WayOut;
+pub use remedies::LoadRemedy;
 
 /// Above this, settings are refused: the cycle's frames do not fit into the cycle.
 pub const REFUSED_PERCENT: f64 = 100.0;
@@ -81,8 +81,8 @@ impl Settings {
 
     /// What would make a bus less full, each with the load that it would give.
     #[must_use]
-    pub fn ways_out(&self, bus: usize) -> Vec<WayOut> {
-        let found = self.buses.get(bus).map(|b| ways_out::of(b, self, &self.protocols_on(bus)));
+    pub fn remedies(&self, bus: usize) -> Vec<LoadRemedy> {
+        let found = self.buses.get(bus).map(|b| remedies::of(b, self, &self.protocols_on(bus)));
         found.unwrap_or_default()
     }
 

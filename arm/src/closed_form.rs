@@ -90,16 +90,16 @@ fn least_on_piece(p: &[f64; 3], d: &[f64; 3], h: &[f64; 3], [from, to]: [f64; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
     use parry3d_f64::math::Pose;
     use parry3d_f64::query::distance;
     use parry3d_f64::shape::{Cuboid, Segment};
 
-    fn point(draw: &mut Draw) -> Vector {
+    fn point(rng: &mut SeededRng) -> Vector {
         // A coarse grid half of the time, so that parallel and degenerate cases really come up.
-        let coarse = draw.unit() < 0.5;
+        let coarse = rng.unit() < 0.5;
         let mut next = || {
-            let x = draw.within(-1.0, 1.0);
+            let x = rng.within(-1.0, 1.0);
             if coarse { (x * 2.0).round() / 2.0 } else { x }
         };
         Vector::new(next(), next(), next())
@@ -113,8 +113,8 @@ mod tests {
     #[test]
     fn segments_random_and_degenerate_agree_with_sampling_and_parry() {
         for seed in 0..3_000 {
-            let mut draw = Draw::new(seed, 0);
-            let [a0, a1, b0, b1] = std::array::from_fn(|_| point(&mut draw));
+            let mut rng = SeededRng::new(seed, 0);
+            let [a0, a1, b0, b1] = std::array::from_fn(|_| point(&mut rng));
             let ours = segment_to_segment_m(a0, a1, b0, b1);
             let dense = sampled(a0, a1, |p| point_to_segment_m(p, b0, b1));
             // A sampling is never below the truth, and above it by at most half a step.
@@ -132,9 +132,9 @@ mod tests {
     #[test]
     fn box_random_and_degenerate_agree_with_sampling_and_parry() {
         for seed in 0..3_000 {
-            let mut draw = Draw::new(seed, 1);
-            let [a, b] = std::array::from_fn(|_| point(&mut draw) * 1.5);
-            let half = Vector::new(draw.within(0.1, 0.8), draw.within(0.1, 0.8), draw.within(0.1, 0.8));
+            let mut rng = SeededRng::new(seed, 1);
+            let [a, b] = std::array::from_fn(|_| point(&mut rng) * 1.5);
+            let half = Vector::new(rng.within(0.1, 0.8), rng.within(0.1, 0.8), rng.within(0.1, 0.8));
             let ours = segment_to_box_m(a, b, half);
             let dense = sampled(a, b, |p| (p.abs() - half).max(Vector::ZERO).length());
             assert!(ours <= dense + 1e-12, "seed {seed}: {ours} above the sampled {dense}");

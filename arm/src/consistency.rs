@@ -3,11 +3,11 @@
 //! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
 use crate::bus_load::{BusLoad, REFUSED_PERCENT};
 use crate::protocol::DamiaoMode;
-use crate::reader::Book;
-use crate::settings::{Cycle, Settings, Supervision, Traffic};
+use crate::reader::FaultList;
+use crate::settings::{CycleSettings, Settings, Supervision, Traffic};
 
 /// Times that only make sense in one order.
-pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision) {
+pub(crate) fn check_times(fault_list: &FaultList, cycle: &CycleSettings, supervision: &Supervision) {
     let period_ms = f64::from(cycle.period_us) * 1e-3;
     let gap_ms = f64::from(cycle.tolerated_gap_periods) * period_ms;
     let (watchdog_ms, stall_ms) = (cycle.drive_watchdog_ms, cycle.stall_resume_ms);
@@ -15,24 +15,29 @@ pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision)
     if f64::from(watchdog_ms) <= gap_ms {
         let expected =
             format!("more than the tolerated gap of {gap_ms} ms (tolerated_gap_periods x period_us)");
-        book.add(None, "cycle.drive_watchdog_ms", &watchdog_ms.to_string(), &expected);
+        fault_list.add(None, "cycle.drive_watchdog_ms", &watchdog_ms.to_string(), &expected);
     }
     if stall_ms > watchdog_ms {
         let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
-        book.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
+        fault_list.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
     }
     // Our own stop keeps the arm on its path; the drives' does not, so ours must come first.
     let lost_ms = f64::from(supervision.lost_cycles_max) * period_ms;
     if lost_ms >= f64::from(watchdog_ms) {
         let expected =
             format!("fewer cycles than drive_watchdog_ms = {watchdog_ms} holds ({lost_ms} ms as it stands)");
-        book.add(None, "supervision.lost_cycles_max", &supervision.lost_cycles_max.to_string(), &expected);
+        fault_list.add(
+            None,
+            "supervision.lost_cycles_max",
+            &supervision.lost_cycles_max.to_string(),
+            &expected,
+        );
     }
     // Feedback is one cycle old when it is looked at; below two periods, jitter alone would stop the arm.
     let age_ms = supervision.feedback_age_s_max * 1e3;
     if age_ms < 2.0 * period_ms {
         let expected = format!("at least two periods, {} s", 2e-3 * period_ms);
-        book.add(
+        fault_list.add(
             None,
             "supervision.feedback_age_s_max",
             &format!("{:?}", supervision.feedback_age_s_max),
@@ -42,7 +47,7 @@ pub(crate) fn check_times(book: &Book, cycle: &Cycle, supervision: &Supervision)
 }
 
 /// A step that a joint makes at full speed, over the gap that is tolerated, is no jump.
-pub(crate) fn check_jump(book: &Book, settings: &Settings) {
+pub(crate) fn check_jump(fault_list: &FaultList, settings: &Settings) {
     let period_s = f64::from(settings.cycle.period_us) * 1e-6;
     let longest_s = f64::from(settings.cycle.tolerated_gap_periods + 1) * period_s;
     let jump_rad = settings.supervision.position_jump_rad_max;
@@ -56,12 +61,12 @@ pub(crate) fn check_jump(book: &Book, settings: &Settings) {
             "more than {step_rad:.5} rad, which joint {} makes in {longest_s} s at full speed",
             joint.name
         );
-        book.add(None, "supervision.position_jump_rad_max", &format!("{jump_rad:?}"), &expected);
+        fault_list.add(None, "supervision.position_jump_rad_max", &format!("{jump_rad:?}"), &expected);
     }
 }
 
 /// Damiao motors against the cycle, the supervision and the traffic that they are driven with.
-pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
+pub(crate) fn check_damiao(fault_list: &FaultList, settings: &Settings) {
     let counted_ms = settings.cycle.drive_watchdog_ms;
     let timeout_s = settings.supervision.drive_timeout_s;
     for (i, servo) in settings.servos.iter().enumerate() {
@@ -70,7 +75,12 @@ pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
             let expected = format!(
                 "at least cycle.drive_watchdog_ms = {counted_ms}: until then the streamer counts on the motor"
             );
-            book.add(None, &format!("servo[{i}].watchdog_ms"), &damiao.watchdog_ms.to_string(), &expected);
+            fault_list.add(
+                None,
+                &format!("servo[{i}].watchdog_ms"),
+                &damiao.watchdog_ms.to_string(),
+                &expected,
+            );
         }
         if let DamiaoMode::Mit { gain_ramp_ms, .. } = damiao.mode
             && f64::from(gain_ramp_ms) * 1e-3 > 0.5 * timeout_s
@@ -78,7 +88,7 @@ pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
             let expected = format!(
                 "at most half of supervision.drive_timeout_s = {timeout_s}: the ramp is a part of enabling"
             );
-            book.add(None, &format!("servo[{i}].gain_ramp_ms"), &gain_ramp_ms.to_string(), &expected);
+            fault_list.add(None, &format!("servo[{i}].gain_ramp_ms"), &gain_ramp_ms.to_string(), &expected);
         }
         let Some(bus) = settings.buses.get(servo.bus).filter(|bus| bus.traffic != Traffic::EVERY_CYCLE)
         else {
@@ -88,34 +98,40 @@ pub(crate) fn check_damiao(book: &Book, settings: &Settings) {
             format!("damiao on bus {} with setpoint_every, stagger, feedback_every or packed", bus.name);
         let expected = "a bus with one command and one answer a cycle: the motor does not interpolate, and answers \
                         each command";
-        book.add(None, &format!("servo[{i}].protocol"), &value, expected);
+        fault_list.add(None, &format!("servo[{i}].protocol"), &value, expected);
     }
 }
 
 /// A bus that its own cycle does not fit on would lose setpoints from the first second.
-pub(crate) fn check_loads(book: &Book, settings: &Settings) {
+pub(crate) fn check_loads(fault_list: &FaultList, settings: &Settings) {
     for (i, bus) in settings.buses.iter().enumerate() {
         let Some(load) = settings.bus_load(i).filter(BusLoad::is_refused) else { continue };
         let value = format!("{:.1} % full in the worst case", load.percent);
-        let best = settings.ways_out(i).into_iter().filter(|way| way.suffices).map(|way| way.what);
-        let ways: Vec<String> = best.take(2).collect();
+        let best =
+            settings.remedies(i).into_iter().filter(|remedy| remedy.suffices).map(|remedy| remedy.what);
+        let remedies: Vec<String> = best.take(2).collect();
         let expected = format!(
             "at most {REFUSED_PERCENT} % on {}, for instance by {} (`taustream check` lists all ways out)",
             bus.interface,
-            if ways.is_empty() { "more buses".to_owned() } else { ways.join("; or by ") }
+            if remedies.is_empty() { "more buses".to_owned() } else { remedies.join("; or by ") }
         );
-        book.add(None, &format!("bus[{i}]"), &value, &expected);
+        fault_list.add(None, &format!("bus[{i}]"), &value, &expected);
     }
 }
 
 /// Rarer setpoints and answers only make sense within the limits of supervision.
-pub(crate) fn check_traffic(book: &Book, settings: &Settings) {
+pub(crate) fn check_traffic(fault_list: &FaultList, settings: &Settings) {
     let period_ms = f64::from(settings.cycle.period_us) * 1e-3;
     for (i, bus) in settings.buses.iter().enumerate() {
         let Traffic { setpoint_every, feedback_every, packed, .. } = bus.traffic;
         let servos = settings.servos.iter().filter(|servo| servo.bus == i).count();
         if packed && servos < 2 {
-            book.add(None, &format!("bus[{i}].packed"), "true", "two servos on the bus that share a frame");
+            fault_list.add(
+                None,
+                &format!("bus[{i}].packed"),
+                "true",
+                "two servos on the bus that share a frame",
+            );
         }
         // What a drive waits for when all goes well, and the gap that it bridges on top, must not trip it.
         let wait_periods = settings.cycle.tolerated_gap_periods + setpoint_every - 1;
@@ -126,7 +142,7 @@ pub(crate) fn check_traffic(book: &Book, settings: &Settings) {
                 "setpoints that come, with the tolerated gap, more often than every drive_watchdog_ms = \
                  {watchdog_ms} ({wait_ms} ms as it stands)"
             );
-            book.add(None, &format!("bus[{i}].setpoint_every"), &setpoint_every.to_string(), &expected);
+            fault_list.add(None, &format!("bus[{i}].setpoint_every"), &setpoint_every.to_string(), &expected);
         }
         // One answer is one cycle old when it is looked at; below one more, jitter alone would stop the arm.
         let age_s = settings.supervision.feedback_age_s_max;
@@ -135,7 +151,7 @@ pub(crate) fn check_traffic(book: &Book, settings: &Settings) {
             let expected = format!(
                 "answers for which feedback_age_s_max = {age_s:?} has room: it must be {least_s} s or more"
             );
-            book.add(None, &format!("bus[{i}].feedback_every"), &feedback_every.to_string(), &expected);
+            fault_list.add(None, &format!("bus[{i}].feedback_every"), &feedback_every.to_string(), &expected);
         }
     }
 }

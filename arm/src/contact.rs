@@ -4,7 +4,7 @@
 //! collision. As set-up assistants do it, a pair that touches in every one of many random poses may touch. The draw
 //! is seeded and of our own making, so that an arm has the same list on every machine and in every version.
 use crate::body::{Body, Posed, to_parry};
-use crate::draw::Draw;
+use crate::rng::SeededRng;
 use crate::robot::LinkShape;
 use std::collections::BTreeMap;
 use taustream_motion::chain::Chain;
@@ -66,11 +66,11 @@ fn always_touching(
             }
         }
     }
-    let mut draw = Draw::new(SEED, 0);
+    let mut rng = SeededRng::new(SEED, 0);
     let mut placed: Vec<Posed> = Vec::new();
     for _ in 0..POSES {
         // Every pose takes its numbers, so that the list does not depend on when a pair drops out.
-        let position_rad = uniform_pose(&mut draw, limits);
+        let position_rad = uniform_pose(&mut rng, limits);
         if pairs.is_empty() {
             break;
         }
@@ -91,11 +91,11 @@ fn always_touching(
     pairs.into_keys().collect()
 }
 
-fn uniform_pose(draw: &mut Draw, limits: &[JointLimits]) -> [f64; MAX_JOINTS] {
+fn uniform_pose(rng: &mut SeededRng, limits: &[JointLimits]) -> [f64; MAX_JOINTS] {
     let mut position_rad = [0.0; MAX_JOINTS];
     for (slot, joint) in position_rad.iter_mut().zip(limits) {
         let [low, high] = joint.position_rad;
-        *slot = draw.within(low, high);
+        *slot = rng.within(low, high);
     }
     position_rad
 }

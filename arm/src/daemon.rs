@@ -83,30 +83,30 @@ impl Manager {
 
     /// Says what the process is about, in one line for `systemctl status`.
     pub fn status(&self, line: &str) {
-        tell(&[NotifyState::Status(line)]);
+        notify(&[NotifyState::Status(line)]);
     }
 
     /// The work has got on: says the first time that the process is ready, and feeds the watchdog when it is due.
     pub fn progress(&mut self) {
         if !self.is_ready {
             self.is_ready = true;
-            tell(&[NotifyState::Ready]);
+            notify(&[NotifyState::Ready]);
         }
         let Some(every) = self.feed_every else { return };
         if self.fed.is_none_or(|fed| fed.elapsed() >= every) {
             self.fed = Some(Instant::now());
-            tell(&[NotifyState::Watchdog]);
+            notify(&[NotifyState::Watchdog]);
         }
     }
 
     /// Says that the process is about to end because it was asked to.
     pub fn stopping() {
-        tell(&[NotifyState::Stopping]);
+        notify(&[NotifyState::Stopping]);
     }
 }
 
 /// Without `$NOTIFY_SOCKET` there is nobody to tell. A socket that refuses is mentioned once: the manager will act.
-fn tell(states: &[NotifyState<'_>]) {
+fn notify(states: &[NotifyState<'_>]) {
     static COMPLAINT: Once = Once::new();
     if let Err(error) = sd_notify::notify(states) {
         COMPLAINT.call_once(|| tracing::warn!("the service manager cannot be told anything: {error}"));
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn promise_is_broken_by_time_alone_and_mended_by_coming_back() {
+    fn promise_is_broken_by_time_alone_and_kept_again_after_a_restart() {
         let silent = Manager { feed_every: None, fed: None, is_ready: false };
         let promise = Promise::start(silent, Duration::from_secs(3_600)).unwrap();
         assert!(promise.is_kept());

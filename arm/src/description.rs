@@ -3,10 +3,10 @@
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
 use crate::document::{Node, Value, shown};
 use crate::mass::{self, Weight};
-use crate::reader::{Book, Bounds, Table};
+use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row};
-use crate::urdf::{self, JointFacts, UrdfArm};
+use crate::urdf::{self, JointInfo, UrdfArm};
 use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 
 /// One joint of the arm.
@@ -54,8 +54,8 @@ const STOP_JERK_RATIO: f64 = 4.0;
 
 impl Description {
     /// Reads every key; `None` after a fault that leaves nothing to describe.
-    pub(crate) fn read(book: &Book, node: Node) -> Option<Self> {
-        let mut top = Table::top(book, node)?;
+    pub(crate) fn read(fault_list: &FaultList, node: Node) -> Option<Self> {
+        let mut top = Table::top(fault_list, node)?;
         let name = top.name("name");
         let mut notices = Vec::new();
         let from_urdf = top.has("urdf");
@@ -67,7 +67,7 @@ impl Description {
         let (joints, geometry) = read.whole?;
         let (name, payload, gravity_m_s2) = (name?, payload?, gravity_m_s2?);
         let described = Self { name, joints, geometry, allowed_contacts, payload, gravity_m_s2, notices };
-        book.is_clean().then_some(described)
+        fault_list.is_clean().then_some(described)
     }
 }
 
@@ -101,13 +101,13 @@ fn read_rows(top: &mut Table<'_>) -> Read {
         read.push(name.zip(limits).zip(row).map(|((name, limits), row)| (Joint { name, limits }, row)));
     }
     check_names(
-        top.book(),
+        top.fault_list(),
         &read.iter().map(|j| j.as_ref().map(|(j, _)| j.name.as_str())).collect::<Vec<_>>(),
     );
     let rows: Vec<_> =
         read.iter().map(|j| j.as_ref().map(|(joint, row)| (joint.name.as_str(), row))).collect();
-    rows::check_kinds(top.book(), &rows);
-    rows::check_weights(top.book(), &rows);
+    rows::check_kinds(top.fault_list(), &rows);
+    rows::check_weights(top.fault_list(), &rows);
     let (joints, rows): (Vec<Joint>, Vec<Row>) = read.into_iter().flatten().unzip();
     // The names of the links follow from the number of tables, faulty ones included.
     let links = (0..=count).map(link_name).collect();
@@ -117,15 +117,15 @@ fn read_rows(top: &mut Table<'_>) -> Read {
 /// The URDF gives the joints and their order; the tables give what a URDF does not know.
 fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
     let arm = UrdfArm::read(top);
-    let facts = arm.as_ref().map(UrdfArm::joints);
-    let mut limits: Vec<Option<JointLimits>> = vec![None; facts.as_ref().map_or(0, Vec::len)];
+    let joint_info = arm.as_ref().map(UrdfArm::joints);
+    let mut limits: Vec<Option<JointLimits>> = vec![None; joint_info.as_ref().map_or(0, Vec::len)];
     let mut names: Vec<Option<String>> = Vec::new();
     for mut table in top.tables("joint") {
         let name = table.text("name", "the name of a joint of the URDF");
-        let at = facts.as_ref().zip(name.as_ref()).and_then(|(facts, name)| {
-            let at = facts.iter().position(|joint| joint.name == *name);
+        let at = joint_info.as_ref().zip(name.as_ref()).and_then(|(joint_info, name)| {
+            let at = joint_info.iter().position(|joint| joint.name == *name);
             if at.is_none() {
-                let known: Vec<&str> = facts.iter().map(|joint| joint.name.as_str()).collect();
+                let known: Vec<&str> = joint_info.iter().map(|joint| joint.name.as_str()).collect();
                 table.fault(
                     "name",
                     &shown(name),
@@ -134,7 +134,7 @@ fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
             }
             at
         });
-        let known = match at.and_then(|at| facts.as_ref()?.get(at)) {
+        let known = match at.and_then(|at| joint_info.as_ref()?.get(at)) {
             Some(joint) => Known::Urdf(joint),
             None => Known::Something,
         };
@@ -145,20 +145,20 @@ fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
         }
         names.push(name);
     }
-    check_names(top.book(), &names.iter().map(Option::as_deref).collect::<Vec<_>>());
+    check_names(top.fault_list(), &names.iter().map(Option::as_deref).collect::<Vec<_>>());
     let links = arm.as_ref().map(UrdfArm::links);
-    let Some((arm, facts)) = arm.zip(facts) else { return Read { links, whole: None } };
-    for joint in facts.iter().filter(|joint| !names.iter().flatten().any(|name| *name == joint.name)) {
+    let Some((arm, joint_info)) = arm.zip(joint_info) else { return Read { links, whole: None } };
+    for joint in joint_info.iter().filter(|joint| !names.iter().flatten().any(|name| *name == joint.name)) {
         let expected = format!(
             "one table [[joint]] with name = {}: a URDF has no accelerations and jerks, and they have no default",
             shown(&joint.name)
         );
         top.fault("joint", "missing", &expected);
     }
-    let joints: Option<Vec<Joint>> = facts
+    let joints: Option<Vec<Joint>> = joint_info
         .into_iter()
         .zip(limits)
-        .map(|(facts, limits)| Some(Joint { name: facts.name, limits: limits? }))
+        .map(|(joint_info, limits)| Some(Joint { name: joint_info.name, limits: limits? }))
         .collect();
     Read { links, whole: joints.map(|joints| (joints, Geometry::Urdf(Box::new(arm)))) }
 }
@@ -168,7 +168,7 @@ enum Known<'a> {
     /// Nothing: the table must say everything.
     Nothing,
     /// A URDF has it.
-    Urdf(&'a JointFacts),
+    Urdf(&'a JointInfo),
     /// A URDF was to have it, but could not be read, or has no such joint: one fault says so, not one a limit.
     Something,
 }
@@ -193,7 +193,7 @@ fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
             return None;
         }
         Known::Something => None,
-        Known::Urdf(facts) => facts.position_rad,
+        Known::Urdf(joint_info) => joint_info.position_rad,
     };
     if table.has("position_rad") {
         let [low, high] = table.interval("position_rad", &POSITION_RAD)?;
@@ -235,7 +235,7 @@ fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
 
 /// No default for acceleration and jerk: what plans may ask of a joint is the owner's word, not ours.
 fn read_motion(mut table: Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
-    let stated = if let Known::Urdf(facts) = known { facts.velocity_rad_s } else { None };
+    let stated = if let Known::Urdf(joint_info) = known { joint_info.velocity_rad_s } else { None };
     let velocity_rad_s = match stated.filter(|v| VELOCITY_RAD_S.hold(*v)) {
         Some(stated) if !table.has("velocity_rad_s") => {
             table.take("velocity_rad_s");
@@ -247,10 +247,10 @@ fn read_motion(mut table: Table<'_>, known: &Known<'_>, notices: &mut Vec<String
         }
         _ => table.number("velocity_rad_s", &VELOCITY_RAD_S),
     };
-    if let (Some(given), Some(stated), Known::Urdf(facts)) = (velocity_rad_s, stated, known)
+    if let (Some(given), Some(stated), Known::Urdf(joint_info)) = (velocity_rad_s, stated, known)
         && given > stated
     {
-        let name = shown(&facts.name);
+        let name = shown(&joint_info.name);
         notices.push(format!(
             "joint {name}: motion.velocity_rad_s = {given} is above the URDF's limit of {stated} rad/s"
         ));
@@ -329,12 +329,12 @@ fn read_contacts(top: &mut Table<'_>, links: Option<&[String]>) -> Vec<(usize, u
         let key = format!("allowed_contacts[{i}]");
         match pair_of(item, links) {
             Some(pair) if !pairs.contains(&pair) => pairs.push(pair),
-            Some(_) => top.book().add(item.line, &key, &item.to_string(), "each pair once"),
+            Some(_) => top.fault_list().add(item.line, &key, &item.to_string(), "each pair once"),
             None => {
                 let names: Vec<String> = links.iter().take(LINKS_SHOWN_MAX).map(|name| shown(name)).collect();
                 let more = if links.len() > LINKS_SHOWN_MAX { ", .." } else { "" };
                 let expected = format!("two different links of {}{more}", names.join(", "));
-                top.book().add(item.line, &key, &item.to_string(), &expected);
+                top.fault_list().add(item.line, &key, &item.to_string(), &expected);
             }
         }
     }
@@ -357,11 +357,11 @@ fn pair_of(item: &Node, links: &[String]) -> Option<(usize, usize)> {
 }
 
 /// Settings bind servos by joint name: two of one name would leave a joint to chance.
-fn check_names(book: &Book, names: &[Option<&str>]) {
+fn check_names(fault_list: &FaultList, names: &[Option<&str>]) {
     for (i, name) in names.iter().enumerate() {
         let Some(name) = name else { continue };
         if names.iter().take(i).flatten().any(|other| other == name) {
-            book.add(None, &format!("joint[{i}].name"), &shown(name), "each joint's name once");
+            fault_list.add(None, &format!("joint[{i}].name"), &shown(name), "each joint's name once");
         }
     }
 }

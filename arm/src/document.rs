@@ -98,8 +98,8 @@ pub(crate) fn read_file(file: &Path, bytes_max: u64, what: &str) -> Result<Vec<u
         fault(&if missing { "no such file".to_owned() } else { format!("cannot be read ({e})") }, what)
     };
     // A device or a pipe could block or never end, so it is turned away before it is opened.
-    let facts = std::fs::metadata(file).map_err(refused)?;
-    if !facts.is_file() {
+    let metadata = std::fs::metadata(file).map_err(refused)?;
+    if !metadata.is_file() {
         return Err(fault("not a regular file", what));
     }
     // One byte more than allowed tells a file that is too long from one that just fits, whatever its metadata says.
@@ -193,7 +193,7 @@ fn from_value(value: &DeValue<'_>, lines: &Lines) -> Value {
 
 /// Reads a JSON text. The syntax fault names line, column and the key that was being read.
 pub(crate) fn parse_json(file: &Path, text: &str) -> Result<Node, Faults> {
-    let trail = Trail::default();
+    let trail = PathTrail::default();
     let mut source = serde_json::Deserializer::from_str(text);
     let read =
         NodeSeed { trail: &trail }.deserialize(&mut source).and_then(|node| source.end().map(|()| node));
@@ -231,14 +231,14 @@ fn token_at(text: &str, line: usize, column: usize) -> String {
 
 /// Where in a JSON tree the reader is, and the first key that stood twice.
 #[derive(Default)]
-struct Trail {
+struct PathTrail {
     keys: RefCell<Vec<String>>,
     twice: RefCell<Option<String>>,
 }
 
 /// Reads one value with everything below it; nesting is bounded by the parser (128 levels).
 struct NodeSeed<'t> {
-    trail: &'t Trail,
+    trail: &'t PathTrail,
 }
 
 impl<'de> DeserializeSeed<'de> for NodeSeed<'_> {

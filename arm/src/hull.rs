@@ -210,19 +210,18 @@ fn keep_outside(points: &mut Vec<Vector>, corners: &[Vector], faces: &[[u32; 3]]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
 
     /// Points of one of many kinds: dense and sparse, round and edged, doubled, nearly flat, on a grid.
     fn points(seed: u64) -> Vec<Point3<f64>> {
-        let mut draw = Draw::new(seed, 20);
-        let count = if seed.is_multiple_of(7) { 3 + draw.index(6) } else { 20 + draw.index(400) };
-        let size = Point3::new(draw.within(0.01, 0.5), draw.within(0.01, 0.5), draw.within(0.01, 0.5));
-        let flat = if seed % 5 == 1 { draw.within(0.0, 1e-3) } else { 1.0 };
-        let kind = draw.index(5);
+        let mut rng = SeededRng::new(seed, 20);
+        let count = if seed.is_multiple_of(7) { 3 + rng.index(6) } else { 20 + rng.index(400) };
+        let size = Point3::new(rng.within(0.01, 0.5), rng.within(0.01, 0.5), rng.within(0.01, 0.5));
+        let flat = if seed % 5 == 1 { rng.within(0.0, 1e-3) } else { 1.0 };
+        let kind = rng.index(5);
         let mut made: Vec<Point3<f64>> = (0..count)
             .map(|_| {
-                let mut p =
-                    Vector::new(draw.within(-1.0, 1.0), draw.within(-1.0, 1.0), draw.within(-1.0, 1.0));
+                let mut p = Vector::new(rng.within(-1.0, 1.0), rng.within(-1.0, 1.0), rng.within(-1.0, 1.0));
                 match kind {
                     0 => p = p.normalize_or_zero(),   // A ball's surface.
                     1 => p = (p * 2.0).round() / 2.0, // A grid: many in one plane.
@@ -234,7 +233,7 @@ mod tests {
             })
             .collect();
         let askew =
-            nalgebra::UnitQuaternion::from_euler_angles(draw.within(0.0, 3.0), draw.within(0.0, 3.0), 0.0);
+            nalgebra::UnitQuaternion::from_euler_angles(rng.within(0.0, 3.0), rng.within(0.0, 3.0), 0.0);
         if seed.is_multiple_of(2) {
             made = made.iter().map(|p| askew * p).collect();
         }
@@ -261,12 +260,12 @@ mod tests {
                 }
             };
             boxes += u32::from(hull.is_box);
-            let mut draw = Draw::new(seed, 21);
+            let mut rng = SeededRng::new(seed, 21);
             for _ in 0..200 {
                 let d = nalgebra::Vector3::new(
-                    draw.within(-1.0, 1.0),
-                    draw.within(-1.0, 1.0),
-                    draw.within(-1.0, 1.0),
+                    rng.within(-1.0, 1.0),
+                    rng.within(-1.0, 1.0),
+                    rng.within(-1.0, 1.0),
                 );
                 let d = d.normalize();
                 let reach =

@@ -83,12 +83,12 @@ fn hex(text: &str) -> String {
 /// The state directory: what was asked for, else `$STATE_DIRECTORY` (systemd; the first of several), else
 /// `$XDG_STATE_HOME/taustream`, else `~/.local/state/taustream`, else `/var/lib/taustream`.
 #[must_use]
-pub fn directory(asked: Option<&Path>) -> PathBuf {
-    choose(asked, |name| std::env::var_os(name).filter(|value| !value.is_empty()))
+pub fn directory(requested: Option<&Path>) -> PathBuf {
+    choose(requested, |name| std::env::var_os(name).filter(|value| !value.is_empty()))
 }
 
-fn choose(asked: Option<&Path>, variable: impl Fn(&str) -> Option<OsString>) -> PathBuf {
-    if let Some(path) = asked {
+fn choose(requested: Option<&Path>, variable: impl Fn(&str) -> Option<OsString>) -> PathBuf {
+    if let Some(path) = requested {
         return path.to_owned();
     }
     if let Some(list) = variable("STATE_DIRECTORY") {
@@ -189,11 +189,11 @@ impl LastPose {
 /// Reads a file of our own that is a file: a pipe would keep us waiting, and somebody else's tells what somebody else wants.
 fn read(path: &Path) -> std::io::Result<String> {
     let refused = |why: &str| std::io::Error::other(why.to_owned());
-    let facts = fs::symlink_metadata(path)?;
-    if !facts.is_file() {
+    let metadata = fs::symlink_metadata(path)?;
+    if !metadata.is_file() {
         return Err(refused("it is no regular file"));
     }
-    if facts.uid() != rustix::process::geteuid().as_raw() || facts.mode() & 0o022 != 0 {
+    if metadata.uid() != rustix::process::geteuid().as_raw() || metadata.mode() & 0o022 != 0 {
         return Err(refused("others could have written it (owner or mode)"));
     }
     let mut text = String::new();

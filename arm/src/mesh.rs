@@ -49,8 +49,8 @@ pub(crate) struct Cloud {
 pub(crate) fn load_points(file: &Path, scale: [f64; 3]) -> Result<Cloud, Refusal> {
     let (ending, bytes) = read(file)?;
     let digest = digest::of_bytes(&bytes);
-    let soup = soup(&ending, bytes);
-    let points = soup.and_then(|(corners, triangles)| {
+    let triangle_soup = triangle_soup(&ending, bytes);
+    let points = triangle_soup.and_then(|(corners, triangles)| {
         check_count(&triangles)?;
         place(corners, scale)
     });
@@ -72,7 +72,7 @@ fn read(file: &Path) -> Result<(String, Vec<u8>), Refusal> {
 
 /// Reads and checks the bytes of a mesh file with the given ending.
 fn parse(ending: &str, bytes: Vec<u8>, scale: f64) -> Result<Mesh, Refusal> {
-    let (corners, triangles) = soup(ending, bytes)?;
+    let (corners, triangles) = triangle_soup(ending, bytes)?;
     check(corners, triangles, scale)
 }
 
@@ -87,15 +87,15 @@ fn first_of(file: &Path, faults: &Faults) -> Refusal {
     }
 }
 
-fn soup(ending: &str, bytes: Vec<u8>) -> Result<Soup, Refusal> {
+fn triangle_soup(ending: &str, bytes: Vec<u8>) -> Result<TriangleSoup, Refusal> {
     if ending == "stl" { read_stl(bytes) } else { read_obj(&bytes) }
 }
 
-type Soup = (Vec<[f32; 3]>, Vec<[usize; 3]>);
+type TriangleSoup = (Vec<[f32; 3]>, Vec<[usize; 3]>);
 
 /// A binary file's length follows from its count, and that decides the format: the customary test, whether it begins
 /// with `solid`, takes many binary files for text.
-fn read_stl(mut bytes: Vec<u8>) -> Result<Soup, Refusal> {
+fn read_stl(mut bytes: Vec<u8>) -> Result<TriangleSoup, Refusal> {
     // Checked against the length before anything is allocated: the count is any number up to four thousand million.
     let count = bytes.get(80..STL_HEADER_BYTES).and_then(|c| c.try_into().ok()).map_or(0, u32::from_le_bytes);
     let binary_bytes = STL_HEADER_BYTES as u64 + u64::from(count) * STL_TRIANGLE_BYTES as u64;
@@ -120,7 +120,7 @@ fn read_stl(mut bytes: Vec<u8>) -> Result<Soup, Refusal> {
     Ok((corners, mesh.faces.iter().map(|face| face.vertices).collect()))
 }
 
-fn read_obj(bytes: &[u8]) -> Result<Soup, Refusal> {
+fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, Refusal> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,

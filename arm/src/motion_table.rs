@@ -3,7 +3,7 @@
 //! The first line names the columns: `t_s`, then `q1_rad` to `qN_rad` in any order; others are let go and named. A table comes
 //! from anywhere and may be of any length, so it is read line by line, and lines, rows and columns are bounded.
 use crate::document::shown;
-use crate::reader::{Book, Bounds};
+use crate::reader::{Bounds, FaultList};
 use crate::{Fault, Faults};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -54,7 +54,7 @@ impl MotionTable {
         let refused = |value: &str| Faults(vec![Fault::new(file, "", value, WANTED)]);
         // A device or a pipe could block, so it is turned away before it is opened.
         match std::fs::metadata(file) {
-            Ok(facts) if facts.is_file() => {}
+            Ok(metadata) if metadata.is_file() => {}
             Ok(_) => return Err(refused("not a regular file")),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Err(refused("no such file")),
             Err(e) => return Err(refused(&format!("cannot be read ({e})"))),
@@ -68,22 +68,22 @@ impl MotionTable {
     /// # Errors
     /// Every fault at once, up to a hundred.
     pub fn read(file: &Path, mut source: impl BufRead) -> Result<Self, Faults> {
-        let book = Book::new(file);
-        let table = read_table(&book, &mut source);
-        book.close(table)
+        let fault_list = FaultList::new(file);
+        let table = read_table(&fault_list, &mut source);
+        fault_list.close(table)
     }
 }
 
 const WANTED: &str = "a table (CSV) whose first line names t_s, q1_rad, q2_rad, ..";
 
-fn read_table(book: &Book, source: &mut impl BufRead) -> Option<MotionTable> {
+fn read_table(fault_list: &FaultList, source: &mut impl BufRead) -> Option<MotionTable> {
     let mut line = Vec::new();
     let mut number = 1;
-    let Some(header) = next_line(book, source, &mut line, number)? else {
-        book.add(None, "", "empty", WANTED);
+    let Some(header) = next_line(fault_list, source, &mut line, number)? else {
+        fault_list.add(None, "", "empty", WANTED);
         return None;
     };
-    let columns = read_header(book, header.trim_start_matches('\u{feff}'))?;
+    let columns = read_header(fault_list, header.trim_start_matches('\u{feff}'))?;
     let mut table = MotionTable {
         joints: columns.joints.len(),
         t_s: Vec::new(),
@@ -93,40 +93,40 @@ fn read_table(book: &Book, source: &mut impl BufRead) -> Option<MotionTable> {
     };
     loop {
         number += 1;
-        let Some(text) = next_line(book, source, &mut line, number)? else { break };
+        let Some(text) = next_line(fault_list, source, &mut line, number)? else { break };
         if text.trim().is_empty() {
             continue;
         }
         if table.t_s.len() == ROWS_MAX {
             let expected = format!("at most {ROWS_MAX} rows; sample at a lower rate, or cut the motion");
-            book.add(Some(number), "", "one row more", &expected);
+            fault_list.add(Some(number), "", "one row more", &expected);
             return None;
         }
-        read_row(book, &columns, (number, text), &mut table);
+        read_row(fault_list, &columns, (number, text), &mut table);
     }
-    if book.is_clean() && table.t_s.len() < 2 {
+    if fault_list.is_clean() && table.t_s.len() < 2 {
         let value = format!("{} row(s)", table.t_s.len());
-        book.add(None, "", &value, "at least two rows: one pose is no motion");
+        fault_list.add(None, "", &value, "at least two rows: one pose is no motion");
     }
-    finish(book, table)
+    finish(fault_list, table)
 }
 
 /// Takes the first time off all of them.
-fn finish(book: &Book, mut table: MotionTable) -> Option<MotionTable> {
+fn finish(fault_list: &FaultList, mut table: MotionTable) -> Option<MotionTable> {
     table.began_s = table.t_s.first().copied().unwrap_or(0.0);
     for t_s in &mut table.t_s {
         *t_s -= table.began_s;
     }
     let span_s = table.t_s.last().copied().unwrap_or(0.0);
     if span_s > END_S_MAX {
-        book.add(None, "t_s", &format!("a motion of {span_s} s"), &format!("at most {END_S_MAX} s"));
+        fault_list.add(None, "t_s", &format!("a motion of {span_s} s"), &format!("at most {END_S_MAX} s"));
     }
-    book.is_clean().then_some(table)
+    fault_list.is_clean().then_some(table)
 }
 
 /// The next line without its end; the inner `None` is the end of the table, the outer one a fault.
 fn next_line<'l>(
-    book: &Book,
+    fault_list: &FaultList,
     source: &mut impl BufRead,
     line: &'l mut Vec<u8>,
     number: usize,
@@ -137,20 +137,21 @@ fn next_line<'l>(
     match bounded.read_until(b'\n', line) {
         Ok(0) => return Some(None),
         Ok(bytes) if bytes > LINE_BYTES_MAX => {
-            book.add(at, "", "a longer line", &format!("lines of at most {LINE_BYTES_MAX} bytes"));
+            fault_list.add(at, "", "a longer line", &format!("lines of at most {LINE_BYTES_MAX} bytes"));
             return None;
         }
         Ok(_) => {}
         Err(e) => {
-            book.add(at, "", &format!("cannot be read ({e})"), WANTED);
+            fault_list.add(at, "", &format!("cannot be read ({e})"), WANTED);
             return None;
         }
     }
-    let text = std::str::from_utf8(line).map_err(|_| book.add(at, "", "not UTF-8 text", WANTED)).ok()?;
+    let text =
+        std::str::from_utf8(line).map_err(|_| fault_list.add(at, "", "not UTF-8 text", WANTED)).ok()?;
     Some(Some(text.trim_end_matches(['\n', '\r'])))
 }
 
-fn read_header(book: &Book, text: &str) -> Option<Columns> {
+fn read_header(fault_list: &FaultList, text: &str) -> Option<Columns> {
     let mut time = None;
     let mut joints: [Option<usize>; MAX_JOINTS] = [None; MAX_JOINTS];
     let (mut ignored, mut count) = (Vec::new(), 0);
@@ -162,7 +163,12 @@ fn read_header(book: &Book, text: &str) -> Option<Columns> {
             None if name == "t_s" => &mut time,
             Some(joint @ 1..=MAX_JOINTS) => &mut joints[joint - 1],
             Some(_) => {
-                book.add(Some(1), &shown(name), "too many joints", &format!("q1_rad to q{MAX_JOINTS}_rad"));
+                fault_list.add(
+                    Some(1),
+                    &shown(name),
+                    "too many joints",
+                    &format!("q1_rad to q{MAX_JOINTS}_rad"),
+                );
                 continue;
             }
             None => {
@@ -173,37 +179,42 @@ fn read_header(book: &Book, text: &str) -> Option<Columns> {
             }
         };
         if slot.replace(at).is_some() {
-            book.add(Some(1), name, "stands there twice", "each column once");
+            fault_list.add(Some(1), name, "stands there twice", "each column once");
         }
     }
     let moved = joints.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     if time.is_none() {
-        book.add(Some(1), "t_s", "missing", WANTED);
+        fault_list.add(Some(1), "t_s", "missing", WANTED);
     }
     for (joint, column) in joints.iter().enumerate().take(moved.max(1)) {
         if column.is_none() {
-            book.add(Some(1), &format!("q{}_rad", joint + 1), "missing", WANTED);
+            fault_list.add(Some(1), &format!("q{}_rad", joint + 1), "missing", WANTED);
         }
     }
-    if !book.is_clean() {
+    if !fault_list.is_clean() {
         return None;
     }
     Some(Columns { time: time?, joints: joints.into_iter().flatten().collect(), count, ignored })
 }
 
-fn read_row(book: &Book, columns: &Columns, (number, text): (usize, &str), table: &mut MotionTable) {
+fn read_row(
+    fault_list: &FaultList,
+    columns: &Columns,
+    (number, text): (usize, &str),
+    table: &mut MotionTable,
+) {
     let words: Vec<&str> = text.split(',').collect();
     if words.len() != columns.count {
         let (value, expected) =
             (format!("{} values", words.len()), format!("{} as in line 1", columns.count));
-        book.add(Some(number), "", &value, &expected);
+        fault_list.add(Some(number), "", &value, &expected);
         return;
     }
     let value = |key: &dyn Fn() -> String, at: usize, bounds: &Bounds| -> Option<f64> {
         let word = words.get(at).map_or("", |word| word.trim());
         let parsed = word.parse::<f64>().ok().filter(|value| bounds.hold(*value));
         if parsed.is_none() {
-            book.add(Some(number), &key(), &shown(word), &bounds.words());
+            fault_list.add(Some(number), &key(), &shown(word), &bounds.words());
         }
         parsed
     };
@@ -214,7 +225,7 @@ fn read_row(book: &Book, columns: &Columns, (number, text): (usize, &str), table
     }
     let Some(t_s) = t_s else { return };
     if let Some(before_s) = table.t_s.last().filter(|before_s| t_s <= **before_s) {
-        book.add(
+        fault_list.add(
             Some(number),
             "t_s",
             &format!("{t_s}"),

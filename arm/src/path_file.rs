@@ -1,6 +1,6 @@
 //! A path: points that an arm's tip or joints go through, in a file (TOML) of their own.
 use crate::document::{self, Node, Value};
-use crate::reader::{Book, Bounds, Table, numbers_of};
+use crate::reader::{Bounds, FaultList, Table, numbers_of};
 use crate::{Fault, Faults};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
@@ -50,15 +50,15 @@ impl PathFile {
     /// # Errors
     /// Every fault at once.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
-        let book = Book::new(file);
-        let path = Self::read(&book, document::parse_toml(file, text)?);
-        book.close(path)
+        let fault_list = FaultList::new(file);
+        let path = Self::read(&fault_list, document::parse_toml(file, text)?);
+        fault_list.close(path)
     }
 
-    fn read(book: &Book, node: Node) -> Option<Self> {
-        let mut top = Table::top(book, node)?;
+    fn read(fault_list: &FaultList, node: Node) -> Option<Self> {
+        let mut top = Table::top(fault_list, node)?;
         let profile = top.text_if_there("profile", "the name of a profile");
-        let near_rad = top.take("near_rad").and_then(|node| angles(book, "near_rad", &node));
+        let near_rad = top.take("near_rad").and_then(|node| angles(fault_list, "near_rad", &node));
         let scale = top.number_or("scale", 1.0, &SCALE);
         let shift_m = top.numbers_or("shift_m", [0.0; 3], &POSITION_M);
         let tables = top.tables("point");
@@ -68,15 +68,15 @@ impl PathFile {
         }
         top.done();
         let map = (scale?, Vector3::from(shift_m?));
-        let read = |(i, table)| read_point(book, &format!("point[{i}]"), table, map);
+        let read = |(i, table)| read_point(fault_list, &format!("point[{i}]"), table, map);
         let points: Vec<Option<PathPoint>> = tables.into_iter().enumerate().map(read).collect();
         let points = points.into_iter().collect::<Option<Vec<_>>>()?;
-        Some(Self { file: book.file().to_owned(), profile, near_rad, points })
+        Some(Self { file: fault_list.file().to_owned(), profile, near_rad, points })
     }
 }
 
 fn read_point(
-    book: &Book,
+    fault_list: &FaultList,
     path: &str,
     mut table: Table<'_>,
     (scale, shift_m): (f64, Vector3<f64>),
@@ -85,7 +85,7 @@ fn read_point(
     let joints = table.take("joints_rad");
     if let Some(node) = joints {
         table.done();
-        return angles(book, &format!("{path}.joints_rad"), &node).map(PathPoint::Joints);
+        return angles(fault_list, &format!("{path}.joints_rad"), &node).map(PathPoint::Joints);
     }
     if !table.has("position_m") {
         table.fault("", "neither joints_rad nor position_m", EITHER);
@@ -97,14 +97,15 @@ fn read_point(
 }
 
 /// One to eight angles; the file does not know how many joints the arm has.
-fn angles(book: &Book, key: &str, node: &Node) -> Option<Vec<f64>> {
+fn angles(fault_list: &FaultList, key: &str, node: &Node) -> Option<Vec<f64>> {
     let count = if let Value::List(items) = &node.value { items.len() } else { 0 };
     if !(1..=MAX_JOINTS).contains(&count) {
-        let fault = Fault::new(book.file(), key, &node.to_string(), "a list of one angle (rad) a joint");
-        book.take_over(Faults(vec![Fault { line: node.line, ..fault }]));
+        let fault =
+            Fault::new(fault_list.file(), key, &node.to_string(), "a list of one angle (rad) a joint");
+        fault_list.merge(Faults(vec![Fault { line: node.line, ..fault }]));
         return None;
     }
-    numbers_of(book, key, node, count, &ANGLE_RAD)
+    numbers_of(fault_list, key, node, count, &ANGLE_RAD)
 }
 
 #[cfg(test)]

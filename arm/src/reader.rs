@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 const FAULTS_MAX: usize = 100;
 
 /// The faults found so far in one file.
-pub(crate) struct Book {
+pub(crate) struct FaultList {
     file: PathBuf,
     faults: RefCell<Vec<Fault>>,
     /// How many were left out.
     further: RefCell<usize>,
 }
 
-impl Book {
+impl FaultList {
     pub(crate) fn new(file: &Path) -> Self {
         Self { file: file.to_owned(), faults: RefCell::default(), further: RefCell::default() }
     }
@@ -30,7 +30,7 @@ impl Book {
         self.push(Fault { line, ..Fault::new(&self.file, key, value, expected) });
     }
     /// Takes over the faults of a file that this one names.
-    pub(crate) fn take_over(&self, faults: Faults) {
+    pub(crate) fn merge(&self, faults: Faults) {
         faults.0.into_iter().for_each(|fault| self.push(fault));
     }
     fn push(&self, fault: Fault) {
@@ -101,7 +101,7 @@ impl Bounds {
 }
 
 /// A number of a node, noting what is wrong with it.
-pub(crate) fn number_of(book: &Book, key: &str, node: &Node, bounds: &Bounds) -> Option<f64> {
+pub(crate) fn number_of(fault_list: &FaultList, key: &str, node: &Node, bounds: &Bounds) -> Option<f64> {
     let number = match &node.value {
         Value::Number(number) => *number,
         // Exact for every integer that any bounds of ours let through.
@@ -111,35 +111,35 @@ pub(crate) fn number_of(book: &Book, key: &str, node: &Node, bounds: &Bounds) ->
     if bounds.hold(number) {
         return Some(number);
     }
-    book.add(node.line, key, &node.to_string(), &bounds.words());
+    fault_list.add(node.line, key, &node.to_string(), &bounds.words());
     None
 }
 
 /// Exactly `count` numbers of a node.
 pub(crate) fn numbers_of(
-    book: &Book,
+    fault_list: &FaultList,
     key: &str,
     node: &Node,
     count: usize,
     bounds: &Bounds,
 ) -> Option<Vec<f64>> {
     let Value::List(items) = &node.value else {
-        book.add(node.line, key, &node.to_string(), &format!("a list of {count} numbers"));
+        fault_list.add(node.line, key, &node.to_string(), &format!("a list of {count} numbers"));
         return None;
     };
     if items.len() != count {
         let value = format!("{node} ({} values)", items.len());
-        book.add(node.line, key, &value, &format!("a list of {count} numbers"));
+        fault_list.add(node.line, key, &value, &format!("a list of {count} numbers"));
         return None;
     }
-    let read = |(i, item): (usize, &Node)| number_of(book, &format!("{key}[{i}]"), item, bounds);
+    let read = |(i, item): (usize, &Node)| number_of(fault_list, &format!("{key}[{i}]"), item, bounds);
     // Every item is looked at, so that two bad ones are two faults.
     let numbers: Vec<Option<f64>> = items.iter().enumerate().map(read).collect();
     numbers.into_iter().collect()
 }
 
 /// A key that was asked for, whether it was there, and its line.
-struct Asked {
+struct RequestedKey {
     key: &'static str,
     there: bool,
     line: Option<usize>,
@@ -147,27 +147,27 @@ struct Asked {
 
 /// One table of a file, handed out key by key.
 pub(crate) struct Table<'b> {
-    book: &'b Book,
+    fault_list: &'b FaultList,
     path: String,
     line: Option<usize>,
     entries: Vec<Entry>,
-    asked: Vec<Asked>,
+    requested: Vec<RequestedKey>,
 }
 
 impl<'b> Table<'b> {
     /// The table at the top of a file, or a fault.
-    pub(crate) fn top(book: &'b Book, node: Node) -> Option<Self> {
-        Self::from_node(book, String::new(), node)
+    pub(crate) fn top(fault_list: &'b FaultList, node: Node) -> Option<Self> {
+        Self::from_node(fault_list, String::new(), node)
     }
-    fn from_node(book: &'b Book, path: String, node: Node) -> Option<Self> {
+    fn from_node(fault_list: &'b FaultList, path: String, node: Node) -> Option<Self> {
         if let Value::Table(entries) = node.value {
-            return Some(Self { book, path, line: node.line, entries, asked: Vec::new() });
+            return Some(Self { fault_list, path, line: node.line, entries, requested: Vec::new() });
         }
-        book.add(node.line, &path, &node.to_string(), "a table");
+        fault_list.add(node.line, &path, &node.to_string(), "a table");
         None
     }
-    pub(crate) fn book(&self) -> &'b Book {
-        self.book
+    pub(crate) fn fault_list(&self) -> &'b FaultList {
+        self.fault_list
     }
     /// The path of one of its keys from the top of the file.
     pub(crate) fn path_of(&self, key: &str) -> String {
@@ -176,12 +176,13 @@ impl<'b> Table<'b> {
     /// Notes a fault of one of its keys (of the table itself when the key is empty).
     pub(crate) fn fault(&self, key: &str, value: &str, expected: &str) {
         let path = if key.is_empty() { self.path.clone() } else { self.path_of(key) };
-        let at = self.asked.iter().find(|asked| asked.key == key).and_then(|asked| asked.line);
-        self.book.add(at.or(self.line), &path, value, expected);
+        let at =
+            self.requested.iter().find(|requested| requested.key == key).and_then(|requested| requested.line);
+        self.fault_list.add(at.or(self.line), &path, value, expected);
     }
     /// True when a key stood there, whatever it held.
     pub(crate) fn had(&self, key: &str) -> bool {
-        self.asked.iter().any(|asked| asked.key == key && asked.there)
+        self.requested.iter().any(|requested| requested.key == key && requested.there)
     }
     /// True when a key stands there and was not taken yet.
     pub(crate) fn has(&self, key: &str) -> bool {
@@ -193,7 +194,7 @@ impl<'b> Table<'b> {
         let at = self.entries.iter().position(|entry| entry.key == key);
         let node = at.map(|at| self.entries.swap_remove(at).node);
         let line = node.as_ref().and_then(|node| node.line);
-        self.asked.push(Asked { key, there: node.is_some(), line });
+        self.requested.push(RequestedKey { key, there: node.is_some(), line });
         node
     }
     /// The value of a key; its absence is a fault.
@@ -207,19 +208,19 @@ impl<'b> Table<'b> {
     /// The number of a key; its absence is a fault.
     pub(crate) fn number(&mut self, key: &'static str, bounds: &Bounds) -> Option<f64> {
         let node = self.need(key, &bounds.words())?;
-        number_of(self.book, &self.path_of(key), &node, bounds)
+        number_of(self.fault_list, &self.path_of(key), &node, bounds)
     }
     /// The number, or the default when the key is absent; `None` only after a fault.
     pub(crate) fn number_or(&mut self, key: &'static str, default: f64, bounds: &Bounds) -> Option<f64> {
         match self.take(key) {
             None => Some(default),
-            Some(node) => number_of(self.book, &self.path_of(key), &node, bounds),
+            Some(node) => number_of(self.fault_list, &self.path_of(key), &node, bounds),
         }
     }
     /// Exactly `N` numbers; their absence is a fault.
     pub(crate) fn numbers<const N: usize>(&mut self, key: &'static str, bounds: &Bounds) -> Option<[f64; N]> {
         let node = self.need(key, &format!("a list of {N} numbers"))?;
-        numbers_of(self.book, &self.path_of(key), &node, N, bounds)?.try_into().ok()
+        numbers_of(self.fault_list, &self.path_of(key), &node, N, bounds)?.try_into().ok()
     }
     /// Exactly `N` numbers, or the default when the key is absent; `None` only after a fault.
     pub(crate) fn numbers_or<const N: usize>(
@@ -230,7 +231,7 @@ impl<'b> Table<'b> {
     ) -> Option<[f64; N]> {
         match self.take(key) {
             None => Some(default),
-            Some(node) => numbers_of(self.book, &self.path_of(key), &node, N, bounds)?.try_into().ok(),
+            Some(node) => numbers_of(self.fault_list, &self.path_of(key), &node, N, bounds)?.try_into().ok(),
         }
     }
     /// Two finite numbers, the first below the second.
@@ -293,7 +294,7 @@ impl<'b> Table<'b> {
         self.refuse(key, node, expected)
     }
     fn refuse<T>(&self, key: &str, node: &Node, expected: &str) -> Option<T> {
-        self.book.add(node.line, &self.path_of(key), &node.to_string(), expected);
+        self.fault_list.add(node.line, &self.path_of(key), &node.to_string(), expected);
         None
     }
     /// A name: it goes into messages, file names and tables, so it is a plain word.
@@ -321,31 +322,31 @@ impl<'b> Table<'b> {
     /// A table inside this one; its absence is a fault.
     pub(crate) fn table(&mut self, key: &'static str, expected: &str) -> Option<Table<'b>> {
         let node = self.need(key, expected)?;
-        Self::from_node(self.book, self.path_of(key), node)
+        Self::from_node(self.fault_list, self.path_of(key), node)
     }
     /// A table inside this one, or none.
     pub(crate) fn table_if_there(&mut self, key: &'static str) -> Option<Table<'b>> {
         let node = self.take(key)?;
-        Self::from_node(self.book, self.path_of(key), node)
+        Self::from_node(self.fault_list, self.path_of(key), node)
     }
     /// The tables of a list (`[[key]]`); none when the key is absent.
     pub(crate) fn tables(&mut self, key: &'static str) -> Vec<Table<'b>> {
         let Some(node) = self.take(key) else { return Vec::new() };
         let Value::List(items) = node.value else {
             let expected = format!("a list of tables, each begun by [[{key}]]");
-            self.book.add(node.line, &self.path_of(key), &node.to_string(), &expected);
+            self.fault_list.add(node.line, &self.path_of(key), &node.to_string(), &expected);
             return Vec::new();
         };
-        let table = |(i, item)| Self::from_node(self.book, self.path_of(&format!("{key}[{i}]")), item);
+        let table = |(i, item)| Self::from_node(self.fault_list, self.path_of(&format!("{key}[{i}]")), item);
         items.into_iter().enumerate().filter_map(table).collect()
     }
     /// Notes what nobody asked for.
     pub(crate) fn done(self) {
-        let known: Vec<&str> = self.asked.iter().map(|asked| asked.key).collect();
+        let known: Vec<&str> = self.requested.iter().map(|requested| requested.key).collect();
         let expected = format!("no such key; known here are {}", known.join(", "));
         for entry in &self.entries {
             let path = self.path_of(&key_shown(&entry.key));
-            self.book.add(entry.node.line, &path, &entry.node.to_string(), &expected);
+            self.fault_list.add(entry.node.line, &path, &entry.node.to_string(), &expected);
         }
     }
 }

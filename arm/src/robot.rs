@@ -1,7 +1,7 @@
 //! A robot: its chain, limits and collision shapes.
 use crate::description::{Description, Geometry};
 use crate::mass::LinkMass;
-use crate::reader::Book;
+use crate::reader::FaultList;
 use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
 use crate::{contact, digest, document};
@@ -81,25 +81,25 @@ impl Robot {
     /// # Errors
     /// Every fault at once.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
-        let book = Book::new(file);
+        let fault_list = FaultList::new(file);
         if text.trim_start().starts_with('<') {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let expected = format!(
                 "a robot file in TOML, which names it: urdf = {name:?}, tip_link = \"..\", and one [[joint]] a joint with its \
                  limits, because a URDF has no accelerations and jerks"
             );
-            book.add(Some(1), "", "an XML file", &expected);
-            return book.close(None);
+            fault_list.add(Some(1), "", "an XML file", &expected);
+            return fault_list.close(None);
         }
-        let description = Description::read(&book, document::parse_toml(file, text)?);
-        let robot = description.and_then(|description| Self::build(&book, &description));
-        book.close(robot)
+        let description = Description::read(&fault_list, document::parse_toml(file, text)?);
+        let robot = description.and_then(|description| Self::build(&fault_list, &description));
+        fault_list.close(robot)
     }
     /// Makes the robot of a description without faults.
-    fn build(book: &Book, description: &Description) -> Option<Self> {
+    fn build(fault_list: &FaultList, description: &Description) -> Option<Self> {
         let parts = Parts::of(description);
         let Some(chain) = Chain::new(&parts.chain) else {
-            book.add(None, "joint", &format!("{} tables", parts.chain.len()), "1 to 8 joints");
+            fault_list.add(None, "joint", &format!("{} tables", parts.chain.len()), "1 to 8 joints");
             return None;
         };
         let limits: Vec<JointLimits> = description.joints.iter().map(|joint| joint.limits).collect();
@@ -107,14 +107,14 @@ impl Robot {
         let ruled = contact::allowed_by_rule(&chain, &parts.shapes, &limits, (&parts.neighbours, &known));
         let allowed_by_rule = ruled.map_err(|shape| {
             let link = parts.shapes.get(shape).and_then(|shape| parts.links.get(shape.link));
-            book.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
+            fault_list.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
         });
         let tip = (chain.joints(), Pose::identity());
         let payload = description.payload.map(|weight| LinkMass::placed(&weight, parts.tip_link, tip));
         let joints = description.joints.iter();
         Some(Self {
             name: description.name.clone(),
-            file: book.file().to_owned(),
+            file: fault_list.file().to_owned(),
             joints: joints.map(|j| RobotJoint { name: j.name.clone(), limits: j.limits }).collect(),
             links: parts.links,
             shapes: parts.shapes,

@@ -1,6 +1,6 @@
 //! Denavit-Hartenberg rows: geometry as a robot file states it itself.
 use crate::mass::{self, Weight};
-use crate::reader::{Book, Bounds, Table};
+use crate::reader::{Bounds, FaultList, Table};
 use std::f64::consts::TAU;
 
 /// Which convention a row follows.
@@ -69,19 +69,19 @@ fn read_row(table: &mut Table<'_>) -> Option<(RowKind, [f64; 4])> {
 }
 
 /// An arm whose links weigh something in part only would make every energy wrong, and silently so.
-pub(crate) fn check_weights(book: &Book, rows: &[Option<(&str, &Row)>]) {
+pub(crate) fn check_weights(fault_list: &FaultList, rows: &[Option<(&str, &Row)>]) {
     let weighs = |row: &Option<(&str, &Row)>| row.is_some_and(|(_, row)| row.weight.is_some());
     if !rows.iter().any(weighs) {
         return;
     }
     for (i, _) in rows.iter().enumerate().filter(|(_, row)| row.is_some() && !weighs(row)) {
         let expected = "a mass for each link, or for none (0 kg is one)";
-        book.add(None, &format!("joint[{i}].link_mass_kg"), "missing", expected);
+        fault_list.add(None, &format!("joint[{i}].link_mass_kg"), "missing", expected);
     }
 }
 
 /// One arm has one convention: a mixed table is a copying mistake, and a silent one. `rows` are joints' names with their rows.
-pub(crate) fn check_kinds(book: &Book, rows: &[Option<(&str, &Row)>]) {
+pub(crate) fn check_kinds(fault_list: &FaultList, rows: &[Option<(&str, &Row)>]) {
     let Some((first_name, first)) = rows.iter().flatten().next() else { return };
     for (i, row) in rows.iter().enumerate() {
         let Some((_, row)) = row.filter(|(_, row)| row.kind != first.kind) else { continue };
@@ -90,6 +90,6 @@ pub(crate) fn check_kinds(book: &Book, rows: &[Option<(&str, &Row)>]) {
             RowKind::Modified => ("mdh", "dh"),
         };
         let expected = format!("{other}, as in joint {first_name:?}: one convention for the whole arm");
-        book.add(None, &format!("joint[{i}].{key}"), "a row", &expected);
+        fault_list.add(None, &format!("joint[{i}].{key}"), "a row", &expected);
     }
 }

@@ -22,8 +22,8 @@ const SYSTEM: &str = "/run/taustream";
 /// The user of the installed services: whose `/run/taustream` is, unless it is root's own.
 #[must_use]
 pub fn user_of_services() -> Option<u32> {
-    let facts = fs::symlink_metadata(SYSTEM).ok()?;
-    (facts.is_dir() && facts.uid() != 0).then(|| facts.uid())
+    let metadata = fs::symlink_metadata(SYSTEM).ok()?;
+    (metadata.is_dir() && metadata.uid() != 0).then(|| metadata.uid())
 }
 
 /// The runtime directory, made (mode 0700) when it is missing and refused when it belongs to somebody else:
@@ -34,8 +34,8 @@ pub fn user_of_services() -> Option<u32> {
 /// When it cannot be made or is not this user's.
 pub fn directory() -> Result<PathBuf, RuntimeError> {
     let uid = rustix::process::geteuid().as_raw();
-    let asked = std::env::var_os("TAUSTREAM_RUNTIME_DIR");
-    prepare(choose(asked, uid, Path::new("/run")), uid)
+    let requested = std::env::var_os("TAUSTREAM_RUNTIME_DIR");
+    prepare(choose(requested, uid, Path::new("/run")), uid)
 }
 
 /// Where [`directory`] would be for a user, below `run` (`/run`); nothing is made or refused.
@@ -45,13 +45,13 @@ pub fn expected(uid: u32, run: &Path) -> PathBuf {
 }
 
 /// Chooses below `run` (`/run`); nothing is made.
-fn choose(asked: Option<OsString>, uid: u32, run: &Path) -> PathBuf {
-    if let Some(path) = asked.filter(|path| !path.is_empty()) {
+fn choose(requested: Option<OsString>, uid: u32, run: &Path) -> PathBuf {
+    if let Some(path) = requested.filter(|path| !path.is_empty()) {
         return PathBuf::from(path);
     }
     let system = run.join("taustream");
     // Root may own services of its own beside those of their user.
-    let owned = fs::symlink_metadata(&system).map_or(uid == 0, |facts| facts.uid() == uid);
+    let owned = fs::symlink_metadata(&system).map_or(uid == 0, |metadata| metadata.uid() == uid);
     let user = run.join(format!("user/{uid}"));
     if owned {
         system
@@ -69,9 +69,9 @@ fn prepare(path: PathBuf, uid: u32) -> Result<PathBuf, RuntimeError> {
     }
     // Not through a link: in /tmp anybody can lay one.
     match fs::symlink_metadata(&path) {
-        Ok(facts) if facts.is_dir() && facts.uid() == uid => Ok(path),
-        Ok(facts) => {
-            let owner = facts.uid();
+        Ok(metadata) if metadata.is_dir() && metadata.uid() == uid => Ok(path),
+        Ok(metadata) => {
+            let owner = metadata.uid();
             let why = format!(
                 "is no directory of uid {uid} (owner {owner}); remove it or set TAUSTREAM_RUNTIME_DIR"
             );

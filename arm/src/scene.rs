@@ -2,7 +2,7 @@
 use crate::Faults;
 use crate::document::{self, Node};
 use crate::mesh;
-use crate::reader::{Book, Bounds, Table};
+use crate::reader::{Bounds, FaultList, Table};
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -101,12 +101,12 @@ impl Scene {
     /// # Errors
     /// Every fault at once.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
-        let book = Book::new(file);
-        let scene = Self::read(&book, document::parse_toml(file, text)?);
-        book.close(scene)
+        let fault_list = FaultList::new(file);
+        let scene = Self::read(&fault_list, document::parse_toml(file, text)?);
+        fault_list.close(scene)
     }
-    fn read(book: &Book, node: Node) -> Option<Self> {
-        let mut top = Table::top(book, node)?;
+    fn read(fault_list: &FaultList, node: Node) -> Option<Self> {
+        let mut top = Table::top(fault_list, node)?;
         let margin_m = top.number_or("margin_m", MARGIN_M_DEFAULT, &MARGIN_M);
         let mut obstacles = Vec::new();
         let mut complete = true;
@@ -120,11 +120,11 @@ impl Scene {
         top.done();
         if obstacles.len() > OBSTACLES_MAX {
             let value = format!("{} obstacles", obstacles.len());
-            book.add(None, "", &value, &format!("at most {OBSTACLES_MAX}"));
+            fault_list.add(None, "", &value, &format!("at most {OBSTACLES_MAX}"));
         }
-        check_names(book, &obstacles);
+        check_names(fault_list, &obstacles);
         let obstacles = obstacles.into_iter().map(|(_, obstacle)| obstacle).collect();
-        complete.then_some(Self { file: book.file().to_owned(), margin_m: margin_m?, obstacles })
+        complete.then_some(Self { file: fault_list.file().to_owned(), margin_m: margin_m?, obstacles })
     }
 }
 
@@ -159,7 +159,7 @@ fn read_mesh(table: &mut Table<'_>) -> Option<Shape> {
     let file = table.text("file", "the path of an .stl or .obj file, relative to this file");
     let scale = table.number_or("scale", 1.0, &SCALE);
     let (file, scale) = (file?, scale?);
-    let path = document::beside(table.book().file(), &file);
+    let path = document::beside(table.fault_list().file(), &file);
     match mesh::load(&path, scale) {
         Ok(mesh) => Some(Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }),
         Err((value, expected)) => {
@@ -174,11 +174,16 @@ pub(crate) fn pose(center_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
     Pose::from_parts(Translation3::from(center_m), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
 
-fn check_names(book: &Book, obstacles: &[(String, Obstacle)]) {
+fn check_names(fault_list: &FaultList, obstacles: &[(String, Obstacle)]) {
     let mut seen = BTreeSet::new();
     for (key, obstacle) in obstacles {
         if !seen.insert(&obstacle.name) {
-            book.add(None, key, &format!("{:?}", obstacle.name), "each obstacle's name once in the file");
+            fault_list.add(
+                None,
+                key,
+                &format!("{:?}", obstacle.name),
+                "each obstacle's name once in the file",
+            );
         }
     }
 }

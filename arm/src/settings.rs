@@ -1,7 +1,7 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
 use crate::protocol::Protocol;
-use crate::reader::{Book, Bounds, Table};
+use crate::reader::{Bounds, FaultList, Table};
 use crate::{Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
 
@@ -116,7 +116,7 @@ pub struct Servo {
 
 /// The cycle and what it tolerates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cycle {
+pub struct CycleSettings {
     /// Period of the cycle.
     pub period_us: u32,
     /// Gap that the drives bridge by themselves, in periods.
@@ -168,7 +168,7 @@ pub struct Settings {
     /// One servo a joint, in the order of the joints.
     pub servos: Vec<Servo>,
     /// The cycle.
-    pub cycle: Cycle,
+    pub cycle: CycleSettings,
     /// Supervision.
     pub supervision: Supervision,
     /// The section of the simulated servos as it stands; whoever simulates checks its keys.
@@ -215,9 +215,9 @@ impl Settings {
     /// Every fault at once, those of the robot and scene files included.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
         let settings = Self::from_toml_overloaded(file, text)?;
-        let book = Book::new(file);
-        consistency::check_loads(&book, &settings);
-        book.close(Some(settings))
+        let fault_list = FaultList::new(file);
+        consistency::check_loads(&fault_list, &settings);
+        fault_list.close(Some(settings))
     }
     /// As [`Self::load`], but takes buses that are too full: for whoever shows what is wrong with them. Nothing may be
     /// run on such settings.
@@ -228,9 +228,9 @@ impl Settings {
         Self::from_toml_overloaded(file, &document::read_text(file, "a settings file in TOML")?)
     }
     fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
-        let book = Book::new(file);
-        let settings = Self::read(&book, document::parse_toml(file, text)?, text);
-        book.close(settings)
+        let fault_list = FaultList::new(file);
+        let settings = Self::read(&fault_list, document::parse_toml(file, text)?, text);
+        fault_list.close(settings)
     }
     /// Cycles in a row that a bus may lose. Where the others go on, the drives of the lost one must not be told to catch
     /// up beyond what they bridge: it has failed before.
@@ -239,8 +239,8 @@ impl Settings {
         let stated = self.supervision.lost_cycles_max;
         if self.buses.len() > 1 { stated.min(self.cycle.tolerated_gap_periods) } else { stated }
     }
-    fn read(book: &Book, node: Node, text: &str) -> Option<Self> {
-        let mut top = Table::top(book, node)?;
+    fn read(fault_list: &FaultList, node: Node, text: &str) -> Option<Self> {
+        let mut top = Table::top(fault_list, node)?;
         let name = read_name(&mut top);
         let robot = named_file(&mut top, "robot", Robot::load);
         let scene = named_file(&mut top, "scene", Scene::load);
@@ -251,14 +251,14 @@ impl Settings {
         let simulator = read_simulator(&mut top, text);
         top.done();
         if let (Some(cycle), Some(supervision)) = (&cycle, &supervision) {
-            consistency::check_times(book, cycle, supervision);
+            consistency::check_times(fault_list, cycle, supervision);
         }
-        if !book.is_clean() {
+        if !fault_list.is_clean() {
             return None;
         }
         let settings = Self {
             name: name?,
-            file: book.file().to_owned(),
+            file: fault_list.file().to_owned(),
             robot: robot?,
             scene: scene?,
             buses: buses.into_iter().collect::<Option<Vec<Bus>>>()?,
@@ -267,9 +267,9 @@ impl Settings {
             supervision: supervision?,
             simulator,
         };
-        consistency::check_jump(book, &settings);
-        consistency::check_damiao(book, &settings);
-        consistency::check_traffic(book, &settings);
+        consistency::check_jump(fault_list, &settings);
+        consistency::check_damiao(fault_list, &settings);
+        consistency::check_traffic(fault_list, &settings);
         Some(settings)
     }
 }
@@ -287,11 +287,11 @@ fn read_name(top: &mut Table<'_>) -> Option<String> {
 /// Loads a file that this one names; its faults join this book.
 fn named_file<T>(top: &mut Table<'_>, key: &'static str, load: fn(&Path) -> Result<T, Faults>) -> Option<T> {
     let named = top.text(key, &format!("the path of a {key} file, relative to this file"))?;
-    let path = document::beside(top.book().file(), &named);
-    load(&path).map_err(|faults| top.book().take_over(faults)).ok()
+    let path = document::beside(top.fault_list().file(), &named);
+    load(&path).map_err(|faults| top.fault_list().merge(faults)).ok()
 }
 
-fn read_cycle(mut table: Table<'_>) -> Option<Cycle> {
+fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
     let period_us = table.integer("period_us", PERIOD_US[0], PERIOD_US[1]);
     let gap = table.integer_or("tolerated_gap_periods", default::TOLERATED_GAP_PERIODS, 1, 100);
     let stall = table.integer_or("stall_resume_ms", default::STALL_RESUME_MS, 0, 10_000);
@@ -300,7 +300,7 @@ fn read_cycle(mut table: Table<'_>) -> Option<Cycle> {
     let cpu = table.has("cpu").then(|| table.integer("cpu", 0, 1023));
     let report_rate_hz = table.number_or("report_rate_hz", default::REPORT_RATE_HZ, &RATE_HZ);
     table.done();
-    Some(Cycle {
+    Some(CycleSettings {
         period_us: u32::try_from(period_us?).ok()?,
         tolerated_gap_periods: u32::try_from(gap?).ok()?,
         stall_resume_ms: u32::try_from(stall?).ok()?,

@@ -5,7 +5,7 @@
 //! digits as it takes to read the same bits back, and read without loss.
 use crate::Faults;
 use crate::document::{self, Node};
-use crate::reader::{Book, Bounds, Table, numbers_of};
+use crate::reader::{Bounds, FaultList, Table, numbers_of};
 use std::fmt::Write as _;
 use std::path::Path;
 use taustream_motion::stroke::{DURATION_S_MIN, END_S_MAX, N_MAX, N_MIN};
@@ -46,12 +46,12 @@ impl TrajectoryFile {
     /// # Errors
     /// Every fault at once.
     pub fn from_json(file: &Path, text: &str) -> Result<Self, Faults> {
-        let book = Book::new(file);
-        let read = Self::read(&book, document::parse_json(file, text)?);
-        book.close(read)
+        let fault_list = FaultList::new(file);
+        let read = Self::read(&fault_list, document::parse_json(file, text)?);
+        fault_list.close(read)
     }
-    fn read(book: &Book, node: Node) -> Option<Self> {
-        let mut top = Table::top(book, node)?;
+    fn read(fault_list: &FaultList, node: Node) -> Option<Self> {
+        let mut top = Table::top(fault_list, node)?;
         top.integer("version", VERSION, VERSION);
         let robot = top.name("robot");
         let digest = top.text_if_there("digest", "the robot's digest, 64 hexadecimal digits");
@@ -66,10 +66,11 @@ impl TrajectoryFile {
         let base_rad = read_angles(&mut top, "base_rad", joints);
         let strokes = read_strokes(&mut top, joints);
         top.done();
-        if !book.is_clean() {
+        if !fault_list.is_clean() {
             return None;
         }
-        let trajectory = Trajectory::new(joints?, base_rad?, &strokes?).map_err(|e| note(book, &e)).ok()?;
+        let trajectory =
+            Trajectory::new(joints?, base_rad?, &strokes?).map_err(|e| note(fault_list, &e)).ok()?;
         Some(Self { robot: robot?, digest, trajectory })
     }
     /// The file's text. Numbers are written so that reading gives the same bits.
@@ -108,7 +109,7 @@ fn numbers(values: &JointArray, joints: usize) -> String {
 /// One number a joint; unused slots are zero. Without a good joint count there is nothing to hold the list against.
 fn read_angles(table: &mut Table<'_>, key: &'static str, joints: Option<usize>) -> Option<JointArray> {
     let node = table.need(key, "a list of one number a joint")?;
-    let values = numbers_of(table.book(), &table.path_of(key), &node, joints?, &ANGLE_RAD)?;
+    let values = numbers_of(table.fault_list(), &table.path_of(key), &node, joints?, &ANGLE_RAD)?;
     let mut angles = [0.0; MAX_JOINTS];
     for (slot, value) in angles.iter_mut().zip(values) {
         *slot = value;
@@ -141,7 +142,7 @@ fn read_stroke(mut table: Table<'_>, joints: Option<usize>) -> Option<Stroke> {
 }
 
 /// Faults that only the whole trajectory shows, under the key that they concern.
-fn note(book: &Book, error: &TrajectoryError) {
+fn note(fault_list: &FaultList, error: &TrajectoryError) {
     let (key, value) = match error {
         TrajectoryError::JointCount { joints } => ("joints".to_owned(), joints.to_string()),
         TrajectoryError::StrokeCount { strokes } => ("strokes".to_owned(), format!("{strokes} strokes")),
@@ -162,5 +163,5 @@ fn note(book: &Book, error: &TrajectoryError) {
             | StrokeError::UnusedJoint { .. } => (format!("strokes[{stroke}]"), "refused".to_owned()),
         },
     };
-    book.add(None, &key, &value, &format!("a sound trajectory ({error})"));
+    fault_list.add(None, &key, &value, &format!("a sound trajectory ({error})"));
 }

@@ -296,7 +296,7 @@ fn bad_urdf_of_every_kind_is_refused_with_words_that_help() {
 
 /// Goal: two faults in one file are both said, so that it is mended in one go.
 #[test]
-fn several_faults_of_a_urdf_are_told_at_once() {
+fn several_faults_of_a_urdf_are_reported_at_once() {
     let folder = Folder::new("several");
     folder.write(
         "two.urdf",

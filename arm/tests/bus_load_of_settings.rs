@@ -51,22 +51,25 @@ fn virtual_bus_is_never_refused_but_measured_against_a_usual_one() {
 }
 
 #[test]
-fn ways_out_state_the_load_that_the_settings_then_have() {
+fn remedies_state_the_load_that_the_settings_then_have() {
     let settings = Settings::load(&file()).unwrap();
-    let ways = settings.ways_out(0);
+    let remedies = settings.remedies(0);
     for (what, bus) in [
         ("packed = true", "virtual = true\npacked = true"),
         ("feedback_every = 2", "virtual = true\nfeedback_every = 2"),
         ("setpoint_every = 2", "virtual = true\nsetpoint_every = 2"),
         ("packed = true and feedback_every = 2", "virtual = true\npacked = true\nfeedback_every = 2"),
     ] {
-        let way = ways.iter().find(|way| way.what == what).unwrap_or_else(|| panic!("no {what}: {ways:?}"));
-        assert!((way.percent - load_of(bus).percent).abs() < 1e-9, "{way:?}");
+        let remedy = remedies
+            .iter()
+            .find(|remedy| remedy.what == what)
+            .unwrap_or_else(|| panic!("no {what}: {remedies:?}"));
+        assert!((remedy.percent - load_of(bus).percent).abs() < 1e-9, "{remedy:?}");
     }
-    let two = ways.iter().find(|way| way.what.starts_with("2 buses")).unwrap();
+    let two = remedies.iter().find(|remedy| remedy.what.starts_with("2 buses")).unwrap();
     assert!((two.percent - 74.5 - 0.26).abs() < 1e-9 && two.suffices, "{two:?}");
     assert_eq!(settings.bus_load(7), None);
-    assert!(settings.ways_out(7).is_empty());
+    assert!(settings.remedies(7).is_empty());
 }
 
 /// The faults of a text, which has some.

@@ -66,7 +66,7 @@ pub struct LimitLine {
 
 /// A filled outline: a spread, an obstacle.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Filled {
+pub struct FilledArea {
     /// Its corners.
     pub points: Vec<Point>,
     /// Its colour.
@@ -91,7 +91,7 @@ pub struct Panel {
     /// Limits.
     pub limits: Vec<LimitLine>,
     /// Filled outlines, below the curves.
-    pub filled: Vec<Filled>,
+    pub filled_areas: Vec<FilledArea>,
 }
 
 impl Panel {
@@ -112,7 +112,7 @@ impl Panel {
         let mut scaled = self.clone();
         if self.is_log {
             let curves = scaled.curves.iter_mut().flat_map(|c| c.points.iter_mut());
-            for (_, y) in curves.chain(scaled.filled.iter_mut().flat_map(|f| f.points.iter_mut())) {
+            for (_, y) in curves.chain(scaled.filled_areas.iter_mut().flat_map(|f| f.points.iter_mut())) {
                 *y = y.max(LOG_LEAST).log10();
             }
             for limit in &mut scaled.limits {
@@ -129,7 +129,7 @@ impl Panel {
 /// When plotters cannot draw it.
 pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     let scaled = panel.scaled();
-    let Panel { curves, limits, filled, is_log, .. } = &scaled;
+    let Panel { curves, limits, filled_areas, is_log, .. } = &scaled;
     let (across, values) = ranges(area, &scaled);
     let ends = [across.start, across.end - (across.end - across.start) * LEGEND_SHARE / (1.0 + LEGEND_SHARE)];
     // Marks are sums of steps: what should be zero is what their rounding leaves.
@@ -163,7 +163,8 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
                 .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 6, y)], style));
         }
     }
-    chart.draw_series(filled.iter().map(|f| Polygon::new(f.points.clone(), f.colour.mix(f.opacity))))?;
+    chart
+        .draw_series(filled_areas.iter().map(|f| Polygon::new(f.points.clone(), f.colour.mix(f.opacity))))?;
     for curve in curves {
         let style: ShapeStyle = curve.colour.mix(curve.opacity).stroke_width(curve.width_px);
         let series = chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
@@ -184,7 +185,7 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
 
 /// The axes: all points and limits, with a little room above and below.
 fn ranges(area: &Area<'_>, panel: &Panel) -> (Range<f64>, Range<f64>) {
-    let outlines = || panel.filled.iter().flat_map(|f| &f.points);
+    let outlines = || panel.filled_areas.iter().flat_map(|f| &f.points);
     let points = || panel.curves.iter().flat_map(|c| &c.points).chain(outlines());
     let across = span(points().map(|p| p.0));
     let values = span(points().map(|p| p.1).chain(panel.limits.iter().map(|l| l.value)));

@@ -42,7 +42,7 @@ pub struct Claim {
 impl Claim {
     /// A claim that a rule has judged.
     #[must_use]
-    pub fn judged(says: &str, rule: &str, holds: bool, numbers: String) -> Self {
+    pub fn decided(says: &str, rule: &str, holds: bool, numbers: String) -> Self {
         let verdict = if holds { Verdict::Holds } else { Verdict::DoesNotHold };
         Self { says: says.to_owned(), rule: rule.to_owned(), verdict, numbers }
     }

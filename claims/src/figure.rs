@@ -1,5 +1,5 @@
 //! A picture: panels of curves, as SVG.
-use crate::chart::{Area, Drawn, Filled, Panel, draw_panel, palette};
+use crate::chart::{Area, Drawn, FilledArea, Panel, draw_panel, palette};
 use plotters::prelude::{IntoDrawingArea, IntoFont, SVGBackend, WHITE};
 
 /// A picture.
@@ -53,7 +53,7 @@ impl Panel {
         let colour = palette(self.curves.len());
         let upper = points.iter().map(|(x, [_, _, high])| (*x, *high));
         let lower = points.iter().rev().map(|(x, [low, _, _])| (*x, *low));
-        self.filled.push(Filled { points: upper.chain(lower).collect(), colour, opacity: 0.15 });
+        self.filled_areas.push(FilledArea { points: upper.chain(lower).collect(), colour, opacity: 0.15 });
         self.line(label, points.iter().map(|(x, [_, middle, _])| (*x, *middle)).collect());
     }
 }

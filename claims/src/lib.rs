@@ -12,7 +12,6 @@
 pub mod chart;
 mod claim;
 mod figure;
-mod lab;
 mod number;
 mod paper_000;
 mod paper_001;
@@ -22,15 +21,16 @@ mod paper_004;
 pub mod planners;
 mod registry;
 mod report;
+mod run_context;
 pub mod statistics;
 mod table;
 mod trial;
 
 pub use claim::{Claim, Verdict, agrees, better};
 pub use figure::Figure;
-pub use lab::{Effort, Lab, Stop};
 pub use number::figures;
 pub use registry::{EXPERIMENTS, Experiment, Outcome, PAPERS, Paper};
 pub use report::{Chapter, Report, run};
+pub use run_context::{Effort, RunContext, Stop};
 pub use table::{Cell, Row, Table};
 pub use trial::{Sample, Trial, convergence, minimise};

@@ -1,7 +1,7 @@
 //! Which experiments there are. A new one is a function and a line here.
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::table::Table;
 use crate::{paper_000, paper_001, paper_002, paper_003, paper_004};
 
@@ -46,7 +46,7 @@ pub struct Experiment {
     /// What it looks at.
     pub name: &'static str,
     /// Does it.
-    pub run: fn(&Lab) -> Result<Outcome, Stop>,
+    pub run: fn(&RunContext) -> Result<Outcome, Stop>,
 }
 
 /// Every experiment, in the order of the papers.

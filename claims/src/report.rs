@@ -1,6 +1,6 @@
 //! All experiments of some papers, one after another, as text, Markdown and data.
-use crate::lab::{Effort, Lab, Stop};
 use crate::registry::{EXPERIMENTS, Outcome, PAPERS};
+use crate::run_context::{Effort, RunContext, Stop};
 use std::fmt;
 
 /// One experiment's outcome.
@@ -30,12 +30,12 @@ pub struct Report {
 ///
 /// # Errors
 /// When the user ended it, or an experiment was refused.
-pub fn run(lab: &Lab, effort: Effort, paper: Option<u8>) -> Result<Report, Stop> {
+pub fn run(run_context: &RunContext, effort: Effort, paper: Option<u8>) -> Result<Report, Stop> {
     let mut chapters = Vec::new();
     for experiment in EXPERIMENTS.iter().filter(|e| paper.is_none_or(|p| p == e.paper)) {
         let file = PAPERS.iter().find(|p| p.number == experiment.paper).map_or("", |p| p.file);
-        lab.say(&format!("paper {:03}: {} ..", experiment.paper, experiment.name));
-        let outcome = (experiment.run)(lab)?;
+        run_context.say(&format!("paper {:03}: {} ..", experiment.paper, experiment.name));
+        let outcome = (experiment.run)(run_context)?;
         chapters.push(Chapter { paper: experiment.paper, file, name: experiment.name, outcome });
     }
     Ok(Report { effort, chapters })

@@ -1,7 +1,7 @@
 //! One run of a method, and many of them beside each other.
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, quantile};
-use taustream_planner::optimize::{End, Found, Optimizer, Problem, Progress, Run};
+use taustream_planner::optimize::{End, Optimizer, Problem, Progress, Run, Solution};
 
 /// Points of a convergence curve.
 const CHECKPOINTS: usize = 100;
@@ -10,7 +10,7 @@ const CHECKPOINTS: usize = 100;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// What it found.
-    pub found: Found,
+    pub found: Solution,
     /// Evaluations done and best so far, at up to 100 iterations that are spread evenly over the budget.
     pub trace: Vec<(f64, f64)>,
     /// Iterations after which the population's best was worse than before.
@@ -22,7 +22,7 @@ pub struct Trial {
 /// # Errors
 /// When the method refuses, or the user ended it.
 pub fn minimise(
-    lab: &Lab,
+    run_context: &RunContext,
     optimizer: &dyn Optimizer,
     problem: &dyn Problem,
     seed: u64,
@@ -38,7 +38,7 @@ pub fn minimise(
             trace.push((p.evaluations as f64, p.best));
         }
     };
-    let is_over = || lab.is_over();
+    let is_over = || run_context.is_over();
     let run = Run { seed, evaluations_max, guesses: &[], is_over: &is_over, watch: &mut watch };
     let found = optimizer.minimise(problem, run)?;
     if found.end == End::Cut {

@@ -1,11 +1,11 @@
 //! All experiments, quickly: every table is there, has finite numbers, and comes from the run and its seed alone.
 use std::sync::OnceLock;
-use taustream_claims::{Cell, EXPERIMENTS, Effort, Lab, PAPERS, Report, Stop, Table, Verdict, run};
+use taustream_claims::{Cell, EXPERIMENTS, Effort, PAPERS, Report, RunContext, Stop, Table, Verdict, run};
 
 #[expect(clippy::unwrap_used, reason = "a helper of tests, outside of any #[test] function")]
 fn report(seed: u64, jobs: usize, paper: Option<u8>) -> Report {
     let effort = Effort { runs: None, quick: true, seed, jobs };
-    run(&Lab::new(effort, &|_| (), &|| false), effort, paper).unwrap()
+    run(&RunContext::new(effort, &|_| (), &|| false), effort, paper).unwrap()
 }
 
 /// One run for all tests: it is what takes the time.
@@ -106,7 +106,7 @@ fn markdown_names_command_and_every_claim() {
 fn experiments_end_when_the_user_ends_them() {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };
     for paper in PAPERS.iter().filter(|p| EXPERIMENTS.iter().any(|e| e.paper == p.number)) {
-        let ended = run(&Lab::new(effort, &|_| (), &|| true), effort, Some(paper.number));
+        let ended = run(&RunContext::new(effort, &|_| (), &|| true), effort, Some(paper.number));
         assert_eq!(ended, Err(Stop::Interrupted), "paper {}", paper.number);
     }
 }

@@ -1,14 +1,14 @@
 //! Papers 000 and 002, quickly: whole tables, one answer for one seed on any number of threads, no constants of ours.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
-use taustream_claims::{Cell, Effort, Lab, Report, Stop, Verdict, run};
+use taustream_claims::{Cell, Effort, Report, RunContext, Stop, Verdict, run};
 
 fn quick(seed: u64, jobs: usize, paper: u8) -> Report {
     let effort = Effort { runs: None, quick: true, seed, jobs };
-    run(&Lab::new(effort, &|_| (), &|| false), effort, Some(paper)).expect("sane numbers")
+    run(&RunContext::new(effort, &|_| (), &|| false), effort, Some(paper)).expect("sane numbers")
 }
 
 /// The tables and verdicts, without how many threads made them.
-fn told(report: &Report) -> Vec<String> {
+fn claims_of(report: &Report) -> Vec<String> {
     report.chapters.iter().map(ToString::to_string).collect()
 }
 
@@ -31,10 +31,14 @@ fn experiments_of_papers_000_and_002_are_whole_and_repeat_on_any_number_of_threa
                 assert!(figure.svg.contains("</svg>"), "{} is empty", figure.file);
             }
         }
-        assert_eq!(told(&quick(1, 3, paper)), told(&report), "paper {paper}: threads change the answer");
+        assert_eq!(
+            claims_of(&quick(1, 3, paper)),
+            claims_of(&report),
+            "paper {paper}: threads change the answer"
+        );
         // Only the interpolators and the potential field have nothing random.
-        let other = told(&quick(2, 1, paper));
-        let same = told(&report).iter().zip(&other).filter(|(a, b)| a == b).count();
+        let other = claims_of(&quick(2, 1, paper));
+        let same = claims_of(&report).iter().zip(&other).filter(|(a, b)| a == b).count();
         assert_eq!(same, usize::from(paper == 0), "paper {paper}: another seed, the same numbers");
     }
 }
@@ -65,10 +69,10 @@ fn verdicts_that_need_no_runs_are_those_of_calculation() {
 }
 
 #[test]
-fn experiments_end_when_they_are_told_to() {
+fn experiments_end_on_request() {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs: 2 };
     for paper in [0, 2] {
-        let over = Lab::new(effort, &|_| (), &|| true);
+        let over = RunContext::new(effort, &|_| (), &|| true);
         assert_eq!(run(&over, effort, Some(paper)).err(), Some(Stop::Interrupted), "paper {paper}");
     }
 }

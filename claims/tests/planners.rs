@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_claims::planners::{Contest, Entrant, ProblemSet, Standings, Surroundings, compare, published};
-use taustream_claims::{Cell, Effort, Lab, Stop};
+use taustream_claims::{Cell, Effort, RunContext, Stop};
+use taustream_planner::budget::Budget;
 use taustream_planner::tree::Space;
-use taustream_planner::work::Work;
 use taustream_planner::world::World;
 
 fn config(name: &str) -> PathBuf {
@@ -26,17 +26,17 @@ fn every_kind() -> [(&'static str, Surroundings); 3] {
 
 fn contest(names: &[&str], count: usize) -> Contest {
     let robot = robot("ur5");
-    let draw = |(name, kind): &(&str, Surroundings)| {
-        ProblemSet::draw(name, &robot, kind, count, 3).expect("shapes that can be built")
+    let random_problems = |(name, kind): &(&str, Surroundings)| {
+        ProblemSet::random(name, &robot, kind, count, 3).expect("shapes that can be built")
     };
     let entrants = names.iter().map(|n| Entrant::from_name(n).expect("known")).collect();
-    let sets = every_kind().iter().map(draw).collect();
+    let sets = every_kind().iter().map(random_problems).collect();
     Contest { sets, entrants, deadline: Duration::from_millis(60), remarks: vec!["a remark".to_owned()] }
 }
 
 fn standings(contest: &Contest, jobs: usize) -> Result<Standings, Stop> {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs };
-    compare(&Lab::new(effort, &|_| (), &|| false), contest)
+    compare(&RunContext::new(effort, &|_| (), &|| false), contest)
 }
 
 /// Goal: a problem asks for a way round something, from a clear pose to a clear pose, for arms of any kind; and another
@@ -46,18 +46,19 @@ fn problems_are_clear_at_both_ends_and_blocked_between() {
     for name in ["ur5", "piper"] {
         let robot = robot(name);
         for (kind, surroundings) in every_kind() {
-            let draw = |seed| ProblemSet::draw(kind, &robot, &surroundings, 5, seed).expect("builds");
-            let set = draw(3);
+            let random_problems =
+                |seed| ProblemSet::random(kind, &robot, &surroundings, 5, seed).expect("builds");
+            let set = random_problems(3);
             assert_eq!(set.problems.len(), 5, "{name}, {kind}: {}", set.left_out);
             for problem in &set.problems {
                 let world = World::new(&robot, &problem.scene).expect("builds");
-                let work = Work::unbounded();
+                let budget = Budget::unbounded();
                 let ends = [problem.start_rad, problem.goal_rad];
                 assert!(ends.iter().all(|pose| world.contact(pose).is_none()), "{name}, {kind}");
-                assert!(!Space::new(&world, &work).is_edge_free(&ends[0], &ends[1]), "{name}, {kind}");
+                assert!(!Space::new(&world, &budget).is_edge_free(&ends[0], &ends[1]), "{name}, {kind}");
             }
-            assert_eq!(set.problems, draw(3).problems, "{name}, {kind}: one seed, two problems");
-            assert_ne!(set.problems, draw(4).problems, "{name}, {kind}: two seeds, one problem");
+            assert_eq!(set.problems, random_problems(3).problems, "{name}, {kind}: one seed, two problems");
+            assert_ne!(set.problems, random_problems(4).problems, "{name}, {kind}: two seeds, one problem");
         }
     }
 }
@@ -67,7 +68,7 @@ fn problems_are_clear_at_both_ends_and_blocked_between() {
 fn scene_without_room_has_no_problems_and_says_so() {
     let mut scene = Scene::load(&config("scenes/open.toml")).expect("shipped");
     scene.obstacles[0].shape = taustream_arm::Shape::Box { size_m: [4.0; 3] };
-    let set = ProblemSet::draw("full", &robot("ur5"), &Surroundings::Given(Box::new(scene)), 2, 1);
+    let set = ProblemSet::random("full", &robot("ur5"), &Surroundings::Given(Box::new(scene)), 2, 1);
     let set = set.expect("builds");
     assert!(set.problems.is_empty() && set.left_out.starts_with("2 problems"), "{}", set.left_out);
     let contest = Contest { sets: vec![set], ..contest(&["auto", "rbf"], 1) };
@@ -107,8 +108,8 @@ fn standings_are_finite_and_do_not_depend_on_threads() {
 #[test]
 fn interrupted_contest_has_no_standings() {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };
-    let lab = Lab::new(effort, &|_| (), &|| true);
-    assert_eq!(compare(&lab, &contest(&["auto"], 1)), Err(Stop::Interrupted));
+    let run_context = RunContext::new(effort, &|_| (), &|| true);
+    assert_eq!(compare(&run_context, &contest(&["auto"], 1)), Err(Stop::Interrupted));
 }
 
 const URDF: &str = r#"<robot name="two">

@@ -19,7 +19,7 @@ fn better_needs_a_difference_that_is_not_by_chance() {
 }
 
 #[test]
-fn mean_is_reproduced_when_it_is_near_or_not_told_apart() {
+fn mean_is_reproduced_when_it_is_near_or_not_significantly_different() {
     let ours = Summary::of(&sample(10.0).values);
     let printed = |mean, sd| Moments { n: 30, mean, sd };
     assert!(agrees(printed(10.9, 0.0), &ours), "within a tenth");

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn failure_to_write_tells_a_gone_reader_apart() {
+    fn failure_to_write_distinguishes_a_closed_reader() {
         let gone = Failure::writing("standard output", io::ErrorKind::BrokenPipe.into());
         assert_eq!((gone.exit_code(), gone.kind()), (0, "write"));
         let full = Failure::writing("F", io::ErrorKind::StorageFull.into());

@@ -95,13 +95,13 @@ fn read_text(path: &Path) -> Result<String, Failure> {
 
 /// Asks sudo beforehand: its own refusal would look like a failure of the command.
 fn may_hand_over() -> Result<(), Failure> {
-    let cure = format!(
+    let remedy = format!(
         "ask the administrator for `usermod -aG {GROUP} {}` (then log in again); the rule for that group is \
          /etc/sudoers.d/taustream, which comes with the installation",
         env::var("USER").unwrap_or_else(|_| "YOU".to_owned())
     );
     let refused = |why: &str| {
-        Failure::Refused(format!("the arm's services belong to user `{USER}`, and {why}; {cure}"))
+        Failure::Refused(format!("the arm's services belong to user `{USER}`, and {why}; {remedy}"))
     };
     if !Path::new(SUDO).exists() {
         return Err(refused("sudo is not installed, by which you could act as that user"));
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_orders_are_refused_in_words() {
+    fn hostile_requests_are_refused_with_a_reason() {
         let newer = text(&["status"], None).replace("\"version\":1", "\"version\":2");
         let more = text(&["status"], None).replace("{\"version\"", "{\"env\":{},\"version\"");
         for bad in ["", "null", "[]", "{\"version\":1}", newer.as_str(), more.as_str()] {

@@ -214,14 +214,14 @@ mod tests {
         for program in programs() {
             check(&built(program), &pages).unwrap();
         }
-        let doctored = programs()[0].clone().arg(clap::Arg::new("new").long("brand-new"));
-        assert!(check(&built(doctored), &pages).unwrap_err().contains("--brand-new"));
+        let corrupted = programs()[0].clone().arg(clap::Arg::new("new").long("brand-new"));
+        assert!(check(&built(corrupted), &pages).unwrap_err().contains("--brand-new"));
         pages.retain(|p| p.file != "taustream-plan.1");
         assert!(check(&built(programs()[0].clone()), &pages).unwrap_err().contains("taustream-plan"));
     }
 
     #[test]
-    fn pages_of_programs_tell_their_own_exit_status_and_examples() {
+    fn pages_of_programs_have_their_own_exit_status_and_examples() {
         let pages = pages().unwrap();
         let text = |file: &str| plain(pages.iter().find(|p| p.file == file).unwrap());
         assert!(

@@ -85,7 +85,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
     })?;
     // A device or a pipe is written into: the rename below would put a file in its place, and as root `-o /dev/null`
     // would take that from everybody on the machine.
-    if fs::metadata(path).is_ok_and(|facts| !facts.is_file() && !facts.is_dir()) {
+    if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
         let written = fs::OpenOptions::new().write(true).open(path);
         return written.and_then(|mut file| file.write_all(text.as_bytes())).map_err(fail);
     }

@@ -3,7 +3,7 @@ use crate::bring_up::explain;
 use crate::codec::cia402::{Cia402Driver, Cia402Error};
 use crate::codec::damiao::{DamiaoDriver, DamiaoError};
 use crate::frame::{CanFrame, FrameBatch};
-use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
+use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
 use taustream_arm::{Protocol, Settings};
 use taustream_motion::MAX_JOINTS;
 
@@ -46,12 +46,12 @@ impl ServoDriver for BusDriver {
     fn encode(
         &mut self,
         now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
         for driver in &mut self.drivers {
-            driver.encode(now, wish, commands, out);
+            driver.encode(now, drive_target, commands, out);
         }
     }
 

@@ -14,4 +14,4 @@ pub mod sim;
 
 pub use frame::{CanFrame, CanId, FrameBatch};
 pub use link::{CanLink, ErrorFrame, LinkFault};
-pub use servo::{DriveState, DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
+pub use servo::{DriveState, DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};

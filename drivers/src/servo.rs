@@ -35,7 +35,7 @@ pub struct JointCommand {
 
 /// What the streamer wants of all drives of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriveWish {
+pub enum DriveTarget {
     /// Configured, communicating, not energised.
     Disabled,
     /// Energised, following the commands.
@@ -57,7 +57,7 @@ pub enum DriveState {
     /// It was found energised before anything was sent to it, and not as this master would have left it; nothing was
     /// changed, and nothing will be. [`ServoStatus::error_code`] and [`ServoStatus::refused_object`] say what differs.
     EnergisedUnowned,
-    /// Found energised exactly as this master leaves its drives; it holds [`ServoStatus::held_rad`] until the wish
+    /// Found energised exactly as this master leaves its drives; it holds [`ServoStatus::hold_position_rad`] until the wish
     /// changes from `Keep`.
     Adopted,
     /// Configured, communicating, not energised.
@@ -101,7 +101,7 @@ pub struct ServoStatus {
     /// Measured link velocity; NaN when the drive does not send it.
     pub velocity_rad_s: f64,
     /// Link angle that an adopted drive holds; NaN in every other state.
-    pub held_rad: f64,
+    pub hold_position_rad: f64,
     /// When the newest feedback arrived; `None` before the first.
     pub received: Option<Nanos>,
     /// The protocol's status word.
@@ -120,7 +120,7 @@ impl ServoStatus {
         state: DriveState::Absent,
         position_rad: f64::NAN,
         velocity_rad_s: f64::NAN,
-        held_rad: f64::NAN,
+        hold_position_rad: f64::NAN,
         received: None,
         status_word: 0,
         error_code: 0,
@@ -151,7 +151,7 @@ pub trait ServoDriver: Send {
     fn encode(
         &mut self,
         now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     );

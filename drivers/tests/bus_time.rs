@@ -172,8 +172,8 @@ fn answers_overtake_setpoints_and_each_frame_takes_its_bits() {
         at += u64::from(reference_bits(&delivered.frame)) * 1_000;
         assert_eq!(delivered.at, Nanos(at), "{delivered:?}");
     }
-    let facts = wire.facts();
-    assert_eq!((facts.delivered, facts.busy_ns, facts.longest_queue), (7, at, 4), "{facts:?}");
+    let counters = wire.counters();
+    assert_eq!((counters.delivered, counters.busy_ns, counters.longest_queue), (7, at, 4), "{counters:?}");
 }
 
 #[test]
@@ -200,8 +200,8 @@ fn full_queues_lose_frames_and_count_them() {
     let taken = (0..20).filter(|_| wire.offer(Nanos(0), Sender::Master, standard(0x201, &[0; 8]))).count();
     let kept = (0..5).filter(|_| wire.offer(Nanos(0), Sender::Drive, standard(0x181, &[0; 8]))).count();
     assert!(wire.offer(Nanos(0), Sender::Drive, standard(0x182, &[0; 8])), "another mailbox has room");
-    let facts = wire.facts();
-    assert_eq!((taken, facts.lost_from_master, kept, facts.lost_from_drives), (8, 12, 2, 3));
+    let counters = wire.counters();
+    assert_eq!((taken, counters.lost_from_master, kept, counters.lost_from_drives), (8, 12, 2, 3));
     assert_eq!(deliveries(&mut wire, 10_000, 1_000).len(), 11);
     assert_eq!(wire.waiting(), (0, 0));
 }

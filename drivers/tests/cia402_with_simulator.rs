@@ -3,8 +3,8 @@
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::{Cia402Driver, CountScale, rad_from_counts};
-use taustream_drivers::sim::{Rig, settings::drives};
-use taustream_drivers::{CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver};
+use taustream_drivers::sim::{ServoSimulator, settings::drives};
+use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
 
 const JOINTS: usize = 6;
 /// Where a UR5 stands free.
@@ -13,10 +13,10 @@ const START_RAD: [f64; JOINTS] = [0.1, -1.2, 1.0, -0.5, 0.3, -0.2];
 /// Six simulated drives and their master, in cycles of 1 ms.
 struct Arm {
     driver: Cia402Driver,
-    rig: Rig,
+    simulator: ServoSimulator,
     settings: Settings,
     now: Nanos,
-    wish: DriveWish,
+    drive_target: DriveTarget,
     commands: [JointCommand; 8],
     /// Frames of the drives that arrive in the next cycle.
     arriving: Vec<CanFrame>,
@@ -29,10 +29,10 @@ impl Arm {
         let setups = drives(&settings, Some(&START_RAD)).unwrap();
         Self {
             driver: Cia402Driver::new(&settings, 0).unwrap(),
-            rig: Rig::new(setups, 1, 1),
+            simulator: ServoSimulator::new(setups, 1, 1),
             settings,
             now: Nanos(1_000_000_000),
-            wish: DriveWish::Disabled,
+            drive_target: DriveTarget::Disabled,
             commands: [JointCommand::default(); 8],
             arriving: Vec::new(),
         }
@@ -40,13 +40,13 @@ impl Arm {
 
     fn step(&mut self) {
         let mut batch = FrameBatch::new();
-        self.driver.encode(self.now, self.wish, &self.commands, &mut batch);
+        self.driver.encode(self.now, self.drive_target, &self.commands, &mut batch);
         for frame in self.arriving.drain(..) {
             self.driver.decode(self.now, &frame);
         }
         let mut out = [Vec::new()];
-        self.rig.advance(self.now, &mut out);
-        self.rig.receive(self.now, 0, batch.frames(), &mut out);
+        self.simulator.advance(self.now, &mut out);
+        self.simulator.receive(self.now, 0, batch.frames(), &mut out);
         self.arriving.append(&mut out[0]);
         self.now.0 += 1_000_000;
     }
@@ -75,7 +75,7 @@ impl Arm {
         for joint in 0..JOINTS {
             self.commands[joint].position_rad = self.driver.status(joint).position_rad;
         }
-        self.wish = DriveWish::Enabled;
+        self.drive_target = DriveTarget::Enabled;
         self.step();
         self.until(DriveState::Enabled);
     }
@@ -108,12 +108,12 @@ fn simulated_drives_come_up_follow_a_sine_and_go_down() {
     println!("largest tracking error {worst_rad:.6} rad, while catching the limp joints {caught_rad:.6} rad");
     assert!(caught_rad < arm.settings.supervision.tracking_error_rad_max, "off by {caught_rad} rad");
     assert!(worst_rad < 0.02, "off by {worst_rad} rad; the shipped settings promise well under 0.02");
-    let travelled = arm.rig.drive(0).unwrap().position_rad() - base[0].position_rad;
+    let travelled = arm.simulator.drive(0).unwrap().position_rad() - base[0].position_rad;
     assert!(
         travelled.abs() < 0.01,
         "a whole number of periods ends where it began, not {travelled} rad away"
     );
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.until(DriveState::Disabled);
 }
@@ -126,7 +126,7 @@ fn simulated_drive_and_master_agree_on_sign_gear_and_zero() {
         let scale = CountScale::of(&arm.settings.servos[joint]).unwrap();
         let count_rad = (rad_from_counts(&scale, 1) - rad_from_counts(&scale, 0)).abs();
         // Not energised, a joint may fall: the feedback is up to two cycles older than the drive's own angle.
-        let drive = arm.rig.drive(joint).unwrap();
+        let drive = arm.simulator.drive(joint).unwrap();
         let aged_rad = drive.velocity_rad_s().abs() * 2e-3 + 1e-4;
         let off_rad = (arm.driver.status(joint).position_rad - drive.position_rad()).abs();
         assert!(off_rad <= 2.0 * count_rad + aged_rad, "joint {joint}: {off_rad:e} rad off");
@@ -135,23 +135,24 @@ fn simulated_drive_and_master_agree_on_sign_gear_and_zero() {
 }
 
 #[test]
-fn restarted_master_that_still_looks_at_energised_drives_lets_go_when_told() {
+fn restarted_master_that_still_observes_energised_drives_releases_them_on_request() {
     let mut arm = Arm::new();
     arm.enable();
     // The old master is gone without a word; the new one comes up before the drives miss it.
     arm.driver = Cia402Driver::new(&arm.settings, 0).unwrap();
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     for _ in 0..20 {
         arm.step();
     }
     assert_eq!(arm.states(), [DriveState::Configuring; JOINTS]);
-    arm.wish = DriveWish::TorqueOff;
+    arm.drive_target = DriveTarget::TorqueOff;
     for _ in 0..300 {
         arm.step();
     }
     assert!(
-        (0..JOINTS).all(|joint| arm.rig.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0)
+        (0..JOINTS)
+            .all(|joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0)
     );
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::Disabled);
 }

@@ -72,7 +72,7 @@ fn local_link_takes_the_largest_batch_in_one_call() {
 }
 
 #[test]
-fn local_link_hears_neither_silence_nor_itself() {
+fn local_link_receives_nothing_from_silence_nor_from_itself() {
     link_suite::silence_and_own_frames_are_not_received(&LocalBench::new());
 }
 

@@ -1,5 +1,5 @@
 //! What the streamer tells of each bus.
-use crate::fault::BusTrouble;
+use crate::fault::BusFault;
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Most buses of one arm.
@@ -19,8 +19,8 @@ pub struct BusReport {
     pub cycles_lost: u64,
     /// Error frames of the controller.
     pub error_frames: u64,
-    /// What is wrong with it ([`BusTrouble::code`]); 0 when it is well.
-    pub trouble: u32,
+    /// What is wrong with it ([`BusFault::code`]); 0 when it is well.
+    pub bus_fault: u32,
     /// 1 while nothing is sent on it, from its failure to `clear-fault`.
     pub silent: u32,
     /// Frames handed over and not yet seen on the wire.
@@ -32,9 +32,9 @@ pub struct BusReport {
 }
 
 impl BusReport {
-    /// What is wrong with it. A code of another release reads as [`BusTrouble::System`]: never as well.
+    /// What is wrong with it. A code of another release reads as [`BusFault::System`]: never as well.
     #[must_use]
-    pub fn trouble(&self) -> Option<BusTrouble> {
-        (self.trouble != 0).then(|| BusTrouble::from_code(self.trouble).unwrap_or(BusTrouble::System))
+    pub fn bus_fault(&self) -> Option<BusFault> {
+        (self.bus_fault != 0).then(|| BusFault::from_code(self.bus_fault).unwrap_or(BusFault::System))
     }
 }

@@ -16,7 +16,7 @@ pub enum FaultReason {
     PositionJump = 4,
     /// A setpoint failed the guard; value = the offending number.
     Guard = 5,
-    /// A bus does not carry setpoints any more; code = [`BusTrouble::code`], bus = which.
+    /// A bus does not carry setpoints any more; code = [`BusFault::code`], bus = which.
     BusFault = 6,
     /// The loop stalled for longer than the drives' watchdog; value = gap in s.
     Stall = 7,
@@ -90,7 +90,7 @@ impl FaultReason {
 /// What is wrong with a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
-pub enum BusTrouble {
+pub enum BusFault {
     /// Its queue took no frames for too many cycles (ENOBUFS, EAGAIN).
     QueueFull = 1,
     /// Frames were taken, but not seen on the wire for too many cycles.
@@ -109,7 +109,7 @@ pub enum BusTrouble {
     System = 8,
 }
 
-impl BusTrouble {
+impl BusFault {
     /// Every trouble.
     pub const ALL: [Self; 8] = [
         Self::QueueFull,
@@ -147,7 +147,7 @@ impl BusTrouble {
     }
     /// What to do about it, before `clear-fault`.
     #[must_use]
-    pub fn cure(self, interface: &str) -> String {
+    pub fn remedy(self, interface: &str) -> String {
         match self {
             Self::QueueFull | Self::Unconfirmed => {
                 "see that the drives are powered, the cable is whole, both ends are terminated and the bit rate is theirs"
@@ -176,7 +176,7 @@ pub struct Cause {
     pub joint: Option<usize>,
     /// Index of the bus in the settings, where one is to blame.
     pub bus: Option<usize>,
-    /// Error code, statusword or [`BusTrouble::code`], by the reason; 0 for none.
+    /// Error code, statusword or [`BusFault::code`], by the reason; 0 for none.
     pub code: u32,
     /// Object that a drive refused, `index << 8 | sub`; 0 for none.
     pub object: u32,
@@ -203,7 +203,7 @@ pub enum Evidence {
     /// A statusword.
     Statusword(u32),
     /// What is wrong with the bus; `None` for a code of another release.
-    Bus(Option<BusTrouble>),
+    Bus(Option<BusFault>),
     /// A number without a limit.
     Value(f64),
     /// A number and the limit that it broke.
@@ -238,8 +238,8 @@ impl Cause {
     }
     /// A bus that failed; `value` against `limit` is what was counted, 0 where nothing was.
     #[must_use]
-    pub fn bus(bus: usize, trouble: BusTrouble, value: f64, limit: f64) -> Self {
-        let cause = Self::new(FaultReason::BusFault).code(trouble.code()).amount(value, limit);
+    pub fn bus(bus: usize, bus_fault: BusFault, value: f64, limit: f64) -> Self {
+        let cause = Self::new(FaultReason::BusFault).code(bus_fault.code()).amount(value, limit);
         Self { bus: Some(bus), ..cause }
     }
 
@@ -253,7 +253,7 @@ impl Cause {
                 Evidence::Refusal { code: self.code, object: self.object }
             }
             FaultReason::DriveDropped | FaultReason::DriveWarning => Evidence::Statusword(self.code),
-            FaultReason::BusFault => Evidence::Bus(BusTrouble::from_code(self.code)),
+            FaultReason::BusFault => Evidence::Bus(BusFault::from_code(self.code)),
             FaultReason::FeedbackLate
             | FaultReason::TrackingError
             | FaultReason::PositionJump

@@ -11,20 +11,20 @@ pub mod fault;
 pub mod phase;
 pub mod plan;
 pub mod receipt;
+pub mod reference_state;
 pub mod report;
 pub mod service;
-pub mod standing;
 pub mod text;
 pub mod trajectory;
 
 pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
-pub use fault::{BusTrouble, Cause, Evidence, FaultReason};
+pub use fault::{BusFault, Cause, Evidence, FaultReason};
 pub use phase::Phase;
 pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
+pub use reference_state::ReferenceState;
 pub use report::Report;
-pub use standing::Standing;
 pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 

@@ -149,18 +149,18 @@ impl TrajectoryMessage {
     /// The raw bits of the message's numbers, for tests that send hostile ones.
     #[doc(hidden)]
     #[must_use]
-    pub fn doctored(mut self: Box<Self>, how: Doctored) -> Box<Self> {
+    pub fn corrupted(mut self: Box<Self>, how: Corrupted) -> Box<Self> {
         match how {
-            Doctored::Layout(v) => self.layout_version = v,
-            Doctored::Joints(v) => self.joint_count = v,
-            Doctored::StrokeCount(v) => self.stroke_count = v,
-            Doctored::Exponent(v) => self.strokes[0].n = v,
-            Doctored::Delta(v) => self.strokes[0].delta_rad[0] = v,
-            Doctored::Duration(v) => self.strokes[0].duration_s = v,
-            Doctored::Start(v) => self.strokes[0].start_s = v,
-            Doctored::Base(v) => self.base_rad[0] = v,
-            Doctored::Replaces(v) => self.replaces = v,
-            Doctored::Digest(v) => self.robot_digest[0] ^= v,
+            Corrupted::Layout(v) => self.layout_version = v,
+            Corrupted::Joints(v) => self.joint_count = v,
+            Corrupted::StrokeCount(v) => self.stroke_count = v,
+            Corrupted::Exponent(v) => self.strokes[0].n = v,
+            Corrupted::Delta(v) => self.strokes[0].delta_rad[0] = v,
+            Corrupted::Duration(v) => self.strokes[0].duration_s = v,
+            Corrupted::Start(v) => self.strokes[0].start_s = v,
+            Corrupted::Base(v) => self.base_rad[0] = v,
+            Corrupted::Replaces(v) => self.replaces = v,
+            Corrupted::Digest(v) => self.robot_digest[0] ^= v,
         }
         self
     }
@@ -169,7 +169,7 @@ impl TrajectoryMessage {
 /// How a test spoils a message.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
-pub enum Doctored {
+pub enum Corrupted {
     Layout(u32),
     Joints(u32),
     StrokeCount(u32),

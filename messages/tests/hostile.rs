@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
-use taustream_messages::trajectory::{Doctored, MessageError};
+use taustream_messages::trajectory::{Corrupted, MessageError};
 use taustream_messages::{
     CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome, Phase, PlanReply,
     PlanRequest, Receipt, Rejection, Replaces, Report, Text, TrajectoryMessage,
@@ -93,25 +93,25 @@ fn trajectory_written_and_read_is_the_same() {
 }
 
 #[test]
-fn trajectory_doctored_in_one_field_is_refused_for_that_field() {
-    let cases: [(Doctored, &str); 10] = [
-        (Doctored::Layout(LAYOUT_VERSION + 1), "layout version 3"),
-        (Doctored::Joints(0), "0 joints"),
-        (Doctored::Joints(9), "joint_count is 9"),
-        (Doctored::StrokeCount(600), "stroke_count is 600; at most 512"),
-        (Doctored::Exponent(3), "n is 3"),
-        (Doctored::Delta(f64::NAN), "delta_rad is not finite"),
-        (Doctored::Duration(0.0), "at least 0.001 s"),
-        (Doctored::Start(-1.0), "start_s is -1"),
-        (Doctored::Base(f64::INFINITY), "base_rad of joint 0"),
-        (Doctored::Replaces(5), "replaces code 5"),
+fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
+    let cases: [(Corrupted, &str); 10] = [
+        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 3"),
+        (Corrupted::Joints(0), "0 joints"),
+        (Corrupted::Joints(9), "joint_count is 9"),
+        (Corrupted::StrokeCount(600), "stroke_count is 600; at most 512"),
+        (Corrupted::Exponent(3), "n is 3"),
+        (Corrupted::Delta(f64::NAN), "delta_rad is not finite"),
+        (Corrupted::Duration(0.0), "at least 0.001 s"),
+        (Corrupted::Start(-1.0), "start_s is -1"),
+        (Corrupted::Base(f64::INFINITY), "base_rad of joint 0"),
+        (Corrupted::Replaces(5), "replaces code 5"),
     ];
-    for (doctored, words) in cases {
-        let message = TrajectoryMessage::new(&example()).doctored(doctored);
+    for (corrupted, words) in cases {
+        let message = TrajectoryMessage::new(&example()).corrupted(corrupted);
         let error = CheckedTrajectory::try_from(&*message).expect_err("a doctored message is refused");
-        assert!(error.to_string().contains(words), "{doctored:?} gave: {error}");
+        assert!(error.to_string().contains(words), "{corrupted:?} gave: {error}");
     }
-    let other_robot = TrajectoryMessage::new(&example()).doctored(Doctored::Digest(1));
+    let other_robot = TrajectoryMessage::new(&example()).corrupted(Corrupted::Digest(1));
     let read = CheckedTrajectory::try_from(&*other_robot).expect("a digest is compared by the streamer");
     assert_ne!(read.robot_digest, example().robot_digest);
 }

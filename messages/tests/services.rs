@@ -59,9 +59,9 @@ fn report_reaches_readers_of_its_arm_only() {
 
     publisher.send_copy(report(11)).expect("send");
 
-    let heard = hears.receive().expect("receive").expect("one report");
-    assert_eq!(heard.sequence, 11);
-    assert!(heard.checked().is_some());
+    let received = hears.receive().expect("receive").expect("one report");
+    assert_eq!(received.sequence, 11);
+    assert!(received.checked().is_some());
     assert!(deaf.receive().expect("receive").is_none(), "a report crossed from one arm to another");
 }
 
@@ -83,7 +83,7 @@ fn arm_name_that_is_no_file_name_is_refused() {
 }
 
 #[test]
-fn nobody_running_is_said_with_the_cure() {
+fn no_running_process_is_reported_with_the_remedy() {
     let arm = Arm::new("nobody");
     let wire = arm.join("test");
     let sentence = wire.not_running("taustream-streamer").to_string();
@@ -93,7 +93,7 @@ fn nobody_running_is_said_with_the_cure() {
 
 /// Goal: a 25th reader is told why, in words, and the 24 before it go on.
 #[test]
-fn readers_of_reports_beyond_the_most_are_refused_with_the_number_and_the_cure() {
+fn readers_of_reports_beyond_the_maximum_are_refused_with_the_number_and_the_remedy() {
     let arm = Arm::new("crowd");
     let writer = arm.join("writer");
     let publisher = writer.report_publisher().expect("publisher");

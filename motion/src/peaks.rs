@@ -42,7 +42,7 @@ pub fn peak_constants(n: u32) -> PeakConstants {
 
 /// Peak constants of phi = 1 - (1 - s^m)^n for m = 3 (Tau-J) or 4 (Tau-J*) and any real n above 3.
 pub(crate) fn family(m: u32, n: f64) -> PeakConstants {
-    let shape = Shape { m: f64::from(m), n };
+    let shape = ProfileShape { m: f64::from(m), n };
     let p2 = shape.next([1.0, 0.0, 0.0, 0.0], 1.0);
     let p3 = shape.next(p2, 2.0);
     let p4 = shape.next(p3, 3.0);
@@ -72,12 +72,12 @@ pub(crate) fn family(m: u32, n: f64) -> PeakConstants {
 }
 
 /// The two exponents of the family.
-struct Shape {
+struct ProfileShape {
     m: f64,
     n: f64,
 }
 
-impl Shape {
+impl ProfileShape {
     /// `P_(j+1)` of `P_j`, as coefficients from x^0 up; degree 2 at most goes in.
     fn next(&self, p: [f64; 4], j: f64) -> [f64; 4] {
         let (a, b) = (self.m - j, self.n - j);

@@ -14,13 +14,13 @@ use crate::limits::{LimitViolation, POSITION_TOLERANCE_RAD, Peaks, Quantity, TOL
 use crate::stroke::{Phi, power};
 use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
 
-/// Most evaluations that a proof may take, of one stroke each; an interval counts as [`INTERVAL_WORK`] more. The densest
+/// Most evaluations that a proof may take, of one stroke each; an interval counts as [`INTERVAL_BUDGET`] more. The densest
 /// messages, at their limits, need about half.
-const WORK_MAX: usize = 5_000_000;
+const BUDGET_MAX: usize = 5_000_000;
 /// How much of it sharper peaks may take: they are a service, not a part of the proof.
-const PEAK_WORK: usize = 1_000_000;
+const PEAK_BUDGET: usize = 1_000_000;
 /// What it costs to judge an interval, in evaluations of one stroke.
-const INTERVAL_WORK: usize = 8;
+const INTERVAL_BUDGET: usize = 8;
 /// Most halvings of one piece: 2^-40 of a day is 80 ns.
 const DEPTH_MAX: u32 = 40;
 /// Reported peaks are at most this much above the true ones, relatively ..
@@ -88,7 +88,7 @@ struct Proof<'a> {
     /// Highest values met so far, and highest bounds proven: velocity, acceleration, jerk.
     met: [JointArray; 3],
     bound: [JointArray; 3],
-    work: usize,
+    budget: usize,
 }
 
 /// An interval that is still to be proven.
@@ -100,7 +100,7 @@ struct Interval {
 }
 
 /// What a bound says about an interval.
-enum Verdict {
+enum IntervalResult {
     Holds,
     Halve,
     /// Not below the limit; the evidence says whether the limit is truly exceeded at the middle.
@@ -122,7 +122,7 @@ impl<'a> Proof<'a> {
             travelled_rad: zero,
             met: [zero; 3],
             bound: [zero; 3],
-            work: 0,
+            budget: 0,
         }
     }
 
@@ -183,7 +183,7 @@ impl<'a> Proof<'a> {
                 rate_k *= rate;
             }
         }
-        self.work += self.running_count + INTERVAL_WORK;
+        self.budget += self.running_count + INTERVAL_BUDGET;
         jet
     }
 
@@ -211,10 +211,11 @@ impl<'a> Proof<'a> {
             count -= 1;
             let Interval { from_s, to_s, depth } = interval;
             let middle_s = 0.5 * (from_s + to_s);
-            let may_halve = depth < DEPTH_MAX && self.work < WORK_MAX && from_s < middle_s && middle_s < to_s;
-            match self.judge(interval, may_halve) {
-                Verdict::Holds => continue,
-                Verdict::Fails(violation) if violation.proven => {
+            let may_halve =
+                depth < DEPTH_MAX && self.budget < BUDGET_MAX && from_s < middle_s && middle_s < to_s;
+            match self.check_interval(interval, may_halve) {
+                IntervalResult::Holds => continue,
+                IntervalResult::Fails(violation) if violation.proven => {
                     // What lies to the right is later; only the left half can hold an earlier one.
                     count = 0;
                     found = Some(violation);
@@ -222,8 +223,8 @@ impl<'a> Proof<'a> {
                         break;
                     }
                 }
-                Verdict::Fails(violation) if !may_halve => return Err(found.unwrap_or(violation)),
-                Verdict::Fails(_) | Verdict::Halve => {
+                IntervalResult::Fails(violation) if !may_halve => return Err(found.unwrap_or(violation)),
+                IntervalResult::Fails(_) | IntervalResult::Halve => {
                     if found.is_some() && to_s - from_s < FIRST_S {
                         continue;
                     }
@@ -242,7 +243,7 @@ impl<'a> Proof<'a> {
     }
 
     /// Bounds everything on one interval and compares it with the limits.
-    fn judge(&mut self, interval: Interval, may_halve: bool) -> Verdict {
+    fn check_interval(&mut self, interval: Interval, may_halve: bool) -> IntervalResult {
         let middle_s = 0.5 * (interval.from_s + interval.to_s);
         let half_s = (interval.to_s - middle_s).max(middle_s - interval.from_s);
         let jet = self.jet(middle_s);
@@ -255,7 +256,7 @@ impl<'a> Proof<'a> {
             let rounding = ROUNDING * (position_rad.abs() + self.travelled_rad[joint] + self.size[0][joint]);
             let reach_rad = self.beyond(&jet, 0, joint, half_s) + rounding;
             if let Some(violation) = position_fault(joint, limits, position_rad, middle_s) {
-                return Verdict::Fails(violation);
+                return IntervalResult::Fails(violation);
             }
             fails = fails.or(reach_fault(joint, limits, (position_rad, reach_rad), middle_s));
             for (rate, quantity) in RATES.into_iter().enumerate() {
@@ -267,7 +268,7 @@ impl<'a> Proof<'a> {
                 let evidence =
                     |value, proven| LimitViolation { joint, quantity, at_s: middle_s, value, limit, proven };
                 if !within(value, limit * (1.0 + TOLERANCE)) {
-                    return Verdict::Fails(evidence(value, true));
+                    return IntervalResult::Fails(evidence(value, true));
                 }
                 if !within(bound, limit * (1.0 + TOLERANCE)) {
                     fails = fails.or(Some(evidence(bound, false)));
@@ -278,17 +279,17 @@ impl<'a> Proof<'a> {
             }
         }
         if let Some(violation) = fails {
-            return Verdict::Fails(violation);
+            return IntervalResult::Fails(violation);
         }
-        if coarse && may_halve && self.work < PEAK_WORK {
-            return Verdict::Halve;
+        if coarse && may_halve && self.budget < PEAK_BUDGET {
+            return IntervalResult::Halve;
         }
         for (bound, new) in self.bound.iter_mut().zip(&bounds) {
             for (bound, new) in bound.iter_mut().zip(new) {
                 *bound = bound.max(*new);
             }
         }
-        Verdict::Holds
+        IntervalResult::Holds
     }
 
     /// How far the k-th derivative can go from its value at the middle, without rounding.

@@ -73,7 +73,7 @@ struct Ramp {
 #[derive(Clone, Copy, Debug)]
 pub struct TimeScale {
     ramp_duration_s: f64,
-    wished: f64,
+    requested: f64,
     ramps: [Ramp; RAMPS_MAX],
     count: usize,
 }
@@ -88,7 +88,7 @@ impl TimeScale {
         } else {
             ramp_duration_s.clamp(DURATION_S_MIN, RAMP_S_MAX)
         };
-        Self { ramp_duration_s, wished: unit(sigma), ramps: [Ramp::default(); RAMPS_MAX], count: 0 }
+        Self { ramp_duration_s, requested: unit(sigma), ramps: [Ramp::default(); RAMPS_MAX], count: 0 }
     }
 
     /// Duration of every ramp.
@@ -104,7 +104,7 @@ impl TimeScale {
     ///
     /// # Errors
     /// `Busy` when too many ramps overlap.
-    pub fn wish(&mut self, sigma: f64, now_s: f64) -> Result<(), Busy> {
+    pub fn request(&mut self, sigma: f64, now_s: f64) -> Result<(), Busy> {
         self.forget_ended(now_s);
         if self.count >= RAMPS_MAX - 1 && unit(sigma) > 0.0 {
             return Err(Busy);
@@ -113,7 +113,7 @@ impl TimeScale {
         Ok(())
     }
 
-    /// Like [`Self::wish`] to 0, but never refused: the kept-back slot serves it.
+    /// Like [`Self::request`] to 0, but never refused: the kept-back slot serves it.
     ///
     /// Real time: no allocation.
     pub fn stop(&mut self, now_s: f64) {
@@ -127,7 +127,7 @@ impl TimeScale {
     #[must_use]
     pub fn sample(&self, now_s: f64) -> Scale {
         let rate = 1.0 / self.ramp_duration_s;
-        let mut scale = Scale { sigma: self.wished, ..Scale::default() };
+        let mut scale = Scale { sigma: self.requested, ..Scale::default() };
         for ramp in self.ramps() {
             let phi = Phi::at(RAMP_N, self.progress(ramp, now_s));
             scale.sigma -= ramp.rise * (1.0 - phi.value);
@@ -149,7 +149,7 @@ impl TimeScale {
         if !(span_s > 0.0 && span_s.is_finite()) {
             return 0.0;
         }
-        let mut advance_s = self.wished * span_s;
+        let mut advance_s = self.requested * span_s;
         for ramp in self.ramps() {
             // Before its start a ramp owes all of its rise, then the integral of u^n.
             let waiting_s = (ramp.start_s - from_s).clamp(0.0, span_s);
@@ -168,8 +168,8 @@ impl TimeScale {
 
     /// The speed that the ramps lead to.
     #[must_use]
-    pub fn wished(&self) -> f64 {
-        self.wished
+    pub fn requested(&self) -> f64 {
+        self.requested
     }
 
     fn ramps(&self) -> &[Ramp] {
@@ -198,9 +198,9 @@ impl TimeScale {
     }
 
     fn ramp_to(&mut self, sigma: f64, now_s: f64) {
-        let rise = sigma - self.wished;
+        let rise = sigma - self.requested;
         if rise != 0.0 && self.push(Ramp { start_s: now_s, rise }) {
-            self.wished = sigma;
+            self.requested = sigma;
         }
     }
 

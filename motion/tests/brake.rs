@@ -1,6 +1,6 @@
 //! The brake against an independent solver, and its limits by independent integration.
 mod common;
-use common::{Draw, slope};
+use common::{SeededRng, slope};
 use proptest::prelude::*;
 use rsruckig::prelude::{
     ControlInterface, DataArrayOrVec, InputParameter, Ruckig, Synchronization, ThrowErrorHandler,
@@ -15,21 +15,21 @@ struct Case {
 }
 
 /// Any state inside the acceleration limit, or up to twice beyond it.
-fn case(draw: &mut Draw, beyond: f64) -> Case {
-    let acceleration = draw.within(1.0, 30.0);
+fn case(rng: &mut SeededRng, beyond: f64) -> Case {
+    let acceleration = rng.within(1.0, 30.0);
     let start = JointState {
-        position_rad: draw.within(-3.0, 3.0),
-        velocity_rad_s: draw.within(-3.5, 3.5),
-        acceleration_rad_s2: acceleration * draw.within(-beyond, beyond),
+        position_rad: rng.within(-3.0, 3.0),
+        velocity_rad_s: rng.within(-3.5, 3.5),
+        acceleration_rad_s2: acceleration * rng.within(-beyond, beyond),
     };
-    Case { start, acceleration, jerk: draw.within(5.0, 600.0) }
+    Case { start, acceleration, jerk: rng.within(5.0, 600.0) }
 }
 
 /// Goal: the brake is time-optimal and ends where the optimum ends.
 /// Method: rsruckig in velocity control. Each joint for itself (`Synchronization::None`), because the
 /// time-synchronised stops of its version 3.0.1 break the jerk limit.
 #[test]
-fn brake_from_any_state_takes_the_time_and_way_of_the_independent_solver() {
+fn brake_from_any_state_takes_the_time_and_distance_of_the_independent_solver() {
     let mut solver = Ruckig::<1, ThrowErrorHandler>::new(None, 0.001);
     let mut input = InputParameter::<1>::new(None);
     input.control_interface = ControlInterface::Velocity;
@@ -38,7 +38,7 @@ fn brake_from_any_state_takes_the_time_and_way_of_the_independent_solver() {
     for seed in 0..20_000 {
         // Every fourth starts beyond the acceleration limit, as after a change of limits or a fault.
         let Case { start, acceleration, jerk } =
-            case(&mut Draw::from_seed(seed), if seed % 4 == 0 { 2.0 } else { 1.0 });
+            case(&mut SeededRng::from_seed(seed), if seed % 4 == 0 { 2.0 } else { 1.0 });
         let brake = Brake::from_state(start, acceleration, jerk);
         input.current_position[0] = start.position_rad;
         input.current_velocity[0] = start.velocity_rad_s;
@@ -87,7 +87,7 @@ const STEPS: u32 = 2_000;
 #[test]
 fn brake_from_any_state_integrates_to_rest_inside_its_limits() {
     for seed in 0..2_000 {
-        let Case { start, acceleration, jerk } = case(&mut Draw::from_seed(seed), 1.0);
+        let Case { start, acceleration, jerk } = case(&mut SeededRng::from_seed(seed), 1.0);
         let brake = Brake::from_state(start, acceleration, jerk);
         let step_s = brake.duration_s() / f64::from(STEPS);
         let mut sum = start;
@@ -113,7 +113,7 @@ fn brake_from_any_state_integrates_to_rest_inside_its_limits() {
             "seed {seed}: {off_rad} rad off"
         );
 
-        let t_s = Draw::from_seed(!seed).within(0.05, 0.95) * brake.duration_s();
+        let t_s = SeededRng::from_seed(!seed).within(0.05, 0.95) * brake.duration_s();
         let h = 1e-3 * brake.duration_s();
         let v = slope(|t| brake.sample(t).0.position_rad, t_s, h);
         let gap = (v - brake.sample(t_s).0.velocity_rad_s).abs();
@@ -125,7 +125,7 @@ fn brake_from_any_state_integrates_to_rest_inside_its_limits() {
 #[test]
 fn sweep_of_a_brake_is_exactly_what_it_passes_over() {
     for seed in 0..2_000 {
-        let Case { start, acceleration, jerk } = case(&mut Draw::from_seed(seed), 2.0);
+        let Case { start, acceleration, jerk } = case(&mut SeededRng::from_seed(seed), 2.0);
         let brake = Brake::from_state(start, acceleration, jerk);
         let [low_rad, high_rad] = brake.sweep_rad();
         let mut seen = [start.position_rad; 2];

@@ -1,7 +1,7 @@
 //! Forward kinematics against plain matrix products and against the poses of real arms.
 #![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 mod common;
-use common::Draw;
+use common::SeededRng;
 use core::f64::consts::{FRAC_PI_2, PI};
 use taustream_motion::MAX_JOINTS;
 use taustream_motion::chain::{Chain, ChainJoint, Column, Pose};
@@ -81,14 +81,14 @@ fn gap(pose: &Pose, matrix: &Matrix) -> f64 {
 #[test]
 fn chain_at_ten_thousand_poses_agrees_with_plain_matrix_products() {
     for seed in 0..10_000 {
-        let mut draw = Draw::from_seed(seed);
+        let mut rng = SeededRng::from_seed(seed);
         let rows = if seed % 2 == 0 {
             UR5.to_vec()
         } else {
-            let count = draw.whole(1, 8) as usize;
-            (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| draw.within(-span, span))).collect()
+            let count = rng.whole(1, 8) as usize;
+            (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span))).collect()
         };
-        let position_rad = draw.joints(rows.len(), PI);
+        let position_rad = rng.joints(rows.len(), PI);
         let (by_dh, by_mdh) = (standard(&rows).frames(&position_rad), modified(&rows).frames(&position_rad));
         let (mut dh, mut mdh) = (IDENTITY, IDENTITY);
         assert!(gap(&by_dh[0], &IDENTITY) == 0.0 && gap(&by_mdh[0], &IDENTITY) == 0.0);
@@ -153,12 +153,12 @@ fn piper_with_all_joints_at_zero_is_where_the_vendor_puts_it() {
 fn jacobian_at_two_thousand_poses_is_the_derivative_of_the_tip() {
     const STEP_RAD: f64 = 1e-6;
     for seed in 0..2_000 {
-        let mut draw = Draw::from_seed(seed);
-        let count = draw.whole(1, 8) as usize;
+        let mut rng = SeededRng::from_seed(seed);
+        let count = rng.whole(1, 8) as usize;
         let rows: Vec<Row> =
-            (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| draw.within(-span, span))).collect();
+            (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span))).collect();
         let chain = if seed % 2 == 0 { standard(&rows) } else { modified(&rows) };
-        let position_rad = draw.joints(count, PI);
+        let position_rad = rng.joints(count, PI);
         let (tip, columns) = chain.jacobian(&position_rad);
         assert_eq!(tip, chain.frames(&position_rad)[MAX_JOINTS]);
         let gap_to = |joint: usize, column: &Column| {

@@ -1,7 +1,7 @@
 //! The proof of limits: what it accepts keeps them, what it refuses breaks them, and it always comes to an end.
 #![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 mod common;
-use common::{Draw, random_limits, ur5_limits};
+use common::{SeededRng, random_limits, ur5_limits};
 use std::time::Instant;
 use taustream_motion::duration::{best_n, joints_duration_s};
 use taustream_motion::limits::{POSITION_TOLERANCE_RAD, Quantity, TOLERANCE, check_motion};
@@ -47,9 +47,9 @@ fn limits_round(peaks: &Setpoint, factor: f64) -> [JointLimits; MAX_JOINTS] {
 #[test]
 fn proof_of_overlapping_strokes_agrees_with_a_dense_scan_on_both_sides() {
     for seed in 0..60 {
-        let mut draw = Draw::from_seed(seed);
-        let count = draw.whole(1, 24);
-        let trajectory = draw.trajectory(6, count, 3.0);
+        let mut rng = SeededRng::from_seed(seed);
+        let count = rng.whole(1, 24);
+        let trajectory = rng.trajectory(6, count, 3.0);
         let most = scan(&trajectory, 40_000);
         let peaks = check_motion(&trajectory, &limits_round(&most, 1.001));
         let peaks = peaks.unwrap_or_else(|violation| panic!("seed {seed}: {violation}"));
@@ -73,10 +73,10 @@ fn proof_of_overlapping_strokes_agrees_with_a_dense_scan_on_both_sides() {
 #[test]
 fn violation_of_each_quantity_names_joint_and_a_value_that_is_reached() {
     for seed in 0..30 {
-        let mut draw = Draw::from_seed(seed);
-        let trajectory = draw.trajectory(6, 8, 2.0);
+        let mut rng = SeededRng::from_seed(seed);
+        let trajectory = rng.trajectory(6, 8, 2.0);
         let most = scan(&trajectory, 30_000);
-        let joint = draw.whole(0, 5) as usize;
+        let joint = rng.whole(0, 5) as usize;
         for quantity in [Quantity::Velocity, Quantity::Acceleration, Quantity::Jerk] {
             let mut limits = limits_round(&most, 1.01);
             let motion = &mut limits[joint].motion;
@@ -154,7 +154,7 @@ fn position_on_its_limit_passes_and_a_hair_beyond_does_not() {
 }
 
 #[test]
-fn trajectory_without_strokes_is_judged_by_its_base() {
+fn trajectory_without_strokes_is_checked_by_its_base() {
     let mut base_rad = [0.0; MAX_JOINTS];
     assert!(check_motion(&Trajectory::new(6, base_rad, &[]).unwrap(), &ur5_limits()).is_ok());
     base_rad[1] = 21.0;
@@ -164,8 +164,8 @@ fn trajectory_without_strokes_is_judged_by_its_base() {
 
 #[test]
 fn limits_that_are_zero_or_no_number_let_nothing_move() {
-    let mut draw = Draw::from_seed(3);
-    let trajectory = draw.trajectory(6, 2, 1.0);
+    let mut rng = SeededRng::from_seed(3);
+    let trajectory = rng.trajectory(6, 2, 1.0);
     for bad in [0.0, -1.0, f64::NAN] {
         for which in 0..4 {
             let mut limits = [JointLimits {
@@ -197,8 +197,8 @@ fn huge_strokes_that_cancel_are_refused_for_their_rounding() {
 }
 
 /// A train: strokes of one duration, evenly spaced, each a part of one move, stretched until one limit is met.
-fn train(count: usize, spacing: f64, limits: &[JointLimits; MAX_JOINTS], draw: &mut Draw) -> Trajectory {
-    let delta_rad = draw.joints(6, 2.0).map(|delta| delta / count as f64);
+fn train(count: usize, spacing: f64, limits: &[JointLimits; MAX_JOINTS], rng: &mut SeededRng) -> Trajectory {
+    let delta_rad = rng.joints(6, 2.0).map(|delta| delta / count as f64);
     let make = |stretch: f64| {
         let strokes: Vec<Stroke> = (0..count)
             .map(|index| Stroke {
@@ -230,10 +230,10 @@ fn roomy() -> JointLimits {
 #[test]
 fn trains_stretched_onto_a_limit_pass_and_faster_ones_do_not() {
     for seed in 0..40 {
-        let mut draw = Draw::from_seed(seed);
-        let limits = random_limits(&mut draw);
-        let count = draw.whole(2, 60) as usize;
-        let trajectory = train(count, 1.0 / 8.0, &limits, &mut draw);
+        let mut rng = SeededRng::from_seed(seed);
+        let limits = random_limits(&mut rng);
+        let count = rng.whole(2, 60) as usize;
+        let trajectory = train(count, 1.0 / 8.0, &limits, &mut rng);
         assert!(check_motion(&trajectory, &limits).is_ok(), "seed {seed}");
         let faster: Vec<Stroke> = trajectory
             .strokes()
@@ -250,7 +250,7 @@ fn trains_stretched_onto_a_limit_pass_and_faster_ones_do_not() {
 /// Times are printed, not asserted; the cap on evaluations is what bounds them.
 #[test]
 fn proof_of_the_densest_messages_comes_to_an_end() {
-    let mut draw = Draw::from_seed(11);
+    let mut rng = SeededRng::from_seed(11);
     for (name, spacing_s, duration_s, steps) in [
         ("all overlap", 1e-3, 8.0, 5_000),
         ("half overlap", 0.01, 2.0, 5_000),
@@ -260,9 +260,9 @@ fn proof_of_the_densest_messages_comes_to_an_end() {
         let strokes: Vec<Stroke> = (0..MAX_STROKES)
             .map(|index| Stroke {
                 start_s: spacing_s * index as f64,
-                duration_s: duration_s * draw.within(0.9, 1.0),
-                n: draw.whole(4, 64),
-                delta_rad: draw.joints(8, 0.02),
+                duration_s: duration_s * rng.within(0.9, 1.0),
+                n: rng.whole(4, 64),
+                delta_rad: rng.joints(8, 0.02),
             })
             .collect();
         let trajectory = Trajectory::new(8, [0.0; MAX_JOINTS], &strokes).unwrap();
@@ -282,12 +282,12 @@ fn proof_of_the_densest_messages_comes_to_an_end() {
 #[test]
 fn chain_of_timed_segments_keeps_the_limits_it_was_timed_for() {
     for seed in 0..100 {
-        let mut draw = Draw::from_seed(seed);
-        let limits = random_limits(&mut draw);
+        let mut rng = SeededRng::from_seed(seed);
+        let limits = random_limits(&mut rng);
         let (mut start_s, mut strokes) = (0.0, Vec::new());
-        for _ in 0..draw.whole(1, 20) {
-            let delta_rad = draw.joints(6, 0.8);
-            let n = if draw.whole(0, 1) == 0 { best_n(&delta_rad, &limits).0 } else { draw.whole(4, 64) };
+        for _ in 0..rng.whole(1, 20) {
+            let delta_rad = rng.joints(6, 0.8);
+            let n = if rng.whole(0, 1) == 0 { best_n(&delta_rad, &limits).0 } else { rng.whole(4, 64) };
             let duration_s = joints_duration_s(&delta_rad, &limits, n);
             strokes.push(Stroke { start_s, duration_s, n, delta_rad });
             start_s += duration_s;

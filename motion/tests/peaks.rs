@@ -1,7 +1,7 @@
 //! Peak constants against 40-digit arithmetic, and stroke durations against what they promise.
 #![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 mod common;
-use common::{Draw, random_limits, ur5_limits};
+use common::{SeededRng, random_limits, ur5_limits};
 use taustream_motion::duration::{best_n, joints_duration_s, stroke_duration_s};
 use taustream_motion::limits::check_motion;
 use taustream_motion::peaks::{PeakConstants, peak_constants};
@@ -110,9 +110,9 @@ fn peaks_of_every_profile_bound_a_dense_scan_tightly() {
 #[test]
 fn stroke_of_its_shortest_duration_meets_one_limit_and_exceeds_none() {
     for seed in 0..2_000 {
-        let mut draw = Draw::from_seed(seed);
-        let limits = random_limits(&mut draw)[0].motion;
-        let (delta, n) = (draw.within(-3.0, 3.0), draw.whole(N_MIN, N_MAX));
+        let mut rng = SeededRng::from_seed(seed);
+        let limits = random_limits(&mut rng)[0].motion;
+        let (delta, n) = (rng.within(-3.0, 3.0), rng.whole(N_MIN, N_MAX));
         let duration_s = stroke_duration_s(delta, &limits, n);
         let c = peak_constants(n);
         let used = [
@@ -129,10 +129,10 @@ fn stroke_of_its_shortest_duration_meets_one_limit_and_exceeds_none() {
 #[test]
 fn joints_timed_exactly_to_a_limit_pass_and_one_percent_less_time_does_not() {
     for seed in 0..300 {
-        let mut draw = Draw::from_seed(seed);
-        let limits = random_limits(&mut draw);
-        let delta_rad = draw.joints(6, 3.0);
-        let n = draw.whole(N_MIN, N_MAX);
+        let mut rng = SeededRng::from_seed(seed);
+        let limits = random_limits(&mut rng);
+        let delta_rad = rng.joints(6, 3.0);
+        let n = rng.whole(N_MIN, N_MAX);
         let exact_s = joints_duration_s(&delta_rad, &limits, n);
         let make = |duration_s| {
             let stroke = Stroke { start_s: 0.4, duration_s, n, delta_rad };
@@ -149,8 +149,8 @@ fn joints_timed_exactly_to_a_limit_pass_and_one_percent_less_time_does_not() {
 #[test]
 fn best_n_is_no_longer_than_any_other() {
     for seed in 0..50 {
-        let mut draw = Draw::from_seed(seed);
-        let (limits, delta_rad) = (random_limits(&mut draw), draw.joints(6, 2.0));
+        let mut rng = SeededRng::from_seed(seed);
+        let (limits, delta_rad) = (random_limits(&mut rng), rng.joints(6, 2.0));
         let (n, best_s) = best_n(&delta_rad, &limits);
         assert_eq!(best_s.to_bits(), joints_duration_s(&delta_rad, &limits, n).to_bits());
         for n in N_MIN..=N_MAX {

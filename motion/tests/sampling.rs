@@ -1,6 +1,6 @@
 //! Strokes and their sums: exact ends, the bits of the cursor, and derivatives against independent numerical ones.
 mod common;
-use common::{Draw, slope};
+use common::{SeededRng, slope};
 use proptest::prelude::*;
 use taustream_motion::stroke::{N_MAX, N_MIN, Phi};
 use taustream_motion::trajectory::Cursor;
@@ -17,11 +17,11 @@ fn bits(setpoint: &Setpoint) -> [[u64; MAX_JOINTS]; 4] {
 #[test]
 fn sums_of_strokes_anywhere_differentiate_to_their_velocity_acceleration_and_jerk() {
     for seed in 0..400 {
-        let mut draw = Draw::from_seed(seed);
-        let count = draw.whole(1, 12);
-        let trajectory = draw.trajectory(6, count, 3.0);
+        let mut rng = SeededRng::from_seed(seed);
+        let count = rng.whole(1, 12);
+        let trajectory = rng.trajectory(6, count, 3.0);
         for _ in 0..20 {
-            let t_s = draw.within(-0.1, trajectory.duration_s() + 0.1);
+            let t_s = rng.within(-0.1, trajectory.duration_s() + 0.1);
             let near_edge = trajectory
                 .strokes()
                 .iter()
@@ -48,8 +48,8 @@ fn sums_of_strokes_anywhere_differentiate_to_their_velocity_acceleration_and_jer
 
 /// The differentiation above must be able to fail: a derivative off by one part in a thousand is seen.
 #[test]
-fn numerical_derivative_of_a_doctored_velocity_is_seen_to_differ() {
-    let trajectory = Draw::from_seed(7).trajectory(6, 3, 1.0);
+fn numerical_derivative_of_a_corrupted_velocity_is_seen_to_differ() {
+    let trajectory = SeededRng::from_seed(7).trajectory(6, 3, 1.0);
     let t_s = 0.5 * trajectory.duration_s();
     let at = trajectory.sample(t_s).velocity_rad_s[0];
     let numeric = slope(|t| trajectory.sample(t).position_rad[0], t_s, 2e-3);
@@ -82,7 +82,7 @@ fn stroke_at_its_ends_is_exact_and_at_rest() {
 #[test]
 fn sums_at_every_join_are_continuous_up_to_the_jerk() {
     for seed in 0..200 {
-        let trajectory = Draw::from_seed(seed).trajectory(4, 8, 2.0);
+        let trajectory = SeededRng::from_seed(seed).trajectory(4, 8, 2.0);
         for stroke in trajectory.strokes() {
             for join_s in [stroke.start_s, stroke.end_s()] {
                 let gap = |h: f64| {
@@ -103,7 +103,7 @@ proptest! {
     fn cursor_at_any_sequence_of_times_has_the_bits_of_the_plain_sum(
         seed in 0_u64..1_000_000, count in 0_u32..40, steps in prop::collection::vec(-0.3_f64..1.0, 1..60),
     ) {
-        let trajectory = Draw::from_seed(seed).trajectory(6, count, 4.0);
+        let trajectory = SeededRng::from_seed(seed).trajectory(6, count, 4.0);
         let mut cursor = if seed % 2 == 0 { Cursor::at_start(&trajectory) } else { Cursor::default() };
         let mut t_s = -0.5;
         for (index, step) in steps.iter().enumerate() {
@@ -123,7 +123,7 @@ proptest! {
     fn travel_bound_between_two_instants_holds_everything_between(
         seed in 0_u64..1_000_000, count in 1_u32..20, from in 0.0_f64..1.0, to in 0.0_f64..1.0,
     ) {
-        let trajectory = Draw::from_seed(seed).trajectory(6, count, 4.0);
+        let trajectory = SeededRng::from_seed(seed).trajectory(6, count, 4.0);
         let (t1_s, t2_s) = (from * trajectory.duration_s(), to * trajectory.duration_s());
         let bound_rad = trajectory.travel_bound_rad(t1_s, t2_s);
         let swapped_rad = trajectory.travel_bound_rad(t2_s, t1_s);
@@ -182,7 +182,7 @@ fn travel_bound_of_a_single_stroke_is_its_travel() {
 
 #[test]
 fn sample_at_no_number_gives_no_number_for_what_moves() {
-    let trajectory = Draw::from_seed(1).trajectory(3, 2, 1.0);
+    let trajectory = SeededRng::from_seed(1).trajectory(3, 2, 1.0);
     let setpoint = trajectory.sample(f64::NAN);
     assert!((0..3).all(|joint| setpoint.position_rad[joint].is_nan()));
     let mut cursor = Cursor::at_start(&trajectory);

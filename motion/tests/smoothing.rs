@@ -1,6 +1,6 @@
 //! Smoothing by the kernel: what it keeps, what it costs, and what it refuses.
 mod common;
-use common::Draw;
+use common::SeededRng;
 use taustream_motion::smoothing::{Kernel, moments, smooth};
 use taustream_motion::stroke::Phi;
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory, TrajectoryError};
@@ -70,11 +70,11 @@ fn motion_inside_its_limits_stays_inside_up_to_the_ripple() {
     };
     let mut coarse_breaks = 0;
     for seed in 0..60 {
-        let mut draw = Draw::from_seed(seed);
-        let motion = draw.trajectory(3, 8, 1.0);
+        let mut rng = SeededRng::from_seed(seed);
+        let motion = rng.trajectory(3, 8, 1.0);
         let scale = share(&motion);
         let span_s = motion.duration_s() * scale;
-        let (n, kernels) = (draw.whole(5, 8), draw.whole(8, 25));
+        let (n, kernels) = (rng.whole(5, 8), rng.whole(8, 25));
         let smoothed = |a_kernel: u32| {
             let kernel = Kernel { n, width_s: span_s / f64::from(kernels), parts: kernels * a_kernel };
             smooth(3, span_s, &kernel, |t| motion.sample(t / scale).position_rad).unwrap()

@@ -1,7 +1,7 @@
 //! The time scale: whatever is wished, a motion inside its motion limits stays inside its stop limits.
 #![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 mod common;
-use common::{Draw, random_limits, slope};
+use common::{SeededRng, random_limits, slope};
 use proptest::prelude::*;
 use taustream_motion::duration::joints_duration_s;
 use taustream_motion::limits::check_motion;
@@ -17,13 +17,13 @@ struct Run {
 }
 
 impl Run {
-    fn new(ramp_s: f64, wishes: &[(f64, f64)]) -> Self {
+    fn new(ramp_s: f64, requests: &[(f64, f64)]) -> Self {
         let mut scale = TimeScale::settled(1.0, ramp_s);
         let mut from = vec![(0.0, 0.0, scale)];
-        for &(at_s, sigma) in wishes {
+        for &(at_s, sigma) in requests {
             let (last_s, reached_s, before) = *from.last().unwrap();
             let reached_s = reached_s + before.advance_s(last_s, at_s);
-            let _ = scale.wish(sigma, at_s);
+            let _ = scale.request(sigma, at_s);
             from.push((at_s, reached_s, scale));
         }
         Self { from }
@@ -45,10 +45,10 @@ impl Run {
 }
 
 /// Straight segments timed exactly to the motion limits, so that nothing is left over where they peak.
-fn timed_trajectory(draw: &mut Draw, limits: &[JointLimits; MAX_JOINTS]) -> Trajectory {
+fn timed_trajectory(rng: &mut SeededRng, limits: &[JointLimits; MAX_JOINTS]) -> Trajectory {
     let (mut start_s, mut strokes) = (0.0, Vec::new());
     for _ in 0..4 {
-        let (delta_rad, n) = (draw.joints(4, 2.0), draw.whole(4, 12));
+        let (delta_rad, n) = (rng.joints(4, 2.0), rng.whole(4, 12));
         let duration_s = joints_duration_s(&delta_rad, limits, n);
         strokes.push(Stroke { start_s, duration_s, n, delta_rad });
         start_s += duration_s;
@@ -57,20 +57,20 @@ fn timed_trajectory(draw: &mut Draw, limits: &[JointLimits; MAX_JOINTS]) -> Traj
 }
 
 /// Random wishes: pauses and resumptions only, or any speeds, some apart, some as fast as the slots allow.
-fn wishes(draw: &mut Draw, ramp_s: f64, until_s: f64) -> Vec<(f64, f64)> {
+fn requests(rng: &mut SeededRng, ramp_s: f64, until_s: f64) -> Vec<(f64, f64)> {
     let (mut t_s, mut list) = (0.0, Vec::new());
-    let pauses = draw.whole(0, 1) == 0;
+    let pauses = rng.whole(0, 1) == 0;
     while pauses && t_s < until_s {
-        t_s += ramp_s * draw.within(0.5, 2.5);
+        t_s += ramp_s * rng.within(0.5, 2.5);
         list.push((t_s, if list.len() % 2 == 0 { 0.0 } else { 1.0 }));
     }
     while t_s < until_s {
-        let most = if draw.whole(0, 3) == 0 { 1.5 } else { 0.3 };
-        t_s += ramp_s * draw.within(0.0, most);
-        let sigma = match draw.whole(0, 3) {
+        let most = if rng.whole(0, 3) == 0 { 1.5 } else { 0.3 };
+        t_s += ramp_s * rng.within(0.0, most);
+        let sigma = match rng.whole(0, 3) {
             0 => 0.0,
             1 => 1.0,
-            _ => draw.within(-0.2, 1.2),
+            _ => rng.within(-0.2, 1.2),
         };
         list.push((t_s, sigma));
     }
@@ -87,16 +87,16 @@ fn second_and_third(f: impl Fn(f64) -> f64, t: f64, h: f64) -> [f64; 2] {
 
 /// Largest part of its stop limits that a run uses, by differences of positions alone.
 fn stop_limit_use(seed: u64, ramp_factor: f64) -> f64 {
-    let mut draw = Draw::from_seed(seed);
-    let limits = random_limits(&mut draw);
-    let trajectory = timed_trajectory(&mut draw, &limits);
+    let mut rng = SeededRng::from_seed(seed);
+    let limits = random_limits(&mut rng);
+    let trajectory = timed_trajectory(&mut rng, &limits);
     assert!(check_motion(&trajectory, &limits).is_ok(), "seed {seed}: the case itself is out of limits");
     let ramp_s = ramp_duration_s(&limits, 4) * ramp_factor;
     let span_s = 2.0 * trajectory.duration_s();
-    let run = Run::new(ramp_s, &wishes(&mut draw, ramp_s, span_s));
+    let run = Run::new(ramp_s, &requests(&mut rng, ramp_s, span_s));
     let mut most = 0.0_f64;
     for _ in 0..300 {
-        let t_s = draw.within(0.01, span_s);
+        let t_s = rng.within(0.01, span_s);
         for (joint, limits) in limits.iter().enumerate().take(4) {
             let q = |t| trajectory.sample(run.trajectory_s(t)).position_rad[joint];
             let [a, j] = second_and_third(q, t_s, 1e-3);
@@ -110,7 +110,7 @@ fn stop_limit_use(seed: u64, ramp_factor: f64) -> f64 {
 }
 
 #[test]
-fn motion_under_any_wishes_stays_inside_its_stop_limits() {
+fn motion_under_any_requests_stays_inside_its_stop_limits() {
     for seed in 0..200 {
         let most = stop_limit_use(seed, 1.0);
         // The differences are good to some parts in a thousand.
@@ -131,14 +131,14 @@ fn motion_with_ramps_that_are_too_short_is_seen_to_break_stop_limits() {
 #[test]
 fn scaled_motion_differentiates_to_its_velocity_acceleration_and_jerk() {
     for seed in 0..100 {
-        let mut draw = Draw::from_seed(seed);
-        let limits = random_limits(&mut draw);
-        let trajectory = timed_trajectory(&mut draw, &limits);
+        let mut rng = SeededRng::from_seed(seed);
+        let limits = random_limits(&mut rng);
+        let trajectory = timed_trajectory(&mut rng, &limits);
         let ramp_s = ramp_duration_s(&limits, 4);
-        let run = Run::new(ramp_s, &wishes(&mut draw, ramp_s, trajectory.duration_s()));
+        let run = Run::new(ramp_s, &requests(&mut rng, ramp_s, trajectory.duration_s()));
         let at = |t: f64| scaled(&trajectory.sample(run.trajectory_s(t)), run.scale(t));
         for _ in 0..40 {
-            let t_s = draw.within(0.01, trajectory.duration_s());
+            let t_s = rng.within(0.01, trajectory.duration_s());
             let exact = at(t_s);
             for (joint, limits) in limits.iter().enumerate().take(4) {
                 let v = slope(|t| at(t).position_rad[joint], t_s, 1e-3);
@@ -158,14 +158,14 @@ fn scaled_motion_differentiates_to_its_velocity_acceleration_and_jerk() {
 }
 
 #[test]
-fn sigma_under_any_wishes_stays_inside_the_bounds_of_the_header() {
+fn sigma_under_any_requests_stays_inside_the_bounds_of_the_header() {
     let c = peak_constants(RAMP_N);
     for seed in 0..500 {
-        let mut draw = Draw::from_seed(seed);
-        let ramp_s = draw.within(0.05, 2.0);
-        let run = Run::new(ramp_s, &wishes(&mut draw, ramp_s, 10.0 * ramp_s));
+        let mut rng = SeededRng::from_seed(seed);
+        let ramp_s = rng.within(0.05, 2.0);
+        let run = Run::new(ramp_s, &requests(&mut rng, ramp_s, 10.0 * ramp_s));
         for _ in 0..200 {
-            let t_s = draw.within(0.0, 12.0 * ramp_s);
+            let t_s = rng.within(0.0, 12.0 * ramp_s);
             let scale = run.scale(t_s);
             assert!((0.0..=1.0).contains(&scale.sigma), "seed {seed}: {scale:?}");
             assert!(scale.sigma_d1_s.abs() <= c.c_v / ramp_s * (1.0 + 1e-12), "seed {seed}: {scale:?}");
@@ -178,7 +178,7 @@ fn sigma_under_any_wishes_stays_inside_the_bounds_of_the_header() {
 /// The bound of the second derivative is no larger than it must be: the worst wishes reach it. They are 1 where phi'''
 /// is positive, seen back from the instant that is asked for.
 #[test]
-fn sigma_under_the_worst_wishes_reaches_both_bounds() {
+fn sigma_under_the_worst_requests_reaches_both_bounds() {
     let c = peak_constants(RAMP_N);
     // The peaks of phi'' by a scan: there phi''' changes its sign.
     let phi = |step: u32| taustream_motion::stroke::Phi::at(RAMP_N, f64::from(step) / 1e5);
@@ -187,12 +187,12 @@ fn sigma_under_the_worst_wishes_reaches_both_bounds() {
     let (up, down) = (f64::from(peak(1.0)) / 1e5, f64::from(peak(-1.0)) / 1e5);
     let mut scale = TimeScale::settled(0.0, 1.0);
     for (at_s, sigma) in [(1.0, 1.0), (2.0 - down, 0.0), (2.0 - up, 1.0)] {
-        scale.wish(sigma, at_s).unwrap();
+        scale.request(sigma, at_s).unwrap();
     }
     let bend = scale.sample(2.0).sigma_d2_s2 / (c.c_a_positive + c.c_a_negative);
     assert!((bend - 1.0).abs() < 1e-6, "{bend}");
     let mut step = TimeScale::settled(0.0, 1.0);
-    step.wish(1.0, 0.0).unwrap();
+    step.request(1.0, 0.0).unwrap();
     assert!((step.sample(c.s_v).sigma_d1_s / c.c_v - 1.0).abs() < 1e-9);
 }
 
@@ -200,7 +200,7 @@ fn sigma_under_the_worst_wishes_reaches_both_bounds() {
 fn ramp_duration_uses_one_stop_limit_up_and_exceeds_none() {
     let c = peak_constants(RAMP_N);
     for seed in 0..2_000 {
-        let limits = random_limits(&mut Draw::from_seed(seed));
+        let limits = random_limits(&mut SeededRng::from_seed(seed));
         let d = ramp_duration_s(&limits, 6);
         let mut most = 0.0_f64;
         for JointLimits { motion: m, stop: s, .. } in limits.iter().take(6) {
@@ -217,7 +217,7 @@ fn ramp_duration_uses_one_stop_limit_up_and_exceeds_none() {
 
 #[test]
 fn ramp_duration_without_room_above_the_motion_limits_is_infinite() {
-    let good = random_limits(&mut Draw::from_seed(0));
+    let good = random_limits(&mut SeededRng::from_seed(0));
     assert!(ramp_duration_s(&good, 6).is_finite());
     for spoil in [
         |limits: &mut JointLimits| limits.stop.acceleration_rad_s2 = limits.motion.acceleration_rad_s2,
@@ -241,42 +241,42 @@ fn bits(scale: Scale) -> [u64; 3] {
 }
 
 #[test]
-fn time_scale_once_settled_is_exactly_what_was_wished() {
+fn time_scale_once_settled_is_exactly_what_was_requested() {
     for seed in 0..300 {
-        let mut draw = Draw::from_seed(seed);
-        let mut scale = TimeScale::settled(draw.within(0.0, 1.0), 0.4);
-        let mut t_s = draw.within(0.0, 1e6); // A monotonic clock is not near zero.
+        let mut rng = SeededRng::from_seed(seed);
+        let mut scale = TimeScale::settled(rng.within(0.0, 1.0), 0.4);
+        let mut t_s = rng.within(0.0, 1e6); // A monotonic clock is not near zero.
         for _ in 0..10 {
-            t_s += draw.within(0.0, 0.2);
-            let _ = scale.wish(draw.within(0.0, 1.0), t_s);
+            t_s += rng.within(0.0, 0.2);
+            let _ = scale.request(rng.within(0.0, 1.0), t_s);
         }
-        let wish = if seed % 2 == 0 { 0.0 } else { draw.within(0.0, 1.0) };
-        scale.wish(wish, t_s).unwrap();
+        let request = if seed % 2 == 0 { 0.0 } else { rng.within(0.0, 1.0) };
+        scale.request(request, t_s).unwrap();
         assert!(!scale.is_settled(t_s) && !scale.is_settled(t_s + 0.399));
         let end_s = t_s + 0.4 + 1e-9;
         assert!(scale.is_settled(end_s));
-        assert_eq!(bits(scale.sample(end_s)), [wish.to_bits(), 0, 0], "seed {seed}");
+        assert_eq!(bits(scale.sample(end_s)), [request.to_bits(), 0, 0], "seed {seed}");
         let advance_s = scale.advance_s(end_s, end_s + 0.001);
-        assert_eq!(advance_s.to_bits(), (wish * ((end_s + 0.001) - end_s)).to_bits(), "seed {seed}");
+        assert_eq!(advance_s.to_bits(), (request * ((end_s + 0.001) - end_s)).to_bits(), "seed {seed}");
     }
 }
 
 #[test]
 fn ramps_that_have_ended_are_forgotten_without_changing_a_bit() {
     for seed in 0..300 {
-        let mut draw = Draw::from_seed(seed);
+        let mut rng = SeededRng::from_seed(seed);
         let mut scale = TimeScale::settled(0.5, 0.5);
         let mut t_s = 0.0;
         for _ in 0..12 {
-            t_s += draw.within(0.0, 0.3);
-            scale.wish(draw.within(0.0, 1.0), t_s).unwrap();
+            t_s += rng.within(0.0, 0.3);
+            scale.request(rng.within(0.0, 1.0), t_s).unwrap();
         }
         let before = scale;
-        t_s += draw.within(0.0, 0.6);
+        t_s += rng.within(0.0, 0.6);
         // The same wish again adds nothing, and only forgets.
-        scale.wish(scale.wished(), t_s).unwrap();
+        scale.request(scale.requested(), t_s).unwrap();
         for _ in 0..50 {
-            let later_s = t_s + draw.within(0.0, 0.6);
+            let later_s = t_s + rng.within(0.0, 0.6);
             assert_eq!(bits(scale.sample(later_s)), bits(before.sample(later_s)), "seed {seed}");
             let (a, b) = (scale.advance_s(t_s, later_s), before.advance_s(t_s, later_s));
             assert_eq!(a.to_bits(), b.to_bits(), "seed {seed}");
@@ -285,25 +285,25 @@ fn ramps_that_have_ended_are_forgotten_without_changing_a_bit() {
 }
 
 #[test]
-fn wish_with_all_slots_taken_is_busy_and_changes_nothing_while_stop_still_works() {
+fn request_with_all_slots_taken_is_busy_and_changes_nothing_while_stop_still_works() {
     let mut scale = TimeScale::settled(1.0, 1.0);
     for step in 1..RAMPS_MAX {
-        scale.wish(if step % 2 == 0 { 1.0 } else { 0.5 }, 0.001 * step as f64).unwrap();
+        scale.request(if step % 2 == 0 { 1.0 } else { 0.5 }, 0.001 * step as f64).unwrap();
     }
     let before = scale;
-    assert_eq!(scale.wish(0.7, 0.05), Err(Busy));
+    assert_eq!(scale.request(0.7, 0.05), Err(Busy));
     assert_eq!(bits(scale.sample(0.4)), bits(before.sample(0.4)));
     scale.stop(0.05);
     scale.stop(0.06); // A second one has nothing to add.
-    assert_eq!(scale.wished().to_bits(), 0.0_f64.to_bits());
-    assert_eq!(scale.wish(1.0, 0.07), Err(Busy));
+    assert_eq!(scale.requested().to_bits(), 0.0_f64.to_bits());
+    assert_eq!(scale.request(1.0, 0.07), Err(Busy));
     assert_eq!(bits(scale.sample(1.1)), [0, 0, 0]);
     // As ramps end, wishes are served again, and a stop always is.
     for round in 0..200 {
         let t_s = 1.0 + 0.01 * f64::from(round);
-        let _ = scale.wish(0.9, t_s);
+        let _ = scale.request(0.9, t_s);
         scale.stop(t_s + 0.001);
-        assert_eq!(scale.wished().to_bits(), 0.0_f64.to_bits(), "round {round}");
+        assert_eq!(scale.requested().to_bits(), 0.0_f64.to_bits(), "round {round}");
     }
     assert_eq!(bits(scale.sample(5.0)), [0, 0, 0]);
 }
@@ -317,11 +317,11 @@ proptest! {
     fn advance_over_any_interval_is_the_integral_of_sigma(
         seed in 0_u64..1_000_000, from in 0.0_f64..3.0, span in 0.0_f64..2.0, cut in 0.0_f64..1.0,
     ) {
-        let mut draw = Draw::from_seed(seed);
-        let mut scale = TimeScale::settled(draw.within(0.0, 1.0), 0.7);
+        let mut rng = SeededRng::from_seed(seed);
+        let mut scale = TimeScale::settled(rng.within(0.0, 1.0), 0.7);
         // All wishes lie ahead of some of the interval: sigma is defined before a ramp begins, too.
         for step in 0..8 {
-            scale.wish(draw.within(0.0, 1.0), 0.05 * f64::from(step) + draw.within(0.0, 0.05)).unwrap();
+            scale.request(rng.within(0.0, 1.0), 0.05 * f64::from(step) + rng.within(0.0, 0.05)).unwrap();
         }
         let h = span / f64::from(STEPS);
         let mut sum = 0.0;
@@ -344,8 +344,8 @@ proptest! {
         steps in prop::collection::vec((any::<f64>(), any::<f64>(), any::<bool>()), 0..80), at in any::<f64>(), to in any::<f64>(),
     ) {
         let mut scale = TimeScale::settled(sigma, ramp);
-        for (wish, now_s, stop) in steps {
-            if stop { scale.stop(now_s) } else { let _ = scale.wish(wish, now_s); }
+        for (request, now_s, stop) in steps {
+            if stop { scale.stop(now_s) } else { let _ = scale.request(request, now_s); }
             prop_assert!((0.0..=1.0).contains(&scale.sample(at).sigma));
             prop_assert!(scale.advance_s(at, to) >= 0.0);
         }

@@ -7,7 +7,7 @@
 //! tests/benchmarks.rs holds against other seeds. Otherwise the first line is the optimum's place, then a line a run: its best so far, the best of its last population, and its
 //! evaluations. Seeds are 1 to RUNS; the optimum is moved by the same vector in every run.
 use anyhow::{Context, bail};
-use taustream_planner::optimize::{Found, METHODS, Optimizer, Problem, Reading, Run, Setup, by_name};
+use taustream_planner::optimize::{METHODS, Optimizer, Problem, Reading, Run, Setup, Solution, by_name};
 use taustream_planner::papers::{Benchmark, Function};
 
 const USAGE: &str = "benchmarks METHOD F1..F6 DIMENSIONS EVALUATIONS RUNS [printed] [unshifted]";
@@ -49,7 +49,7 @@ fn run(
     problem: &dyn Problem,
     seed: u64,
     evaluations_max: usize,
-) -> anyhow::Result<Found> {
+) -> anyhow::Result<Solution> {
     let (is_over, mut watch) = (|| false, |_: &_| ());
     let run = Run { seed, evaluations_max, guesses: &[], is_over: &is_over, watch: &mut watch };
     Ok(optimizer.minimise(problem, run)?)

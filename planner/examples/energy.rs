@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::draw::Draw;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
 use taustream_planner::{Improvement, Objective, Plan, PlanOptions, plan};
 
@@ -56,14 +56,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 /// Two random clear poses.
 fn ends(world: &World, seed: u64) -> [JointArray; 2] {
-    let mut draw = Draw::new(seed, 90);
+    let mut rng = SeededRng::new(seed, 90);
     let mut clear = || loop {
         let mut q = [0.0; 8];
         for (q, joint) in q.iter_mut().zip(&world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
-            *q = draw.within(0.5 * low, 0.5 * high);
+            *q = rng.within(0.5 * low, 0.5 * high);
         }
-        if taustream_planner::leave::is_clear(world, &q) {
+        if taustream_planner::margin_exit::is_clear(world, &q) {
             return q;
         }
     };

@@ -8,10 +8,10 @@
 use std::path::Path;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::draw::Draw;
-use taustream_planner::leave::is_clear;
+use taustream_planner::margin_exit::is_clear;
 use taustream_planner::optimize::METHODS;
 use taustream_planner::position::one_try;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,11 +22,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for arm in ["ur5", "piper"] {
         let robot = Robot::load(&config.join(format!("robots/{arm}.toml")))?;
         let world = World::new(&robot, &scene)?;
-        let start_rad = clear(&world, &mut Draw::new(0, 91));
+        let start_rad = clear(&world, &mut SeededRng::new(0, 91));
         for method in METHODS {
             let (mut there, mut times_s) = (0, Vec::new());
             for seed in 0..targets {
-                let [.., tip] = robot.chain.frames(&clear(&world, &mut Draw::new(seed, 92)));
+                let [.., tip] = robot.chain.frames(&clear(&world, &mut SeededRng::new(seed, 92)));
                 let found = one_try(&world, start_rad, tip.translation.vector.into(), method, seed)?;
                 there += u32::from(found.is_some());
                 times_s.extend(found.filter(|(pose, _)| is_clear(&world, pose)).map(|(_, time_s)| time_s));
@@ -40,12 +40,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// A random clear pose.
-fn clear(world: &World, draw: &mut Draw) -> JointArray {
+fn clear(world: &World, rng: &mut SeededRng) -> JointArray {
     loop {
         let mut q = [0.0; 8];
         for (q, joint) in q.iter_mut().zip(&world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
-            *q = draw.within(low, high);
+            *q = rng.within(low, high);
         }
         if is_clear(world, &q) {
             return q;

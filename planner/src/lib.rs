@@ -6,13 +6,14 @@
 #![forbid(unsafe_code)]
 
 pub mod arguments;
+pub mod budget;
 pub mod collide;
 pub mod cost;
 pub mod dynamics;
 pub mod foraging;
 pub mod import;
 pub mod kind;
-pub mod leave;
+pub mod margin_exit;
 pub mod objective;
 pub mod optimize;
 pub mod papers;
@@ -27,10 +28,9 @@ pub mod shortcut;
 pub mod timing;
 pub mod tree;
 pub mod verify;
-pub mod work;
 pub mod world;
 
-pub use taustream_arm::draw;
+pub use taustream_arm::rng;
 
 pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
 pub use kind::{Improvement, PlannerKind};

@@ -52,14 +52,14 @@ impl Objective {
 const SAMPLES: u32 = 1_000;
 
 /// Weighs verified motions.
-pub struct Judge<'a> {
+pub struct Evaluator<'a> {
     /// What counts.
     pub objective: Objective,
     robot: &'a Robot,
     dynamics: Result<Dynamics<'a>, NoMasses>,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> Evaluator<'a> {
     /// A judge of one arm's motions.
     ///
     /// # Errors
@@ -89,13 +89,13 @@ impl<'a> Judge<'a> {
     pub fn score(&self, motion: &Trajectory, proof: &Proof) -> f64 {
         match self.objective {
             Objective::Time => proof.duration_s,
-            Objective::Cost => self.way_cost(motion),
+            Objective::Cost => self.distance_cost(motion),
             Objective::Energy => self.energy_j(motion).unwrap_or(f64::INFINITY),
         }
     }
 
     /// The paper's cost of a way that touches nothing: its length in space and in joints, weighed.
-    fn way_cost(&self, motion: &Trajectory) -> f64 {
+    fn distance_cost(&self, motion: &Trajectory) -> f64 {
         let [length, travel, _] = CostModel::default().weights;
         let at = |i: u32| motion.sample(motion.duration_s() * f64::from(i) / f64::from(SAMPLES)).position_rad;
         let tip = |q: &JointArray| {

@@ -2,20 +2,20 @@
 //!
 //! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> improvement -> timing with rounded corners
 //! -> proof. From the first proven motion on there is an answer; later stages can only replace it by a better one.
+use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
-use crate::draw::Draw;
 use crate::kind::{Improvement, PlannerKind};
-use crate::leave::Leaving;
-use crate::objective::{Judge, Objective};
+use crate::margin_exit::MarginExit;
+use crate::objective::{Evaluator, Objective};
 use crate::optimize::{METHODS, Method, Optimizer, Setup};
 use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions};
 use crate::refine::{self, PathProblem, refine};
+use crate::rng::SeededRng;
 use crate::search::Searcher;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
 use crate::tree::Space;
 use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
-use crate::work::Work;
 use crate::world::World;
 use std::ops::Range;
 use std::time::Duration;
@@ -33,7 +33,7 @@ const CORNER_S: f64 = 0.3;
 /// Evaluations granted a stage, from the deadline alone: about half of what a small controller does in the time,
 /// so that the clock cuts in on slow or busy machines only.
 #[derive(Clone, Copy, Debug)]
-struct Budget {
+struct StageBudgets {
     /// Poses checked by all searches.
     search_checks: usize,
     /// Shortcuts tried a path.
@@ -56,7 +56,7 @@ pub fn search_checks(deadline: Duration) -> usize {
     counted_ms(deadline) * 100
 }
 
-impl Budget {
+impl StageBudgets {
     fn of(options: &PlanOptions) -> Self {
         let ms = counted_ms(options.deadline);
         Self {
@@ -94,9 +94,9 @@ pub struct Pipeline<'a> {
     space: Space<'a>,
     options: &'a PlanOptions,
     /// Set when the motion must leave a margin before the pipeline's own path begins.
-    leaving: Option<Leaving<'a>>,
-    judge: &'a Judge<'a>,
-    budget: Budget,
+    margin_exit: Option<MarginExit<'a>>,
+    evaluator: &'a Evaluator<'a>,
+    stage_budgets: StageBudgets,
     limits: [JointLimits; MAX_JOINTS],
     /// What was done, in words.
     tried: Vec<String>,
@@ -110,16 +110,16 @@ impl<'a> Pipeline<'a> {
     #[must_use]
     pub fn new(
         world: &'a World<'a>,
-        work: &'a Work<'a>,
+        budget: &'a Budget<'a>,
         options: &'a PlanOptions,
-        judge: &'a Judge<'a>,
+        evaluator: &'a Evaluator<'a>,
     ) -> Self {
         Self {
-            space: Space::new(world, work),
+            space: Space::new(world, budget),
             options,
-            leaving: None,
-            judge,
-            budget: Budget::of(options),
+            margin_exit: None,
+            evaluator,
+            stage_budgets: StageBudgets::of(options),
             limits: world.robot().limits(),
             tried: Vec::new(),
             best: None,
@@ -129,8 +129,8 @@ impl<'a> Pipeline<'a> {
 
     /// Has every motion begin where the arm stands, inside the margin, and go straight to where [`Self::run`] starts.
     #[must_use]
-    pub fn leaving(mut self, leaving: Leaving<'a>) -> Self {
-        self.leaving = Some(leaving);
+    pub fn margin_exit(mut self, margin_exit: MarginExit<'a>) -> Self {
+        self.margin_exit = Some(margin_exit);
         self
     }
 
@@ -140,7 +140,7 @@ impl<'a> Pipeline<'a> {
     /// What was tried in vain.
     pub fn run(mut self, start_rad: &JointArray, goal_rad: &JointArray) -> Result<Plan, PlanError> {
         if start_rad.iter().zip(goal_rad).all(|(a, b)| (a - b).abs() <= SAME_RAD) {
-            if self.leaving.is_some() {
+            if self.margin_exit.is_some() {
                 self.propose(&[*goal_rad], "straight line");
             } else {
                 self.stay(start_rad);
@@ -155,7 +155,7 @@ impl<'a> Pipeline<'a> {
             PlannerKind::Auto => {
                 if !self.straight(&line) {
                     self.around(&line);
-                } else if self.judge.objective != Objective::Time {
+                } else if self.evaluator.objective != Objective::Time {
                     // Nothing is shorter in time than the line; by another measure something may be better.
                     self.by_objective(&[(&line, LINE)]);
                 }
@@ -165,7 +165,7 @@ impl<'a> Pipeline<'a> {
             PlannerKind::Rbf => self.search_alone(Searcher::Rbf, &line),
             PlannerKind::Bfo => self.search_alone(Searcher::Bfo, &line),
             PlannerKind::Optimiser(method) => {
-                let evaluations = self.budget.refinements;
+                let evaluations = self.stage_budgets.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
                 let optimizer = (method.make)(setup);
                 if let Some(refined) = self.refine(&line, &*optimizer, evaluations, LINE) {
@@ -180,7 +180,7 @@ impl<'a> Pipeline<'a> {
 
     /// What one searcher finds, with rounded corners.
     fn search_alone(&mut self, searcher: Searcher, line: &[JointArray]) {
-        if let Some((_, path)) = self.search(searcher, line, 0..SEARCHES, self.budget.search_checks) {
+        if let Some((_, path)) = self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks) {
             let source = searched(searcher);
             self.propose(&path, &source);
             self.round(&path, &source);
@@ -190,18 +190,18 @@ impl<'a> Pipeline<'a> {
     /// A path round what blocks the straight line: searched, and improved.
     fn around(&mut self, line: &[JointArray]) {
         let searcher = Searcher::RrtConnect;
-        let first = self.search(searcher, line, 0..SEARCHES, self.budget.search_checks);
+        let first = self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks);
         let Some((estimate_s, path)) = first else { return };
         let source = searched(searcher);
         self.propose(&path, &source);
         match self.options.improvement {
-            _ if self.judge.objective != Objective::Time => {
+            _ if self.evaluator.objective != Objective::Time => {
                 self.by_objective(&[(&path, "that"), (line, LINE)]);
             }
             Improvement::Nothing => {}
             Improvement::Searches => {
                 let more = SEARCHES..SEARCHES + MORE_SEARCHES;
-                let found = self.search(searcher, line, more, self.budget.refinements * refine::POSES);
+                let found = self.search(searcher, line, more, self.stage_budgets.refinements * refine::POSES);
                 if let Some((_, better)) = found.filter(|(s, _)| *s < estimate_s) {
                     self.round(&better, &source);
                 }
@@ -214,7 +214,7 @@ impl<'a> Pipeline<'a> {
     /// Looks for motions that are better by another measure than time.
     fn by_objective(&mut self, starts: &[(&[JointArray], &str)]) {
         let is_chosen = self.options.improvement != Improvement::default();
-        let method = match (self.options.improvement, self.judge.objective) {
+        let method = match (self.options.improvement, self.evaluator.objective) {
             (Improvement::Method(method), objective) if is_chosen || objective != Objective::Energy => {
                 Some(method)
             }
@@ -228,7 +228,7 @@ impl<'a> Pipeline<'a> {
 
     /// Refinements from several paths, since each stays near where it starts.
     fn refine_around(&mut self, method: &Method, starts: &[(&[JointArray], &str)]) {
-        let each = self.budget.refinements / starts.len().max(1);
+        let each = self.stage_budgets.refinements / starts.len().max(1);
         let optimizer = (method.make)(Setup { reading: self.options.reading, evaluations: Some(each) });
         let source = optimizer.name().to_uppercase();
         let refined: Vec<_> =
@@ -244,7 +244,7 @@ impl<'a> Pipeline<'a> {
 
     fn stay(&mut self, pose_rad: &JointArray) {
         let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
-        match verify_in(self.space.world, &trajectory, self.space.work) {
+        match verify_in(self.space.world, &trajectory, self.space.budget) {
             Ok(proof) => self.keep(trajectory, proof, "already there".to_owned()),
             Err(violation) => self.violation = Some(violation),
         }
@@ -252,26 +252,26 @@ impl<'a> Pipeline<'a> {
 
     /// The corners of a whole motion: the way out of the margin comes before the path.
     fn whole_path(&self, path: &[JointArray]) -> Vec<JointArray> {
-        self.leaving.iter().map(|l| l.start_rad).chain(path.iter().copied()).collect()
+        self.margin_exit.iter().map(|l| l.start_rad).chain(path.iter().copied()).collect()
     }
 
     /// What a motion must keep, and when; `None` when it does not leave the margin that it begins in.
     fn stretches(&self, motion: &Trajectory) -> Option<Vec<Stretch<'_>>> {
         let (world, duration_s) = (self.space.world, motion.duration_s());
-        let Some(leaving) = &self.leaving else {
+        let Some(margin_exit) = &self.margin_exit else {
             return Some(vec![Stretch { world, span_s: [0.0, duration_s] }]);
         };
-        let left_s = leaving.left_s(world, motion, self.space.work)?;
-        Some(leaving.stretches(world, left_s, duration_s).to_vec())
+        let left_s = margin_exit.left_s(world, motion, self.space.budget)?;
+        Some(margin_exit.stretches(world, left_s, duration_s).to_vec())
     }
 
     /// True when a candidate keeps what it must.
     fn keeps_apart(&self, motion: &Trajectory) -> bool {
-        let begins = if self.leaving.is_some() { SweepRules::WAY_OUT } else { SweepRules::CANDIDATE };
+        let begins = if self.margin_exit.is_some() { SweepRules::MARGIN_EXIT } else { SweepRules::CANDIDATE };
         let rules = [begins, SweepRules::CANDIDATE];
         self.stretches(motion).is_some_and(|stretches| {
             let mut parts = stretches.iter().zip(&rules);
-            parts.all(|(s, rules)| sweep(s.world, motion, s.span_s, rules, self.space.work).is_ok())
+            parts.all(|(s, rules)| sweep(s.world, motion, s.span_s, rules, self.space.budget).is_ok())
         })
     }
 
@@ -279,12 +279,12 @@ impl<'a> Pipeline<'a> {
     fn straight(&mut self, line: &[JointArray]) -> bool {
         let [from_rad, to_rad] = line else { return false };
         let edge = StraightEdge { from_rad, to_rad };
-        let result = sweep(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.work);
+        let result = sweep(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.budget);
         match result.map_err(|b| b.pair) {
             Ok(_) => {
                 self.tried.push("straight line".to_owned());
                 self.propose(line, "straight line");
-                if self.leaving.is_some() {
+                if self.margin_exit.is_some() {
                     // The way out ends in a corner, or on the line: no need to stop there.
                     self.round(line, "straight line");
                 }
@@ -317,12 +317,12 @@ impl<'a> Pipeline<'a> {
         let end = self.space.checks().saturating_add(checks_max);
         for stream in streams {
             let left = end.saturating_sub(self.space.checks());
-            if made > 0 && (left == 0 || self.space.work.is_over()) {
+            if made > 0 && (left == 0 || self.space.budget.is_over()) {
                 break;
             }
             made += 1;
-            let mut draw = Draw::new(self.options.seed, 10 + stream);
-            let search = searcher.search(&self.space, [start, goal], left, &mut draw);
+            let mut rng = SeededRng::new(self.options.seed, 10 + stream);
+            let search = searcher.search(&self.space, [start, goal], left, &mut rng);
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
@@ -330,7 +330,7 @@ impl<'a> Pipeline<'a> {
                 // An answer, before time is spent on better ones.
                 self.propose(&path, searcher.title());
             }
-            shorten(&self.space, &mut path, self.budget.shortcuts, &mut draw);
+            shorten(&self.space, &mut path, self.stage_budgets.shortcuts, &mut rng);
             let estimate_s = self.estimate_s(&path);
             if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
                 best = Some((estimate_s, path));
@@ -362,7 +362,7 @@ impl<'a> Pipeline<'a> {
     ) -> Option<Vec<JointArray>> {
         let name = optimizer.name().to_uppercase();
         let [Some(start), Some(goal)] = [path.first(), path.last()] else { return None };
-        let problem = PathProblem::new(&self.space, *start, *goal).by_energy(self.judge.energy());
+        let problem = PathProblem::new(&self.space, *start, *goal).by_energy(self.evaluator.energy());
         let refined = refine(&problem, path, optimizer, evaluations_max, self.options.seed);
         let (mut corners, found) = match refined {
             Ok(refined) => refined?,
@@ -383,7 +383,7 @@ impl<'a> Pipeline<'a> {
             return None;
         }
         // The optimiser always has three control points; those that lie on the way are not needed.
-        shorten(&self.space, &mut corners, 0, &mut Draw::new(self.options.seed, 2));
+        shorten(&self.space, &mut corners, 0, &mut SeededRng::new(self.options.seed, 2));
         Some(corners)
     }
 
@@ -391,7 +391,7 @@ impl<'a> Pipeline<'a> {
     fn propose(&mut self, path: &[JointArray], how: &str) {
         let corners = self.whole_path(path);
         let waits = vec![1.0; corners.len().saturating_sub(2)];
-        let timed = self.path(&corners).fastest(&waits, self.space.work);
+        let timed = self.path(&corners).fastest(&waits, self.space.budget);
         if let Some(timed) = timed {
             self.prove(&corners, timed, how);
         }
@@ -404,14 +404,14 @@ impl<'a> Pipeline<'a> {
         if corners == 0 {
             return self.propose(path, source);
         }
-        let mut left = self.budget.timings;
+        let mut left = self.stage_budgets.timings;
         let mut best: Option<Timed> = None;
         let mut attempt = |waits: &[f64], best: &mut Option<Timed>| {
-            if left == 0 || self.space.work.is_over() {
+            if left == 0 || self.space.budget.is_over() {
                 return;
             }
             left -= 1;
-            let Some(timed) = self.path(&whole).fastest(waits, self.space.work) else { return };
+            let Some(timed) = self.path(&whole).fastest(waits, self.space.budget) else { return };
             let duration_s = timed.trajectory.duration_s();
             let shorter = best.as_ref().is_none_or(|b| duration_s < b.trajectory.duration_s());
             if shorter && self.keeps_apart(&timed.trajectory) {
@@ -437,7 +437,7 @@ impl<'a> Pipeline<'a> {
 
     /// Keeps a verified motion if it is better than what there is.
     fn keep(&mut self, trajectory: Trajectory, proof: Proof, how: String) {
-        let score = self.judge.score(&trajectory, &proof);
+        let score = self.evaluator.score(&trajectory, &proof);
         if self.best.as_ref().is_none_or(|best| score < best.score) {
             self.best = Some(Best { trajectory, proof, how, score });
         }
@@ -450,9 +450,9 @@ impl<'a> Pipeline<'a> {
         for _ in 0..6 {
             let Some(stretches) = self.stretches(&timed.trajectory) else { return };
             let left_s = stretches.first().map(|s| s.span_s[1]);
-            match verify_stretches(&stretches, &timed.trajectory, self.space.work) {
+            match verify_stretches(&stretches, &timed.trajectory, self.space.budget) {
                 Ok(proof) => {
-                    let note = self.leaving.as_ref().and_then(|l| l.note.as_ref());
+                    let note = self.margin_exit.as_ref().and_then(|l| l.note.as_ref());
                     let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
                     return self.keep(timed.trajectory, proof, format!("{note}{how}"));
                 }
@@ -469,8 +469,8 @@ impl<'a> Pipeline<'a> {
     }
 
     fn finish(self) -> Result<Plan, PlanError> {
-        let work = self.space.work;
-        let cut = work.was_cut();
+        let budget = self.space.budget;
+        let cut = budget.was_cut();
         let tried = self.tried.join(", ");
         match (self.best, self.violation) {
             (Some(Best { trajectory, proof, how: last, score }), _) => {
@@ -482,8 +482,8 @@ impl<'a> Pipeline<'a> {
                 if !tried.is_empty() && tried != how {
                     how = format!("{how} (tried: {tried})");
                 }
-                let (energy_j, checks) = (self.judge.energy_j(&trajectory), self.space.checks());
-                let planning_s = work.elapsed_s();
+                let (energy_j, checks) = (self.evaluator.energy_j(&trajectory), self.space.checks());
+                let planning_s = budget.elapsed_s();
                 Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, checks })
             }
             (None, Some(violation)) => Err(PlanError::Unproven { tried, violation }),

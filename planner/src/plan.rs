@@ -1,12 +1,12 @@
 //! From two poses to a verified motion.
+use crate::budget::Budget;
 use crate::dynamics::NoMasses;
 use crate::kind::{Improvement, PlannerKind};
-use crate::leave::{Leaving, Relaxed, is_clear, way_out};
-use crate::objective::{Judge, Objective};
+use crate::margin_exit::{MarginExit, Relaxed, find_margin_exit, is_clear};
+use crate::objective::{Evaluator, Objective};
 use crate::optimize::Reading;
 use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
-use crate::work::Work;
 use crate::world::World;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -220,10 +220,10 @@ pub fn plan_until(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Plan, PlanError> {
-    let work = Work::until(options.clock(), cancel);
+    let budget = Budget::until(options.clock(), cancel);
     check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
     check_pose(task.robot, PoseOf::Goal, &task.goal_rad)?;
-    let judge = Judge::new(options.objective, task.robot)?;
+    let evaluator = Evaluator::new(options.objective, task.robot)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
     let (start_rad, goal_rad) = (&task.start_rad, &task.goal_rad);
     let relaxed = match (task.margin, world.contact(start_rad)) {
@@ -235,35 +235,35 @@ pub fn plan_until(
         return Err(PlanError::too_close(PoseOf::Goal, contact));
     }
     if is_clear(&world, start_rad) {
-        return Pipeline::new(&world, &work, options, &judge).run(start_rad, goal_rad);
+        return Pipeline::new(&world, &budget, options, &evaluator).run(start_rad, goal_rad);
     }
-    plan_out(&world, relaxed.as_ref(), (&work, &judge), (task, options))
+    plan_out(&world, relaxed.as_ref(), (&budget, &evaluator), (task, options))
 }
 
 /// Plans from a start inside the margin or at its edge: out of it first.
 fn plan_out(
     world: &World,
     relaxed: Option<&Relaxed>,
-    (work, judge): (&Work, &Judge),
+    (budget, evaluator): (&Budget, &Evaluator),
     (task, options): (&Task, &PlanOptions),
 ) -> Result<Plan, PlanError> {
     let ends = [&task.start_rad, &task.goal_rad];
     let full = world.contact(&task.start_rad).is_none().then_some((world, None));
     let reduced = relaxed.map(|r| (&r.world, Some(r.note.clone())));
     for (near, note) in full.into_iter().chain(reduced) {
-        if let Some(pose_rad) = way_out([near, world], ends, options.seed, work) {
-            let leaving = Leaving { near, start_rad: task.start_rad, note };
-            return Pipeline::new(world, work, options, judge)
-                .leaving(leaving)
+        if let Some(pose_rad) = find_margin_exit([near, world], ends, options.seed, budget) {
+            let margin_exit = MarginExit { near, start_rad: task.start_rad, note };
+            return Pipeline::new(world, budget, options, evaluator)
+                .margin_exit(margin_exit)
                 .run(&pose_rad, &task.goal_rad);
         }
     }
     // No way out nearby: the reduced margin all the way, rather than an arm that nobody can move.
     let Some(relaxed) = relaxed else {
-        return Pipeline::new(world, work, options, judge).run(&task.start_rad, &task.goal_rad);
+        return Pipeline::new(world, budget, options, evaluator).run(&task.start_rad, &task.goal_rad);
     };
     let mut plan =
-        Pipeline::new(&relaxed.world, work, options, judge).run(&task.start_rad, &task.goal_rad)?;
+        Pipeline::new(&relaxed.world, budget, options, evaluator).run(&task.start_rad, &task.goal_rad)?;
     plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
     Ok(plan)
 }

@@ -3,13 +3,13 @@
 //! The structure is the paper's (length of the tip's path, joint travel, penalty when anything collides); the
 //! distances are the world's own, of every shape, and the penalty's width is the radii and the margin. What comes
 //! out is a proposal: its edges are proven like any other path's.
+use crate::budget::Budget;
 use crate::cost::CostModel;
-use crate::draw::Draw;
 use crate::dynamics::Dynamics;
-use crate::optimize::{Found, Optimizer, Problem, Progress, Refusal, Run};
+use crate::optimize::{Optimizer, Problem, Progress, Refusal, Run, Solution};
+use crate::rng::SeededRng;
 use crate::timing::Path;
 use crate::tree::Space;
-use crate::work::Work;
 use crate::world::{Snapshot, World};
 use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -36,9 +36,9 @@ pub fn refine(
     optimizer: &dyn Optimizer,
     evaluations_max: usize,
     seed: u64,
-) -> Result<Option<(Vec<JointArray>, Found)>, Refusal> {
+) -> Result<Option<(Vec<JointArray>, Solution)>, Refusal> {
     let guesses = problem.guesses(path, seed);
-    let (is_over, mut watch) = (|| problem.work.is_over(), |_: &Progress| ());
+    let (is_over, mut watch) = (|| problem.budget.is_over(), |_: &Progress| ());
     let run = Run { seed, evaluations_max, guesses: &guesses, is_over: &is_over, watch: &mut watch };
     let found = optimizer.minimise(problem, run)?;
     Ok((!found.x.is_empty()).then(|| (problem.corners(&found.x), found)))
@@ -48,7 +48,7 @@ pub fn refine(
 /// of the ways of tip and joints.
 pub struct PathProblem<'a> {
     world: &'a World<'a>,
-    work: &'a Work<'a>,
+    budget: &'a Budget<'a>,
     start_rad: JointArray,
     goal_rad: JointArray,
     weights: [f64; 3],
@@ -62,11 +62,11 @@ impl<'a> PathProblem<'a> {
     /// The problem between two poses.
     #[must_use]
     pub fn new(space: &Space<'a>, start_rad: JointArray, goal_rad: JointArray) -> Self {
-        let (world, work) = (space.world, space.work);
+        let (world, budget) = (space.world, space.budget);
         let one = world.robot().joints.iter().map(|j| j.limits.position_rad);
         let bounds = one.cycle().take(CONTROL_POINTS * world.joints()).collect();
         let (weights, snapshot) = (CostModel::default().weights, RefCell::default());
-        Self { world, work, start_rad, goal_rad, weights, energy: None, bounds, snapshot }
+        Self { world, budget, start_rad, goal_rad, weights, energy: None, bounds, snapshot }
     }
 
     /// The same for the energy of the motion.
@@ -105,13 +105,13 @@ impl<'a> PathProblem<'a> {
             inner.flat_map(|c| c.iter().take(joints).copied()).collect()
         };
         let seeded = flat(&with_control_points(path, CONTROL_POINTS));
-        let mut draw = Draw::new(seed, 1);
+        let mut rng = SeededRng::new(seed, 1);
         let mut guesses = vec![
             seeded.clone(),
             flat(&with_control_points(&[self.start_rad, self.goal_rad], CONTROL_POINTS)),
         ];
         for _ in 0..SCATTERED {
-            guesses.push(seeded.iter().map(|x| x + draw.within(-SCATTER_RAD, SCATTER_RAD)).collect());
+            guesses.push(seeded.iter().map(|x| x + rng.within(-SCATTER_RAD, SCATTER_RAD)).collect());
         }
         guesses
     }
@@ -131,7 +131,7 @@ impl Problem for PathProblem<'_> {
             let [from, to] = segment else { continue };
             travel_rad += from.iter().zip(to).map(|(a, b)| (b - a).abs()).sum::<f64>();
             for i in 1..=POSES_PER_SEGMENT {
-                if self.work.is_over_after(self.world.pairs().len()) {
+                if self.budget.is_over_after(self.world.pairs().len()) {
                     // Not worth anything: the run ends with the next question.
                     return f64::INFINITY;
                 }
@@ -149,11 +149,11 @@ impl Problem for PathProblem<'_> {
         }
         let [length, travel, weight] = self.weights;
         let penalty = if collides { weight * penalty } else { 0.0 };
-        let way = match self.energy {
+        let leading_term = match self.energy {
             Some(dynamics) => self.energy_j(dynamics, &corners),
             None => length * length_m + travel * travel_rad,
         };
-        way + penalty
+        leading_term + penalty
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Every searcher takes the same question and the same budget, in poses checked, and answers with proven edges, so that
 //! the pipeline treats them alike and they can be compared.
-use crate::draw::Draw;
 use crate::foraging::{Foraged, Numbers, forage};
+use crate::rng::SeededRng;
 use crate::tree::{Search, Space, rrt, rrt_connect};
 use taustream_motion::JointArray;
 
@@ -42,15 +42,21 @@ impl Searcher {
     }
 
     /// Looks for a path between two free poses until `checks_max` poses have been checked.
-    pub fn search(self, space: &Space, ends: [&JointArray; 2], checks_max: usize, draw: &mut Draw) -> Search {
+    pub fn search(
+        self,
+        space: &Space,
+        ends: [&JointArray; 2],
+        checks_max: usize,
+        rng: &mut SeededRng,
+    ) -> Search {
         let numbers = match self {
-            Self::RrtConnect => return rrt_connect(space, ends[0], ends[1], checks_max, draw),
-            Self::Rrt => return rrt(space, ends[0], ends[1], checks_max, draw),
+            Self::RrtConnect => return rrt_connect(space, ends[0], ends[1], checks_max, rng),
+            Self::Rrt => return rrt(space, ends[0], ends[1], checks_max, rng),
             Self::Rbf => &Numbers::ROBUST,
             Self::Bfo => &Numbers::PLAIN,
         };
         // Our own numbers are not refused; if they were, there would be no path.
-        let Foraged { path, steps, .. } = forage(space, ends, numbers, checks_max, draw).unwrap_or_default();
+        let Foraged { path, steps, .. } = forage(space, ends, numbers, checks_max, rng).unwrap_or_default();
         Search { path, nodes: steps }
     }
 }

@@ -144,8 +144,8 @@ impl<'a> Outbox<'a> {
             replaces,
             trajectory: trajectory.clone(),
         });
-        let heard = self.trajectories.send_copy(*message).map_err(|e| transport("publish it", &e))?;
-        if heard == 0 {
+        let received = self.trajectories.send_copy(*message).map_err(|e| transport("publish it", &e))?;
+        if received == 0 {
             return Err(self.wire.not_running("taustream-streamer").into());
         }
         let receipt = self.receipt(trajectory_id, timeout)?;

@@ -144,32 +144,32 @@ impl<'a> Service<'a> {
         }
     }
 
-    fn answer(&self, request: &Request, asked: &CheckedPlanRequest) -> Answer {
-        match self.try_answer(request, asked) {
+    fn answer(&self, request: &Request, requested: &CheckedPlanRequest) -> Answer {
+        match self.try_answer(request, requested) {
             Ok(answer) => answer,
             Err(reason) => Answer::Now(failed(&reason)),
         }
     }
 
-    fn try_answer(&self, request: &Request, asked: &CheckedPlanRequest) -> Result<Answer, String> {
+    fn try_answer(&self, request: &Request, requested: &CheckedPlanRequest) -> Result<Answer, String> {
         let expected = self.robot.joints.len();
-        if asked.joints != expected {
-            let (got, robot) = (asked.joints, &self.robot.name);
+        if requested.joints != expected {
+            let (got, robot) = (requested.joints, &self.robot.name);
             return Err(format!("the goal has {got} joint values, {robot} has {expected} joints"));
         }
-        let options = options(asked)?;
+        let options = options(requested)?;
         if self.waiting.is_some() {
             return Err("another motion waits for the end of the running one; ask again after it".to_owned());
         }
         let (report, phase) = self.outbox.fresh_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
-        match (phase, asked.when) {
+        match (phase, requested.when) {
             (Phase::Holding, _) if report.energised == 1 => {
-                let plan = self.plan(report.command_rad, asked, &options)?;
+                let plan = self.plan(report.command_rad, requested, &options)?;
                 Ok(Answer::Now(self.send(request, &plan)))
             }
             (Phase::Moving, When::AfterCurrent) => {
-                let plan = self.plan(report.end_rad, asked, &options)?;
+                let plan = self.plan(report.end_rad, requested, &options)?;
                 info!("planned; waiting for the running motion to end");
                 Ok(Answer::Later(Box::new(plan)))
             }
@@ -182,11 +182,11 @@ impl<'a> Service<'a> {
     fn plan(
         &self,
         start_rad: JointArray,
-        asked: &CheckedPlanRequest,
+        requested: &CheckedPlanRequest,
         options: &PlanOptions,
     ) -> Result<Plan, String> {
         // The arm stands where it stands: after a stop or a sag nobody could move it otherwise.
-        let (robot, scene, goal_rad) = (self.robot, self.scene, asked.goal_rad);
+        let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         self.promise.back_within(options.deadline + OVERRUN_MAX);
         let result = thread::scope(|scope| {
@@ -282,17 +282,17 @@ impl Seen {
     }
 }
 
-fn options(asked: &CheckedPlanRequest) -> Result<PlanOptions, String> {
-    let planner = match asked.planner.as_str() {
+fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {
+    let planner = match requested.planner.as_str() {
         "" => PlannerKind::default(),
         name => PlannerKind::from_name(name)
             .ok_or_else(|| format!("unknown planner `{name}`; use one of {}", PlannerKind::names()))?,
     };
-    let deadline = match asked.deadline_ms {
+    let deadline = match requested.deadline_ms {
         0 => DEADLINE_DEFAULT,
         ms => Duration::from_millis(ms.into()).min(DEADLINE_MAX),
     };
-    Ok(PlanOptions { seed: asked.seed, deadline, planner, ..PlanOptions::default() })
+    Ok(PlanOptions { seed: requested.seed, deadline, planner, ..PlanOptions::default() })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

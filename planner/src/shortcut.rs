@@ -1,18 +1,18 @@
 //! Shortens a path of proven edges: random shortcuts, then corners that are not needed.
-use crate::draw::Draw;
+use crate::rng::SeededRng;
 use crate::tree::Space;
 use taustream_motion::JointArray;
 
 /// Tries `tries` random shortcuts, then drops corners that can be dropped. Every edge of the result is proven.
-pub fn shorten(space: &Space, path: &mut Vec<JointArray>, tries: usize, draw: &mut Draw) {
+pub fn shorten(space: &Space, path: &mut Vec<JointArray>, tries: usize, rng: &mut SeededRng) {
     for _ in 0..tries {
-        if path.len() <= 2 || space.work.is_over() {
+        if path.len() <= 2 || space.budget.is_over() {
             break;
         }
         let lengths_m: Vec<f64> =
             path.windows(2).map(|p| if let [a, b] = p { space.distance_m(a, b) } else { 0.0 }).collect();
         let total_m: f64 = lengths_m.iter().sum();
-        let (a_m, b_m) = (draw.unit() * total_m, draw.unit() * total_m);
+        let (a_m, b_m) = (rng.unit() * total_m, rng.unit() * total_m);
         let (from, a) = point_at(path, &lengths_m, a_m.min(b_m));
         let (to, b) = point_at(path, &lengths_m, a_m.max(b_m));
         if from < to && space.is_edge_free(&a, &b) {
@@ -39,7 +39,7 @@ fn point_at(path: &[JointArray], lengths_m: &[f64], at_m: f64) -> (usize, JointA
 /// Joins neighbours wherever the straight edge past a corner is proven, until no corner can go.
 fn drop_corners(space: &Space, path: &mut Vec<JointArray>) {
     let mut i = 1;
-    while i + 1 < path.len() && !space.work.is_over() {
+    while i + 1 < path.len() && !space.budget.is_over() {
         if space.is_edge_free(&path[i - 1], &path[i + 1]) {
             path.remove(i);
             // The corner before may have become droppable.

@@ -7,7 +7,7 @@
 //! exactly, at w = 0 it passes and rounds the corner, which is new geometry. Scaling all times by c scales velocity,
 //! acceleration and jerk by 1/c, 1/c^2, 1/c^3 and leaves the geometry, so every shape (T, n, w) is made to fit the
 //! limits exactly, and the shortest wins. One stroke a segment (the paper's way) is the limit of large T.
-use crate::work::Work;
+use crate::budget::Budget;
 use taustream_motion::stroke::{DURATION_S_MIN, Phi};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Stroke, Trajectory};
 
@@ -64,7 +64,7 @@ impl Path<'_> {
     /// The shortest motion with the given waits; `None` when nothing fits (too many strokes, limits of zero, or
     /// the clock).
     #[must_use]
-    pub fn fastest(&self, waits: &[f64], work: &Work) -> Option<Timed> {
+    pub fn fastest(&self, waits: &[f64], budget: &Budget) -> Option<Timed> {
         // A way that is long against the natural kernel takes more strokes than a message holds: the widest kernel
         // with room for them is then as good, as it is still short against the way.
         let natural_s = self.natural_kernel_s().max(self.least_kernel_s()?);
@@ -79,7 +79,7 @@ impl Path<'_> {
         };
         let mut top = None;
         for kernel in KERNELS {
-            if work.is_over() {
+            if budget.is_over() {
                 break;
             }
             top = try_shape(kernel, EXPONENTS[1]).or(top);
@@ -88,7 +88,7 @@ impl Path<'_> {
         for step in [1.12, 1.05, 1.02] {
             for n in EXPONENTS {
                 for factor in [1.0 / step, 1.0, step] {
-                    if !work.is_over() {
+                    if !budget.is_over() {
                         kernel = try_shape(kernel * factor, n).map_or(kernel, |(k, _)| k);
                     }
                 }
@@ -127,8 +127,8 @@ impl Path<'_> {
     fn least_kernel_s(&self) -> Option<f64> {
         let segments = self.corners_rad.windows(2);
         let room = MAX_STROKES.checked_sub(segments.len()).filter(|room| *room > 0)?;
-        let way_s: f64 = segments.map(|p| if let [a, b] = p { self.cruise_s(a, b) } else { 0.0 }).sum();
-        Some(way_s * SPACING / room as f64)
+        let distance_s: f64 = segments.map(|p| if let [a, b] = p { self.cruise_s(a, b) } else { 0.0 }).sum();
+        Some(distance_s * SPACING / room as f64)
     }
 
     /// Time of the reference for a segment at full speed of its slowest joint.

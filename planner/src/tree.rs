@@ -4,9 +4,9 @@
 //! `LaValle`, "Rapidly-Exploring Random Trees: A New Tool for Path Planning", 1998. What poses, distances and free edges
 //! are is a matter of the [`Field`] that they grow in. In the arm's [`Space`], distances between poses weigh each joint
 //! with how far it can move a point of the arm, so that a step means about the same way in space for every joint.
+use crate::budget::Budget;
 use crate::collide::{Motion, StraightEdge, SweepRules, sweep};
-use crate::draw::Draw;
-use crate::work::Work;
+use crate::rng::SeededRng;
 use crate::world::World;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -35,7 +35,7 @@ pub trait Field {
     fn is_over(&self) -> bool;
 
     /// A uniform pose.
-    fn draw_pose(&self, draw: &mut Draw) -> JointArray;
+    fn random_pose(&self, rng: &mut SeededRng) -> JointArray;
 }
 
 impl Field for Space<'_> {
@@ -56,11 +56,11 @@ impl Field for Space<'_> {
     }
 
     fn is_over(&self) -> bool {
-        self.work.is_over()
+        self.budget.is_over()
     }
 
-    fn draw_pose(&self, draw: &mut Draw) -> JointArray {
-        self.draw_pose(draw)
+    fn random_pose(&self, rng: &mut SeededRng) -> JointArray {
+        self.random_pose(rng)
     }
 }
 
@@ -69,7 +69,7 @@ pub struct Space<'a> {
     /// The world.
     pub world: &'a World<'a>,
     /// The clock.
-    pub work: &'a Work<'a>,
+    pub budget: &'a Budget<'a>,
     weight_m: JointArray,
     checks: std::cell::Cell<usize>,
 }
@@ -77,9 +77,9 @@ pub struct Space<'a> {
 impl<'a> Space<'a> {
     /// Makes a space.
     #[must_use]
-    pub fn new(world: &'a World<'a>, work: &'a Work<'a>) -> Self {
+    pub fn new(world: &'a World<'a>, budget: &'a Budget<'a>) -> Self {
         let weight_m = world.reach_m().map(|r| r.max(WEIGHT_M_MIN));
-        Self { world, work, weight_m, checks: std::cell::Cell::new(0) }
+        Self { world, budget, weight_m, checks: std::cell::Cell::new(0) }
     }
 
     /// Weighted distance of two poses.
@@ -93,7 +93,7 @@ impl<'a> Space<'a> {
     /// True when the straight edge between two poses is proven.
     pub fn is_edge_free(&self, a: &JointArray, b: &JointArray) -> bool {
         let edge = StraightEdge { from_rad: a, to_rad: b };
-        let result = sweep(self.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.work);
+        let result = sweep(self.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.budget);
         let checks = match &result {
             Ok(clearance) => clearance.checks,
             Err(blocked) => blocked.checks,
@@ -126,11 +126,11 @@ impl<'a> Space<'a> {
     }
 
     /// A uniform pose inside the position limits.
-    pub fn draw_pose(&self, draw: &mut Draw) -> JointArray {
+    pub fn random_pose(&self, rng: &mut SeededRng) -> JointArray {
         let mut pose = [0.0; MAX_JOINTS];
         for (q, joint) in pose.iter_mut().zip(&self.world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
-            *q = draw.within(low, high);
+            *q = rng.within(low, high);
         }
         pose
     }
@@ -175,7 +175,7 @@ pub fn rrt(
     start_rad: &JointArray,
     goal_rad: &JointArray,
     checks_max: usize,
-    draw: &mut Draw,
+    rng: &mut SeededRng,
 ) -> Search {
     let end = field.checks().saturating_add(checks_max);
     let mut tree = Tree { nodes: vec![(*start_rad, 0)] };
@@ -184,8 +184,8 @@ pub fn rrt(
         if is_spent(field, nodes, end) {
             return Search { path: None, nodes };
         }
-        let is_goal = draw.unit() < GOAL_BIAS;
-        let target = if is_goal { *goal_rad } else { field.draw_pose(draw) };
+        let is_goal = rng.unit() < GOAL_BIAS;
+        let target = if is_goal { *goal_rad } else { field.random_pose(rng) };
         let grown = tree.extend(field, &target);
         if let (true, Reached::Target(new)) = (is_goal, grown) {
             return Search { path: Some(tree.path_to(new)), nodes: tree.nodes.len() };
@@ -199,7 +199,7 @@ pub fn rrt_connect(
     start_rad: &JointArray,
     goal_rad: &JointArray,
     checks_max: usize,
-    draw: &mut Draw,
+    rng: &mut SeededRng,
 ) -> Search {
     let end = field.checks().saturating_add(checks_max);
     let mut from_start = Tree { nodes: vec![(*start_rad, 0)] };
@@ -212,7 +212,7 @@ pub fn rrt_connect(
         }
         let (growing, other) =
             if swapped { (&mut from_goal, &mut from_start) } else { (&mut from_start, &mut from_goal) };
-        let target = field.draw_pose(draw);
+        let target = field.random_pose(rng);
         if let Reached::Advanced(new) | Reached::Target(new) = growing.extend(field, &target) {
             let meeting = growing.nodes[new].0;
             if let Some(there) = other.connect(field, &meeting, end) {

@@ -2,8 +2,8 @@
 //!
 //! Limits are proven by the motion crate from closed-form peaks; distances by bisection with a proven step
 //! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
+use crate::budget::Budget;
 use crate::collide::{Blocked, SweepRules, sweep};
-use crate::work::Work;
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::Trajectory;
@@ -107,15 +107,15 @@ pub enum Violation {
 /// The first violation, with joint or pair, time and amount.
 pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<Proof, Violation> {
     let world = World::new(robot, scene).map_err(|name| Violation::Shape { name })?;
-    verify_in(&world, trajectory, &Work::unbounded())
+    verify_in(&world, trajectory, &Budget::unbounded())
 }
 
 /// Like [`verify`], in a world that exists already and with a clock that may cut the proof short.
 ///
 /// # Errors
 /// The first violation; `Unresolved` when the clock cut in.
-pub fn verify_in(world: &World, trajectory: &Trajectory, work: &Work) -> Result<Proof, Violation> {
-    verify_stretches(&[Stretch { world, span_s: [0.0, trajectory.duration_s()] }], trajectory, work)
+pub fn verify_in(world: &World, trajectory: &Trajectory, budget: &Budget) -> Result<Proof, Violation> {
+    verify_stretches(&[Stretch { world, span_s: [0.0, trajectory.duration_s()] }], trajectory, budget)
 }
 
 /// A part of a motion, and the world whose distances it must keep.
@@ -134,7 +134,7 @@ pub struct Stretch<'a> {
 pub fn verify_stretches(
     stretches: &[Stretch],
     trajectory: &Trajectory,
-    work: &Work,
+    budget: &Budget,
 ) -> Result<Proof, Violation> {
     let Some(first) = stretches.first() else { return Err(Violation::Unresolved { checks: 0, at_s: 0.0 }) };
     let robot = first.world.robot();
@@ -159,8 +159,8 @@ pub fn verify_stretches(
         peaks,
     };
     for stretch in stretches {
-        let clearance = sweep(stretch.world, trajectory, stretch.span_s, &SweepRules::PROOF, work)
-            .map_err(|blocked| explain(stretch, trajectory, &blocked, work))?;
+        let clearance = sweep(stretch.world, trajectory, stretch.span_s, &SweepRules::PROOF, budget)
+            .map_err(|blocked| explain(stretch, trajectory, &blocked, budget))?;
         if clearance.proven_m < proof.clearance_m {
             let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
             proof.clearance_m = clearance.proven_m;
@@ -171,7 +171,7 @@ pub fn verify_stretches(
 }
 
 /// States the contact where it is deepest, which tells more than the instant at which it begins.
-fn explain(stretch: &Stretch, trajectory: &Trajectory, blocked: &Blocked, work: &Work) -> Violation {
+fn explain(stretch: &Stretch, trajectory: &Trajectory, blocked: &Blocked, budget: &Budget) -> Violation {
     const SAMPLES: u32 = 2_000;
     let Some((mut pair, mut distance_m)) = blocked.pair else {
         return Violation::Unresolved { checks: blocked.checks, at_s: blocked.at };
@@ -179,7 +179,7 @@ fn explain(stretch: &Stretch, trajectory: &Trajectory, blocked: &Blocked, work: 
     let (world, [begin_s, end_s]) = (stretch.world, stretch.span_s);
     let (from_s, mut at_s) = (blocked.at, blocked.at);
     for i in 0..=SAMPLES {
-        if work.is_over_after(world.pairs().len()) {
+        if budget.is_over_after(world.pairs().len()) {
             break;
         }
         let t_s = begin_s + (end_s - begin_s) * f64::from(i) / f64::from(SAMPLES);

@@ -334,7 +334,7 @@ fn axes(robot: &Robot) -> Vec<Axis> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
     use std::path::{Path, PathBuf};
 
     fn ur5() -> Robot {
@@ -360,14 +360,14 @@ mod tests {
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
         let mut broken_when_shrunk = 0;
         for seed in 0..5_000 {
-            let mut draw = Draw::new(seed, 0);
+            let mut rng = SeededRng::new(seed, 0);
             let mut q = [0.0; MAX_JOINTS];
             let (mut turn, mut there) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
             for j in 0..6 {
-                q[j] = draw.within(-3.0, 3.0);
+                q[j] = rng.within(-3.0, 3.0);
                 // Often one joint alone, by a little: there the bound is nearly exact.
-                turn[j] = if draw.unit() < 0.5 { 0.0 } else { draw.within(0.0, 0.3) };
-                there[j] = q[j] + turn[j] * if draw.unit() < 0.5 { 1.0 } else { draw.within(-1.0, 1.0) };
+                turn[j] = if rng.unit() < 0.5 { 0.0 } else { rng.within(0.0, 0.3) };
+                there[j] = q[j] + turn[j] * if rng.unit() < 0.5 { 1.0 } else { rng.within(-1.0, 1.0) };
             }
             world.place(&q, &mut snapshot);
             world.moves_m(&snapshot, &turn, &mut moves_m);
@@ -403,8 +403,8 @@ mod tests {
         let world = World::new(&robot, &scene).expect("builds");
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
         for seed in 0..2_000 {
-            let mut draw = Draw::new(seed, 1);
-            let q = std::array::from_fn(|j| if j < 6 { draw.within(-3.1, 3.1) } else { 0.0 });
+            let mut rng = SeededRng::new(seed, 1);
+            let q = std::array::from_fn(|j| if j < 6 { rng.within(-3.1, 3.1) } else { 0.0 });
             world.place(&q, &mut snapshot);
             for joint in 0..6 {
                 let mut turn = [0.0; MAX_JOINTS];

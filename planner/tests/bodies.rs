@@ -11,53 +11,53 @@ use taustream_arm::scene::Shape;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::budget::Budget;
 use taustream_planner::collide::{StraightEdge, SweepRules, sweep};
-use taustream_planner::draw::Draw;
-use taustream_planner::work::Work;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::world::{Snapshot, World};
 
 const KINDS: usize = 6;
 
-fn vector(draw: &mut Draw, span: f64) -> Vector3<f64> {
-    Vector3::new(draw.within(-span, span), draw.within(-span, span), draw.within(-span, span))
+fn vector(rng: &mut SeededRng, span: f64) -> Vector3<f64> {
+    Vector3::new(rng.within(-span, span), rng.within(-span, span), rng.within(-span, span))
 }
 
-fn pose(draw: &mut Draw, span_m: f64) -> Pose {
-    let turn = UnitQuaternion::from_scaled_axis(vector(draw, 3.0));
-    Isometry3::from_parts(Translation3::from(vector(draw, span_m)), turn)
+fn pose(rng: &mut SeededRng, span_m: f64) -> Pose {
+    let turn = UnitQuaternion::from_scaled_axis(vector(rng, 3.0));
+    Isometry3::from_parts(Translation3::from(vector(rng, span_m)), turn)
 }
 
 /// A tetrahedron askew: corners and faces, outwards.
-fn tetrahedron(draw: &mut Draw) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+fn tetrahedron(rng: &mut SeededRng) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
     let size = || [1.0, 1.0, 1.0];
-    let [x, y, z] = size().map(|_| draw.within(0.03, 0.2));
-    let at = Point3::from(vector(draw, 0.1));
+    let [x, y, z] = size().map(|_| rng.within(0.03, 0.2));
+    let at = Point3::from(vector(rng, 0.1));
     let corner = |x, y, z| at + Vector3::new(x, y, z);
     let corners = vec![at, corner(x, 0.0, 0.0), corner(0.0, y, 0.0), corner(0.02, 0.02, z)];
     (corners, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 }
 
-fn shape(draw: &mut Draw, kind: usize) -> Shape {
-    let (radius_m, length_m) = (draw.within(0.01, 0.1), draw.within(0.02, 0.3));
+fn shape(rng: &mut SeededRng, kind: usize) -> Shape {
+    let (radius_m, length_m) = (rng.within(0.01, 0.1), rng.within(0.02, 0.3));
     match kind {
         0 => Shape::Sphere { radius_m },
         1 => Shape::Capsule { radius_m, length_m },
         2 => Shape::Cylinder { radius_m, length_m },
-        3 => Shape::Box { size_m: [radius_m, length_m, draw.within(0.02, 0.3)] },
+        3 => Shape::Box { size_m: [radius_m, length_m, rng.within(0.02, 0.3)] },
         kind => {
-            let (vertices_m, triangles) = tetrahedron(draw);
+            let (vertices_m, triangles) = tetrahedron(rng);
             if kind == 4 {
                 Shape::Mesh { vertices_m, triangles }
             } else {
-                Shape::Hull { vertices_m, triangles, rounding_m: draw.within(0.0, 0.02) }
+                Shape::Hull { vertices_m, triangles, rounding_m: rng.within(0.0, 0.02) }
             }
         }
     }
 }
 
 /// Points of a shape, its outermost ones among them.
-fn points(draw: &mut Draw, shape: &Shape) -> Vec<Point3<f64>> {
-    let mut direction = || vector(draw, 1.0).normalize();
+fn points(rng: &mut SeededRng, shape: &Shape) -> Vec<Point3<f64>> {
+    let mut direction = || vector(rng, 1.0).normalize();
     let balls = |centres: &[Point3<f64>], radius_m: f64, direction: &mut dyn FnMut() -> Vector3<f64>| {
         let around = centres.iter().flat_map(|c| (0..8).map(move |_| *c));
         around.map(|c| c + direction() * radius_m).collect()
@@ -87,23 +87,23 @@ fn points(draw: &mut Draw, shape: &Shape) -> Vec<Point3<f64>> {
 
 /// A robot of one to eight joints with origins and axes anywhere, and two shapes a link.
 fn robot(template: &Robot, seed: u64) -> Robot {
-    let mut draw = Draw::new(seed, 30);
-    let count = 1 + draw.index(MAX_JOINTS);
+    let mut rng = SeededRng::new(seed, 30);
+    let count = 1 + rng.index(MAX_JOINTS);
     let joints: Vec<ChainJoint> = (0..count)
         .map(|i| ChainJoint {
-            pre: pose(&mut draw, 0.2),
-            axis: Unit::new_normalize(vector(&mut draw, 1.0)),
-            offset_rad: draw.within(-3.0, 3.0),
+            pre: pose(&mut rng, 0.2),
+            axis: Unit::new_normalize(vector(&mut rng, 1.0)),
+            offset_rad: rng.within(-3.0, 3.0),
             // A URDF has something behind the last joint only; the bound holds wherever it is.
-            post: if i + 1 == count || draw.unit() < 0.3 { pose(&mut draw, 0.2) } else { Pose::identity() },
+            post: if i + 1 == count || rng.unit() < 0.3 { pose(&mut rng, 0.2) } else { Pose::identity() },
         })
         .collect();
     let mut shapes = Vec::new();
     for frame in 0..=count {
         for _ in 0..2 {
-            let kind = draw.index(KINDS);
-            let shape = shape(&mut draw, kind);
-            shapes.push(LinkShape { link: frame, frame, pose: pose(&mut draw, 0.1), shape });
+            let kind = rng.index(KINDS);
+            let shape = shape(&mut rng, kind);
+            shapes.push(LinkShape { link: frame, frame, pose: pose(&mut rng, 0.1), shape });
         }
     }
     let joint = template.joints[0].clone();
@@ -145,19 +145,19 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
         let robot = robot(&template, seed);
         let scene = empty();
         let world = World::new(&robot, &scene).expect("builds");
-        let mut draw = Draw::new(seed, 31);
+        let mut rng = SeededRng::new(seed, 31);
         let (mut q, mut turn, mut there): (JointArray, JointArray, JointArray) = Default::default();
         for j in 0..robot.joints.len() {
-            q[j] = draw.within(-3.0, 3.0);
+            q[j] = rng.within(-3.0, 3.0);
             // Often one joint alone, by a little: there the bound is nearly exact.
-            turn[j] = if draw.unit() < 0.6 { 0.0 } else { draw.within(0.0, 0.3) };
-            there[j] = q[j] + turn[j] * if draw.unit() < 0.5 { 1.0 } else { draw.within(-1.0, 1.0) };
+            turn[j] = if rng.unit() < 0.6 { 0.0 } else { rng.within(0.0, 0.3) };
+            there[j] = q[j] + turn[j] * if rng.unit() < 0.5 { 1.0 } else { rng.within(-1.0, 1.0) };
         }
         world.place(&q, &mut snapshot);
         world.moves_m(&snapshot, &turn, &mut moves_m);
         let (before, after) = (robot.chain.frames(&q), robot.chain.frames(&there));
         for (body, shape) in robot.shapes.iter().enumerate() {
-            for point in points(&mut draw, &shape.shape) {
+            for point in points(&mut rng, &shape.shape) {
                 let at = |frames: &[Pose]| frames[shape.frame] * shape.pose * point;
                 for from in 0..shape.frame {
                     let seen = |frames: &[Pose]| frames[from].inverse() * at(frames);
@@ -194,20 +194,20 @@ fn clearance_that_a_sweep_proves_holds_at_every_pose_between() {
         // Its own links overlap in nearly every pose; here the obstacles count.
         robot.allowed_by_file =
             (0..robot.links.len()).flat_map(|a| (a..robot.links.len()).map(move |b| (a, b))).collect();
-        let mut draw = Draw::new(seed, 32);
-        let obstacle = |i: usize, draw: &mut Draw| {
-            let kind = draw.index(KINDS);
-            Obstacle { name: format!("o{i}"), pose: pose(draw, 1.0), shape: shape(draw, kind) }
+        let mut rng = SeededRng::new(seed, 32);
+        let obstacle = |i: usize, rng: &mut SeededRng| {
+            let kind = rng.index(KINDS);
+            Obstacle { name: format!("o{i}"), pose: pose(rng, 1.0), shape: shape(rng, kind) }
         };
-        let obstacles = (0..3).map(|i| obstacle(i, &mut draw)).collect();
+        let obstacles = (0..3).map(|i| obstacle(i, &mut rng)).collect();
         let scene = Scene { obstacles, ..empty() };
         let world = World::new(&robot, &scene).expect("builds");
         let mut ends: [JointArray; 2] = Default::default();
         for end in &mut ends {
-            (0..robot.joints.len()).for_each(|j| end[j] = draw.within(-1.0, 1.0));
+            (0..robot.joints.len()).for_each(|j| end[j] = rng.within(-1.0, 1.0));
         }
         let edge = StraightEdge { from_rad: &ends[0], to_rad: &ends[1] };
-        let Ok(clearance) = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Work::unbounded()) else {
+        let Ok(clearance) = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Budget::unbounded()) else {
             continue;
         };
         proven += 1;

@@ -10,11 +10,11 @@ use std::time::Duration;
 use taustream_arm::{LinkMass, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint};
 use taustream_motion::{JointArray, Stroke, Trajectory};
-use taustream_planner::draw::Draw;
 use taustream_planner::dynamics::Dynamics;
-use taustream_planner::leave::is_clear;
-use taustream_planner::objective::Judge;
+use taustream_planner::margin_exit::is_clear;
+use taustream_planner::objective::Evaluator;
 use taustream_planner::papers::two_link::{Moving, TwoLink};
+use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
 use taustream_planner::{Objective, Plan, PlanError, PlanOptions, plan};
 
@@ -77,8 +77,8 @@ fn torques_and_energy_of_the_papers_two_link_arm_are_its_closed_forms() {
     let dynamics = Dynamics::new(&robot).expect("masses");
     let base_j = arm.gravity * arm.height * (arm.masses[0] + arm.masses[1]);
     for seed in 0..200 {
-        let mut draw = Draw::new(seed, 70);
-        let mut two = |size: f64| [draw.within(-size, size), draw.within(-size, size)];
+        let mut rng = SeededRng::new(seed, 70);
+        let mut two = |size: f64| [rng.within(-size, size), rng.within(-size, size)];
         let moving = Moving { angle_rad: two(1.5), speed_rad_s: two(2.0), acceleration_rad_s2: two(5.0) };
         let joints = |[theta, phi]: [f64; 2]| [theta, theta, phi, 0.0, 0.0, 0.0, 0.0, 0.0];
         let (q, v, a) =
@@ -207,9 +207,9 @@ fn spent_energy_of_one_joint_is_its_closed_form() {
     robot.masses = vec![rod(1, mass_kg, length_m, Vector3::x())];
     // Without gravity all energy is that of the fastest instant: given once, and braked away once.
     robot.gravity_m_s2 = Vector3::zeros();
-    let mut way = [0.0; 8];
-    way[0] = turn_rad;
-    let motion = one_stroke([0.0; 8], way, 1, duration_s);
+    let mut distance = [0.0; 8];
+    distance[0] = turn_rad;
+    let motion = one_stroke([0.0; 8], distance, 1, duration_s);
     // c_v of n = 6: s^4 = 3 / 23.
     let s = (3.0_f64 / 23.0).powf(0.25);
     let fastest_rad_s = 24.0 * s.powi(3) * (1.0 - s.powi(4)).powi(5) * turn_rad / duration_s;
@@ -219,8 +219,8 @@ fn spent_energy_of_one_joint_is_its_closed_form() {
     // So slowly that only the weight counts: lifted from hanging to upright, and past it down again.
     robot.gravity_m_s2 = Vector3::new(0.0, -9.806_65, 0.0);
     let mut base = [0.0; 8];
-    (base[0], way[0]) = (-FRAC_PI_2, 3.0 * FRAC_PI_2);
-    let spent_j = Dynamics::new(&robot).expect("masses").spent_j(&one_stroke(base, way, 1, 400.0));
+    (base[0], distance[0]) = (-FRAC_PI_2, 3.0 * FRAC_PI_2);
+    let spent_j = Dynamics::new(&robot).expect("masses").spent_j(&one_stroke(base, distance, 1, 400.0));
     // Centre from -0.5 m to 0.5 m, and back to 0 m.
     close("weight", spent_j, mass_kg * 9.806_65 * (1.0 + 0.5), 1e-4);
 }
@@ -234,10 +234,10 @@ fn chosen(robot: &Robot, scene: &Scene, ends: [JointArray; 2], objective: Object
 
 /// Two random clear poses among obstacles.
 fn ends(world: &World, seed: u64) -> [JointArray; 2] {
-    let mut draw = Draw::new(seed, 90);
+    let mut rng = SeededRng::new(seed, 90);
     let mut clear = || loop {
         let q: JointArray =
-            std::array::from_fn(|j| if j < 6 { draw.within(-FRAC_PI_2, FRAC_PI_2) } else { 0.0 });
+            std::array::from_fn(|j| if j < 6 { rng.within(-FRAC_PI_2, FRAC_PI_2) } else { 0.0 });
         if is_clear(world, &q) {
             return q;
         }
@@ -257,9 +257,9 @@ fn plans_by_energy_and_by_cost_have_less_of_it_than_plans_by_time() {
         let by_time = chosen(&robot, &scene, ends, Objective::Time, seed);
         for (i, objective) in [Objective::Energy, Objective::Cost].into_iter().enumerate() {
             let better = chosen(&robot, &scene, ends, objective, seed);
-            let judge = Judge::new(objective, &robot).expect("masses");
-            let of_time = judge.score(&by_time.trajectory, &by_time.proof);
-            assert_eq!(better.score.to_bits(), judge.score(&better.trajectory, &better.proof).to_bits());
+            let evaluator = Evaluator::new(objective, &robot).expect("masses");
+            let of_time = evaluator.score(&by_time.trajectory, &by_time.proof);
+            assert_eq!(better.score.to_bits(), evaluator.score(&better.trajectory, &better.proof).to_bits());
             if by_time.how.starts_with("straight line") {
                 let who = format!("seed {seed}, {objective:?}");
                 assert!(better.score <= of_time * (1.0 + 1e-12), "{who}: {} against {of_time}", better.score);

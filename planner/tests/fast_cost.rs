@@ -8,23 +8,23 @@ use std::time::{Duration, Instant};
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
 use taustream_planner::cost::{ControlPointCost, CostError, CostModel, Level, PaperCost};
-use taustream_planner::draw::Draw;
 use taustream_planner::optimize::{Problem, Progress, Reading, Run, Setup, by_name};
 use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_planner::rng::SeededRng;
 
 /// Decision vectors between the straight line and anything.
 fn vectors(problem: &ControlPointCost, count: usize, seed: u64) -> Vec<Vec<f64>> {
-    let mut draw = Draw::new(seed, 0);
+    let mut rng = SeededRng::new(seed, 0);
     let straight = problem.straight();
     let one = |i: usize| {
         let spread = [0.01, 0.3, 1.0, 3.0][i % 4];
-        straight.iter().map(|x| (x + spread * draw.within(-1.0, 1.0)).clamp(-PI, PI)).collect()
+        straight.iter().map(|x| (x + spread * rng.within(-1.0, 1.0)).clamp(-PI, PI)).collect()
     };
     (0..count).map(one).collect()
 }
 
 fn random_case(robot: &Robot, points: usize, model: CostModel, seed: u64) -> ControlPointCost<'_> {
-    let case = Case::draw(robot, &model, seed).expect("room");
+    let case = Case::random(robot, &model, seed).expect("room");
     case.problem(robot, points, model).expect("fits")
 }
 
@@ -43,7 +43,7 @@ fn fast_cost_has_the_yardsticks_penalty_and_a_path_within_a_hundred_thousandth()
         let (mut worst, mut hits, mut all) = (0.0_f64, 0, 0);
         for (seed, model) in (0..).zip(models) {
             // The printed sum is taken without the draw, whose ends keep off the spheres.
-            let case = Case::draw(&robot, &paper, seed).expect("room");
+            let case = Case::random(&robot, &paper, seed).expect("room");
             for points in [1, CONTROL_POINTS, 6] {
                 let problem = case.problem(&robot, points, model).expect("fits");
                 for level in Level::available() {
@@ -69,7 +69,7 @@ fn fast_cost_has_the_yardsticks_penalty_and_a_path_within_a_hundred_thousandth()
 
 /// Goal: what an optimiser reports is the yardstick's cost.
 #[test]
-fn winner_is_weighed_again_by_the_yardstick() {
+fn winner_is_evaluated_again_by_the_reference_cost() {
     let robot = ur5();
     let problem = random_case(&robot, CONTROL_POINTS, CostModel::default(), 2);
     let (is_over, mut watch) = (|| false, |_: &Progress| ());
@@ -107,7 +107,7 @@ fn fast_cost_of_what_makes_no_sense_is_refused_or_infinite() {
 /// one for each operation, cost a multiple of what is gained.
 /// Method: the best of several turns of either, alternating, so that a busy machine slows both.
 #[test]
-fn fast_cost_is_faster_than_the_yardstick_by_a_multiple() {
+fn fast_cost_is_faster_than_the_reference_by_a_multiple() {
     const TURNS: usize = 7;
     let robot = ur5();
     let problem = random_case(&robot, CONTROL_POINTS, CostModel::default(), 3);

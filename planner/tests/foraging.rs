@@ -6,23 +6,23 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::draw::Draw;
+use taustream_planner::budget::Budget;
 use taustream_planner::foraging::{Foraged, Numbers, forage};
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Space;
-use taustream_planner::work::Work;
 use taustream_planner::world::World;
 
 const CHECKS: usize = 20_000;
 
 fn search(
     world: &World,
-    work: &Work,
+    budget: &Budget,
     numbers: &Numbers,
     seed: u64,
     ends: [&JointArray; 2],
 ) -> (Foraged, usize) {
-    let space = Space::new(world, work);
-    let foraged = forage(&space, ends, numbers, CHECKS, &mut Draw::new(seed, 0)).expect("sane numbers");
+    let space = Space::new(world, budget);
+    let foraged = forage(&space, ends, numbers, CHECKS, &mut SeededRng::new(seed, 0)).expect("sane numbers");
     (foraged, space.checks())
 }
 
@@ -36,14 +36,14 @@ fn pillars() -> (Robot, Scene, [JointArray; 2]) {
 fn found_path_is_made_of_proven_edges_and_one_seed_gives_it_on_any_thread() {
     let (robot, scene, [start, goal]) = pillars();
     let world = World::new(&robot, &scene).expect("builds");
-    let run = |seed| search(&world, &Work::unbounded(), &Numbers::ROBUST, seed, [&start, &goal]);
+    let run = |seed| search(&world, &Budget::unbounded(), &Numbers::ROBUST, seed, [&start, &goal]);
     let mut paths = Vec::new();
     for seed in 0..4 {
         let (foraged, checks) = run(seed);
         let path = foraged.path.clone().unwrap_or_else(|| panic!("seed {seed}: {foraged:?}"));
         assert_eq!((path.first(), path.last()), (Some(&start), Some(&goal)), "seed {seed}");
-        let work = Work::unbounded();
-        let space = Space::new(&world, &work);
+        let budget = Budget::unbounded();
+        let space = Space::new(&world, &budget);
         assert!(path.windows(2).all(|p| space.is_edge_free(&p[0], &p[1])), "seed {seed}");
         assert!(checks <= CHECKS + 4_000, "seed {seed}: {checks} poses"); // One edge more, at most.
         paths.push(path);
@@ -62,7 +62,7 @@ fn virtual_obstacles_lead_out_of_traps_that_hold_plain_foraging() {
     let (mut robust, mut plain, mut set) = (0, 0, 0);
     for seed in 0..12 {
         let [with, without] = [Numbers::ROBUST, Numbers::PLAIN]
-            .map(|numbers| search(&world, &Work::unbounded(), &numbers, seed, [&start, &goal]).0);
+            .map(|numbers| search(&world, &Budget::unbounded(), &numbers, seed, [&start, &goal]).0);
         robust += u32::from(with.path.is_some());
         plain += u32::from(without.path.is_some());
         set += with.virtuals.len();
@@ -76,13 +76,13 @@ fn virtual_obstacles_lead_out_of_traps_that_hold_plain_foraging() {
 fn budget_clock_and_cancellation_end_a_search() {
     let (robot, scene, [start, goal]) = pillars();
     let world = World::new(&robot, &scene).expect("builds");
-    let work = Work::unbounded();
+    let budget = Budget::unbounded();
     let nothing =
-        forage(&Space::new(&world, &work), [&start, &goal], &Numbers::ROBUST, 0, &mut Draw::new(0, 0));
+        forage(&Space::new(&world, &budget), [&start, &goal], &Numbers::ROBUST, 0, &mut SeededRng::new(0, 0));
     assert_eq!(nothing, Ok(Foraged::default()));
     let cancelled = AtomicBool::new(true);
-    for work in [Work::until(Duration::ZERO, None), Work::until(Duration::MAX, Some(&cancelled))] {
-        let (foraged, checks) = search(&world, &work, &Numbers::ROBUST, 0, [&start, &goal]);
+    for budget in [Budget::until(Duration::ZERO, None), Budget::until(Duration::MAX, Some(&cancelled))] {
+        let (foraged, checks) = search(&world, &budget, &Numbers::ROBUST, 0, [&start, &goal]);
         assert_eq!(foraged.path, None);
         assert!(checks < 1_000, "{checks} poses after the end");
     }
@@ -92,7 +92,7 @@ fn budget_clock_and_cancellation_end_a_search() {
 fn numbers_that_make_no_sense_are_refused_by_name() {
     let (robot, scene, [start, goal]) = pillars();
     let world = World::new(&robot, &scene).expect("builds");
-    let work = Work::unbounded();
+    let budget = Budget::unbounded();
     let sane = Numbers::ROBUST;
     for (numbers, word) in [
         (Numbers { bacteria: 0, ..sane }, "bacteria"),
@@ -106,8 +106,8 @@ fn numbers_that_make_no_sense_are_refused_by_name() {
         (Numbers { retreat_m: -1.0, ..sane }, "length"),
         (Numbers { obstacle: [f64::INFINITY, 1.0], ..sane }, "height"),
     ] {
-        let space = Space::new(&world, &work);
-        let refused = forage(&space, [&start, &goal], &numbers, 100, &mut Draw::new(0, 0));
+        let space = Space::new(&world, &budget);
+        let refused = forage(&space, [&start, &goal], &numbers, 100, &mut SeededRng::new(0, 0));
         let words = refused.expect_err(word).to_string();
         assert!(words.contains(word), "{words}");
     }
@@ -126,7 +126,7 @@ fn odd_questions_are_answered() {
     for by_rad in [0.0, 1e-9, 0.05] {
         let mut goal = middle;
         goal[0] += by_rad;
-        let (foraged, _) = search(&world, &Work::unbounded(), &Numbers::ROBUST, 1, [&middle, &goal]);
+        let (foraged, _) = search(&world, &Budget::unbounded(), &Numbers::ROBUST, 1, [&middle, &goal]);
         assert_eq!(foraged.path, Some(vec![middle, goal]), "{by_rad} rad away");
     }
 }

@@ -3,7 +3,7 @@ mod common;
 use common::{config, pose, scene, ur5, ur5_origins_m};
 use nalgebra::Vector3;
 use std::path::Path;
-use taustream_arm::draw::Draw;
+use taustream_arm::rng::SeededRng;
 use taustream_arm::{MotionTable, PathFile, PathPoint, Robot, Scene};
 use taustream_motion::limits::check_motion;
 use taustream_motion::{JointArray, Stroke, Trajectory};
@@ -24,10 +24,10 @@ fn table(every_s: f64, rows: usize, at: impl Fn(f64) -> JointArray) -> MotionTab
 /// The largest difference to the original at instants that the import does not know, by its own account of delay and scale.
 fn measured_rad(imported: &Imported, reference: &Reference, seed: u64) -> f64 {
     let delay_s = imported.kernel.map_or(0.0, |kernel| kernel.delay_s);
-    let mut draw = Draw::new(seed, 9);
+    let mut rng = SeededRng::new(seed, 9);
     let mut most: f64 = 0.0;
     for _ in 0..20_000 {
-        let at_s = draw.within(-0.1, reference.duration_s() + 0.1);
+        let at_s = rng.within(-0.1, reference.duration_s() + 0.1);
         let q = imported.trajectory.sample(at_s * imported.time_scale + delay_s).position_rad;
         let r = reference.at(at_s);
         most = q.iter().zip(&r).map(|(q, r)| (q - r).abs()).fold(most, f64::max);
@@ -55,24 +55,23 @@ fn random_points_by_any_profile_are_imported_truly_or_refused() {
     let (robot, scene) = (ur5(), Scene::default());
     let (mut imported_count, mut by_profile) = (0, [0; 7]);
     for seed in 0..84 {
-        let mut draw = Draw::new(seed, 0);
+        let mut rng = SeededRng::new(seed, 0);
         let which = (seed % 7) as usize;
-        let k = (which < 2).then(|| draw.within(0.02, 0.33));
+        let k = (which < 2).then(|| rng.within(0.02, 0.33));
         let profile = ViaProfile::from_name(ViaProfile::NAMES[which], k).expect("a profile");
         let mut points_rad = vec![pose(HOME_RAD)];
-        for _ in 0..1 + draw.index(5) {
+        for _ in 0..1 + rng.index(5) {
             let last = points_rad[points_rad.len() - 1];
-            let reach = if draw.index(6) == 0 { 0.0 } else { draw.within(0.01, 0.8) };
-            points_rad.push(std::array::from_fn(|j| {
-                if j < 6 { last[j] + draw.within(-reach, reach) } else { 0.0 }
-            }));
+            let reach = if rng.index(6) == 0 { 0.0 } else { rng.within(0.01, 0.8) };
+            points_rad
+                .push(std::array::from_fn(|j| if j < 6 { last[j] + rng.within(-reach, reach) } else { 0.0 }));
         }
         let fitted = match fitted_durations_s(&points_rad, 6, profile, &robot.limits()) {
             Ok(fitted) => fitted,
             Err(ImportError::Still) => continue,
             Err(other) => panic!("seed {seed}: {other}"),
         };
-        let hurry = if seed % 3 == 0 { draw.within(0.4, 3.0) } else { 1.0 };
+        let hurry = if seed % 3 == 0 { rng.within(0.4, 3.0) } else { 1.0 };
         let durations_s: Vec<f64> = fitted.iter().map(|s| (s * hurry).max(0.001)).collect();
         let via = Via { points_rad: &points_rad, joints: 6, profile, durations_s: &durations_s };
         let reference = match Reference::through(&via) {
@@ -225,14 +224,14 @@ fn mutated_tables_never_panic_and_never_pass_unverified() {
     }
     let mut passed = 0;
     for seed in 0..300 {
-        let mut draw = Draw::new(seed, 1);
+        let mut rng = SeededRng::new(seed, 1);
         let mut bytes = text.clone().into_bytes();
-        for _ in 0..1 + draw.index(3) {
-            let at = draw.index(bytes.len());
-            match draw.index(4) {
-                0 => bytes[at] = b"0123456789.-e,\n"[draw.index(15)],
+        for _ in 0..1 + rng.index(3) {
+            let at = rng.index(bytes.len());
+            match rng.index(4) {
+                0 => bytes[at] = b"0123456789.-e,\n"[rng.index(15)],
                 1 => drop(bytes.remove(at)),
-                2 => bytes.insert(at, b"019-.,eN\n"[draw.index(9)]),
+                2 => bytes.insert(at, b"019-.,eN\n"[rng.index(9)]),
                 _ => bytes.truncate(at.max(60)),
             }
         }

@@ -3,26 +3,26 @@
 use proptest::prelude::*;
 use std::cell::{Cell, RefCell};
 use taustream_planner::optimize::{
-    Bfoa, Boa, Bso, BsoStep, De, End, Exempt, Found, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, METHODS, Method,
-    Optimizer, Parallel, Parameters, Problem, Progress, Pso, Reading, Refusal, Run, Schedule, Setup, Sma,
-    Ssa, Swarming, WORTHLESS, by_name,
+    Bfoa, Boa, Bso, BsoStep, De, End, Exempt, Ga, Gwo, Ibfoa, Iepso, Isma, Iwo, METHODS, Method, Optimizer,
+    Parallel, Parameters, Problem, Progress, Pso, Reading, Refusal, Run, Schedule, Setup, Sma, Solution, Ssa,
+    Swarming, WORTHLESS, by_name,
 };
 use taustream_planner::papers::{Benchmark, Function};
 
 /// A problem made of a closure; notes that nobody asks outside the box.
-struct Asked<F> {
+struct CountedObjective<F> {
     bounds: Vec<[f64; 2]>,
     cost: F,
     times: Cell<usize>,
 }
 
-impl<F: Fn(&[f64]) -> f64> Asked<F> {
+impl<F: Fn(&[f64]) -> f64> CountedObjective<F> {
     fn new(bounds: &[[f64; 2]], cost: F) -> Self {
         Self { bounds: bounds.to_vec(), cost, times: Cell::new(0) }
     }
 }
 
-impl<F: Fn(&[f64]) -> f64> Problem for Asked<F> {
+impl<F: Fn(&[f64]) -> f64> Problem for CountedObjective<F> {
     fn bounds(&self) -> &[[f64; 2]] {
         &self.bounds
     }
@@ -38,7 +38,7 @@ fn bowl(x: &[f64]) -> f64 {
     x.iter().map(|x| (x - 0.3) * (x - 0.3)).sum()
 }
 
-fn run(method: &dyn Optimizer, problem: &dyn Problem, seed: u64, budget: usize) -> Result<Found, Refusal> {
+fn run(method: &dyn Optimizer, problem: &dyn Problem, seed: u64, budget: usize) -> Result<Solution, Refusal> {
     let (is_over, mut watch) = (|| false, |_: &Progress| ());
     let run = Run { seed, evaluations_max: budget, guesses: &[], is_over: &is_over, watch: &mut watch };
     method.minimise(problem, run)
@@ -58,15 +58,18 @@ fn every(evaluations: usize) -> impl Iterator<Item = (&'static Method, Reading, 
 fn optimiser_budget_is_kept_to_the_evaluation_and_counted() {
     for (method, _, made) in every(300) {
         for budget in [0, 1, 2, 7, 55, 56, 300] {
-            let problem = Asked::new(&[[-1.0, 1.0]; 3], bowl);
+            let problem = CountedObjective::new(&[[-1.0, 1.0]; 3], bowl);
             let found = run(made.as_ref(), &problem, 3, budget).expect("sane");
-            let (asked, name) = (problem.times.get(), method.name);
-            assert_eq!(found.progress.evaluations, asked, "{name}, budget {budget}");
-            assert!(asked <= budget, "{name} asked {asked} of {budget}");
+            let (requested, name) = (problem.times.get(), method.name);
+            assert_eq!(found.progress.evaluations, requested, "{name}, budget {budget}");
+            assert!(requested <= budget, "{name} asked {requested} of {budget}");
             match found.end {
-                End::Budget => assert_eq!(asked, budget, "{name} stopped before its budget was used up"),
+                End::Budget => assert_eq!(requested, budget, "{name} stopped before its budget was used up"),
                 End::Done => {
-                    assert!(asked > 100 && budget == 300, "{name} was done after {asked} of {budget}");
+                    assert!(
+                        requested > 100 && budget == 300,
+                        "{name} was done after {requested} of {budget}"
+                    );
                 }
                 End::Cut => panic!("{name}: nobody cut it"),
             }
@@ -80,7 +83,7 @@ fn optimiser_is_cut_between_two_evaluations_and_returns_its_best() {
     for (method, _, made) in every(2_000) {
         for after in [0_usize, 1, 20, 333] {
             let least = Cell::new(f64::INFINITY);
-            let problem = Asked::new(&[[-1.0, 1.0]; 4], |x| {
+            let problem = CountedObjective::new(&[[-1.0, 1.0]; 4], |x| {
                 least.set(least.get().min(bowl(x)));
                 bowl(x)
             });
@@ -155,7 +158,8 @@ fn parallel_costs_are_those_of_one_thread_in_their_order() {
 #[test]
 fn optimiser_finds_the_bottom_of_a_bowl() {
     for (method, reading, made) in every(6_000) {
-        let found = run(made.as_ref(), &Asked::new(&[[-1.0, 1.0]; 4], bowl), 5, 6_000).expect("sane");
+        let found =
+            run(made.as_ref(), &CountedObjective::new(&[[-1.0, 1.0]; 4], bowl), 5, 6_000).expect("sane");
         // A random point costs 1.7 on average; a step of 0.2 cannot get nearer than about a hundredth of that,
         // undamped particles hardly get anywhere, and butterflies smell little where costs are small.
         let band = if ["pso", "boa"].contains(&method.name) { 0.3 } else { 0.03 };
@@ -167,7 +171,7 @@ fn optimiser_finds_the_bottom_of_a_bowl() {
 fn optimiser_uses_the_guesses_that_fit_and_clamps_them() {
     for (method, _, made) in every(500) {
         let first = RefCell::new(Vec::new());
-        let problem = Asked::new(&[[-1.0, 1.0]; 2], |x| {
+        let problem = CountedObjective::new(&[[-1.0, 1.0]; 2], |x| {
             first.borrow_mut().push(x.to_vec());
             bowl(x)
         });
@@ -207,7 +211,7 @@ const BOXES: [(&str, &[[f64; 2]], bool); 12] = [
 fn optimiser_refuses_what_is_no_box_and_lives_with_what_is_one() {
     for (method, _, made) in every(200) {
         for (what, bounds, is_box) in BOXES {
-            let result = run(made.as_ref(), &Asked::new(bounds, bowl), 2, 200);
+            let result = run(made.as_ref(), &CountedObjective::new(bounds, bowl), 2, 200);
             assert_eq!(result.is_ok(), is_box, "{}, {what}: {result:?}", method.name);
             if let Err(refusal) = result {
                 assert!(
@@ -218,7 +222,7 @@ fn optimiser_refuses_what_is_no_box_and_lives_with_what_is_one() {
         }
     }
     let bounds = &[[0.0, 1.0], [2.0, -3.5]];
-    let refusal = run(&Ibfoa::CASE_1, &Asked::new(bounds, bowl), 0, 9).expect_err("inverted");
+    let refusal = run(&Ibfoa::CASE_1, &CountedObjective::new(bounds, bowl), 0, 9).expect_err("inverted");
     assert!(refusal.to_string().starts_with("coordinate 1 (of 0..2) has the bounds 2 to -3.5"), "{refusal}");
 }
 
@@ -237,7 +241,7 @@ fn optimiser_lives_with_objectives_that_are_no_numbers() {
     ];
     for (method, reading, made) in every(400) {
         for (what, objective) in objectives {
-            let problem = Asked::new(&[[-1.0, 1.0]; 3], objective);
+            let problem = CountedObjective::new(&[[-1.0, 1.0]; 3], objective);
             let found = run(made.as_ref(), &problem, 4, 400).expect("sane");
             let name = method.name;
             assert!(found.cost.is_finite() && !found.x.is_empty(), "{name} {reading:?}, {what}: {found:?}");
@@ -252,14 +256,14 @@ fn optimiser_lives_with_objectives_that_are_no_numbers() {
 fn optimiser_has_an_answer_in_one_dimension_and_in_a_thousand() {
     for (method, _, made) in every(300) {
         for dimensions in [1, 1000] {
-            let problem = Asked::new(&vec![[-1.0, 1.0]; dimensions], bowl);
+            let problem = CountedObjective::new(&vec![[-1.0, 1.0]; dimensions], bowl);
             let found = run(made.as_ref(), &problem, 6, 300).expect("sane");
             assert_eq!(found.x.len(), dimensions, "{}", method.name);
             // A random point of a thousand coordinates costs 423, and hardly ever less than 380.
             assert!(found.cost < 0.45 * dimensions as f64, "{} in {dimensions}: {}", method.name, found.cost);
         }
     }
-    let too_many = Asked::new(&vec![[0.0, 1.0]; 10_001], bowl);
+    let too_many = CountedObjective::new(&vec![[0.0, 1.0]; 10_001], bowl);
     assert_eq!(run(&Ibfoa::CASE_1, &too_many, 0, 9), Err(Refusal::Dimensions { got: 10_001 }));
 }
 
@@ -298,15 +302,15 @@ fn optimiser_of_any_population_answers_or_says_how_many_it_needs() {
         let mut least = None;
         for population in [0, 1, 2, 3, 4, 5, 10_001, usize::MAX] {
             let made = of_population(method.name, population);
-            match run(made.as_ref(), &Asked::new(&[[-1.0, 1.0]; 2], bowl), 1, 5_000) {
+            match run(made.as_ref(), &CountedObjective::new(&[[-1.0, 1.0]; 2], bowl), 1, 5_000) {
                 Ok(found) => {
                     assert!(found.cost < 3.4 && population <= 5, "{} of {population}", method.name);
                     least = least.or(Some(population));
                 }
                 Err(Refusal::Parameter { method: who, what, value, .. }) => {
-                    let told = (who, what, value.to_bits());
-                    let asked = (method.name, "the population", (population as f64).to_bits());
-                    assert_eq!(told, asked);
+                    let reported = (who, what, value.to_bits());
+                    let requested = (method.name, "the population", (population as f64).to_bits());
+                    assert_eq!(reported, requested);
                     assert!(least.is_none() || population > 10_000, "{} of {population}", method.name);
                 }
                 Err(other) => panic!("{} of {population}: {other}", method.name),
@@ -334,7 +338,8 @@ fn optimiser_numbers_that_make_no_sense_are_refused_with_their_name() {
         ("most seeds", Box::new(Iwo { seeds: [0, 0], ..Iwo::PAPER_004 })),
     ];
     for (what, made) in bad {
-        let refusal = run(made.as_ref(), &Asked::new(&[[-1.0, 1.0]], bowl), 1, 99).expect_err(what);
+        let refusal =
+            run(made.as_ref(), &CountedObjective::new(&[[-1.0, 1.0]], bowl), 1, 99).expect_err(what);
         assert!(refusal.to_string().contains(what), "{what}: {refusal}");
     }
 }
@@ -343,7 +348,7 @@ fn optimiser_numbers_that_make_no_sense_are_refused_with_their_name() {
 /// Method: what it found before it shared its colony with the others, on a bowl in eighteen dimensions.
 #[test]
 fn ibfoa_case_1_walks_as_it_did_when_it_was_the_only_one() {
-    let asked = |x: &[f64]| x.iter().enumerate().map(|(i, x)| (x - 0.1 * i as f64).powi(2)).sum();
+    let requested = |x: &[f64]| x.iter().enumerate().map(|(i, x)| (x - 0.1 * i as f64).powi(2)).sum();
     let guesses = [vec![0.5; 18], vec![9.0; 18]];
     let then = [
         (5, usize::MAX, 0x3fe6_f683_1e7e_0b4a_u64, 9_993, 0x3ff6_bea8_d51b_7daf_u64, 480),
@@ -357,7 +362,7 @@ fn ibfoa_case_1_walks_as_it_did_when_it_was_the_only_one() {
             rises.set(rises.get() + u32::from(p.current > last.get()));
             last.set(p.current);
         };
-        let problem = Asked::new(&[[-3.0, 2.0]; 18], asked);
+        let problem = CountedObjective::new(&[[-3.0, 2.0]; 18], requested);
         let run = Run { seed, evaluations_max, guesses: &guesses, is_over: &|| false, watch: &mut watch };
         let found = Ibfoa::CASE_1.minimise(&problem, run).expect("sane");
         assert_eq!(
@@ -436,17 +441,17 @@ proptest! {
             .into_iter()
             .map(|[a, b]| if sane { [a.abs().min(b.abs()).min(1e300), a.abs().max(b.abs()).min(1e300)] } else { [a, b] })
             .collect();
-        let asked = Cell::new(0_usize);
-        let problem = Asked::new(&bounds, |_| {
-            asked.set(asked.get() + 1);
-            table[asked.get() % table.len()]
+        let requested = Cell::new(0_usize);
+        let problem = CountedObjective::new(&bounds, |_| {
+            requested.set(requested.get() + 1);
+            table[requested.get() % table.len()]
         });
         let made = of_population(METHODS[which].name, population);
         if let Ok(found) = run(made.as_ref(), &problem, seed, budget) {
             let inside = found.x.iter().zip(&bounds).all(|(x, [low, high])| x >= low && x <= high);
             prop_assert!(inside && found.cost.is_finite(), "{}: {found:?}", METHODS[which].name);
-            prop_assert!(found.progress.evaluations == asked.get() && asked.get() <= budget);
-            prop_assert!(found.x.is_empty() == (asked.get() == 0));
+            prop_assert!(found.progress.evaluations == requested.get() && requested.get() <= budget);
+            prop_assert!(found.x.is_empty() == (requested.get() == 0));
         }
     }
 }

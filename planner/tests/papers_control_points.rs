@@ -2,13 +2,13 @@
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{pose, ur5};
-use taustream_planner::optimize::{End, Found, Parallel, Problem, Progress, Run, Setup, by_name};
+use taustream_planner::optimize::{End, Parallel, Problem, Progress, Run, Setup, Solution, by_name};
 use taustream_planner::papers::control_point_count::Growth;
 use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
 use taustream_planner::{CostModel, paper_cost};
 
 fn case(seed: u64) -> Case {
-    Case::draw(&ur5(), &CostModel::default(), seed).expect("a UR5 has room")
+    Case::random(&ur5(), &CostModel::default(), seed).expect("a UR5 has room")
 }
 
 #[test]
@@ -58,7 +58,7 @@ fn paper_problem_costs_what_its_motion_costs() {
 fn paper_problem_is_improved_by_its_methods_alike_on_any_number_of_threads() {
     let (robot, case) = (ur5(), case(5));
     let problem = case.problem(&robot, CONTROL_POINTS, CostModel::default()).expect("fits");
-    let go = |method: &str, problem: &dyn Problem| -> Found {
+    let go = |method: &str, problem: &dyn Problem| -> Solution {
         let optimizer =
             by_name(method, Setup { evaluations: Some(400), ..Setup::default() }).expect("registered");
         let (is_over, mut watch) = (|| false, |_: &Progress| ());

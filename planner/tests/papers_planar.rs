@@ -2,14 +2,14 @@
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use taustream_planner::optimize::Reading;
 use taustream_planner::papers::planar::{
-    Drive, Journey, Numbers, Obstacle, Rule, Scene, distance_cm, drive, force, potential,
+    Journey, Numbers, Obstacle, PlanarDrive, PlanarScene, Rule, distance_cm, drive, force, potential,
 };
 
 fn go(scene: &str, rule: Rule, seed: u64) -> Journey {
     // A robot without an escape that has not arrived by then stands.
     let steps_max = if rule == Rule::RobustBacteria { 4_000 } else { 800 };
-    let how = Drive { rule, numbers: Numbers { steps_max, ..Numbers::OURS }, shared: true, seed };
-    drive(&Scene::by_name(scene).expect("a scene"), &how).expect("sane")
+    let how = PlanarDrive { rule, numbers: Numbers { steps_max, ..Numbers::OURS }, shared: true, seed };
+    drive(&PlanarScene::by_name(scene).expect("a scene"), &how).expect("sane")
 }
 
 fn arrived(scene: &str, rule: Rule) -> Vec<Journey> {
@@ -25,8 +25,9 @@ fn planar_robust_bacteria_walk_as_the_program_written_from_the_paper() {
         |line: &str| -> Vec<f64> { line.split(' ').map(|word| word.parse().expect("a number")).collect() };
     let lines: Vec<Vec<f64>> = include_str!("oracles/planar_walk.txt").lines().map(numbers).collect();
     let walls = Obstacle::walls(&[[-15.0, -20.0], [-15.0, 0.0], [15.0, 0.0], [15.0, -20.0]]);
-    let scene = Scene { name: "oracle", robots: vec![[[3.0, -60.0], [0.0, 60.0]]], obstacles: vec![walls] };
-    let how = Drive { rule: Rule::RobustBacteria, numbers: Numbers::OURS, shared: true, seed: 1 };
+    let scene =
+        PlanarScene { name: "oracle", robots: vec![[[3.0, -60.0], [0.0, 60.0]]], obstacles: vec![walls] };
+    let how = PlanarDrive { rule: Rule::RobustBacteria, numbers: Numbers::OURS, shared: true, seed: 1 };
     let journey = drive(&scene, &how).expect("sane");
     let path = &journey.paths_cm[0];
     let counts = [path.len() as f64, journey.virtuals.len() as f64];
@@ -116,9 +117,9 @@ fn planar_traps_hold_plain_bacteria_and_the_field_and_not_the_robust_ones() {
 fn planar_virtual_obstacles_belong_where_the_trap_is() {
     let median = |reading| {
         let numbers = Numbers { reading, ..Numbers::OURS };
-        let scene = Scene::by_name("wide-u").expect("a scene");
+        let scene = PlanarScene::by_name("wide-u").expect("a scene");
         let steps = (0..5).map(|seed| {
-            drive(&scene, &Drive { rule: Rule::RobustBacteria, numbers, shared: true, seed })
+            drive(&scene, &PlanarDrive { rule: Rule::RobustBacteria, numbers, shared: true, seed })
                 .expect("sane")
                 .steps
         });
@@ -132,7 +133,7 @@ fn planar_virtual_obstacles_belong_where_the_trap_is() {
 
 #[test]
 fn planar_robots_keep_clear_of_what_stands_and_move_a_step_at_a_time() {
-    for scene in Scene::paper_002().into_iter().filter(|s| s.name != "moving") {
+    for scene in PlanarScene::paper_002().into_iter().filter(|s| s.name != "moving") {
         for rule in [Rule::Potential, Rule::Bacteria, Rule::RobustBacteria] {
             let journey = go(scene.name, rule, 3);
             assert!(journey.nearest_cm >= 3.0 - 1e-9, "{} {rule:?}: {}", scene.name, journey.nearest_cm);
@@ -149,10 +150,10 @@ fn planar_four_robots_all_arrive_with_the_escape_only() {
     let plain = go("four-robots", Rule::Bacteria, 1);
     let stuck = plain.arrived.iter().filter(|a| !**a).count();
     assert!((1..=3).contains(&stuck), "{:?}", plain.arrived);
-    let scene = Scene::by_name("four-robots").expect("a scene");
+    let scene = PlanarScene::by_name("four-robots").expect("a scene");
     for shared in [true, false] {
         for seed in 0..5 {
-            let how = Drive { rule: Rule::RobustBacteria, numbers: Numbers::OURS, shared, seed };
+            let how = PlanarDrive { rule: Rule::RobustBacteria, numbers: Numbers::OURS, shared, seed };
             let journey = drive(&scene, &how).expect("sane");
             assert!(
                 journey.arrived.iter().all(|a| *a),
@@ -167,9 +168,9 @@ fn planar_four_robots_all_arrive_with_the_escape_only() {
 #[test]
 fn planar_closed_room_ends_with_its_caps() {
     let room = Obstacle::walls(&[[-20.0, -20.0], [20.0, -20.0], [20.0, 20.0], [-20.0, 20.0], [-20.0, -20.0]]);
-    let scene = Scene { name: "room", robots: vec![[[0.0, 0.0], [0.0, 90.0]]], obstacles: vec![room] };
+    let scene = PlanarScene { name: "room", robots: vec![[[0.0, 0.0], [0.0, 90.0]]], obstacles: vec![room] };
     let numbers = Numbers { steps_max: 1_000, virtual_max: 12, ..Numbers::OURS };
-    let how = Drive { rule: Rule::RobustBacteria, numbers, shared: true, seed: 1 };
+    let how = PlanarDrive { rule: Rule::RobustBacteria, numbers, shared: true, seed: 1 };
     let journey = drive(&scene, &how).expect("sane");
     assert_eq!((journey.arrived, journey.virtuals.len(), journey.steps), (vec![false], 12, 1_000));
     assert!(journey.nearest_cm >= 3.0 - 1e-9);
@@ -186,21 +187,21 @@ fn planar_numbers_that_make_no_sense_are_refused_and_odd_scenes_end() {
         Numbers { clearance_cm: f64::INFINITY, ..good },
         Numbers { goal: [20.0, f64::NAN], ..good },
     ];
-    let scene = Scene::by_name("static").expect("a scene");
+    let scene = PlanarScene::by_name("static").expect("a scene");
     for numbers in refused {
-        let how = Drive { rule: Rule::Bacteria, numbers, shared: true, seed: 0 };
+        let how = PlanarDrive { rule: Rule::Bacteria, numbers, shared: true, seed: 0 };
         assert!(drive(&scene, &how).is_err(), "{numbers:?}");
     }
     let odd = [
-        Scene { name: "nobody", robots: vec![], obstacles: vec![] },
-        Scene { name: "there", robots: vec![[[0.0; 2], [0.0; 2]]], obstacles: vec![] },
-        Scene {
+        PlanarScene { name: "nobody", robots: vec![], obstacles: vec![] },
+        PlanarScene { name: "there", robots: vec![[[0.0; 2], [0.0; 2]]], obstacles: vec![] },
+        PlanarScene {
             name: "on it",
             robots: vec![[[0.0; 2], [50.0, 0.0]]],
             obstacles: vec![Obstacle::disc([0.0; 2], 5.0)],
         },
-        Scene { name: "no number", robots: vec![[[f64::NAN; 2], [1.0, 0.0]]], obstacles: vec![] },
-        Scene {
+        PlanarScene { name: "no number", robots: vec![[[f64::NAN; 2], [1.0, 0.0]]], obstacles: vec![] },
+        PlanarScene {
             name: "no number",
             robots: vec![[[0.0; 2], [9.0, 0.0]]],
             obstacles: vec![Obstacle::disc([f64::NAN; 2], 5.0)],
@@ -208,7 +209,8 @@ fn planar_numbers_that_make_no_sense_are_refused_and_odd_scenes_end() {
     ];
     for scene in odd {
         for rule in [Rule::Potential, Rule::Bacteria, Rule::RobustBacteria] {
-            let journey = drive(&scene, &Drive { rule, numbers: good, shared: true, seed: 0 }).expect("ends");
+            let journey =
+                drive(&scene, &PlanarDrive { rule, numbers: good, shared: true, seed: 0 }).expect("ends");
             assert!(journey.steps <= 50, "{}", scene.name);
         }
     }

@@ -108,25 +108,25 @@ fn spline_time_refuses_limits_that_are_none() {
 fn spline_time_adds_up_as_printed_and_as_corrected() {
     let wide = [[1e9; 3]];
     let printed = SplineTime::new(&points(1), &wide, [0.1, 3.0], Reading::Printed).expect("a problem");
-    let judged = printed.judge(&TIMES_S).expect("a spline");
-    assert!((judged.jerk_rad_s3 - SCIPY_JERK_RMS).abs() < 1e-8 * SCIPY_JERK_RMS, "{judged:?}");
-    assert!((judged.cost - (0.4 * 6.3 + 0.6 * SCIPY_JERK_RMS)).abs() < 1e-7, "{judged:?}");
+    let evaluated = printed.evaluate(&TIMES_S).expect("a spline");
+    assert!((evaluated.jerk_rad_s3 - SCIPY_JERK_RMS).abs() < 1e-8 * SCIPY_JERK_RMS, "{evaluated:?}");
+    assert!((evaluated.cost - (0.4 * 6.3 + 0.6 * SCIPY_JERK_RMS)).abs() < 1e-7, "{evaluated:?}");
 
     // Jerk is broken by half of its limit, speed by nothing, acceleration is none.
     let peak = [3.6, 9.0, 36.0];
-    let jerk = judged_peak(&TIMES_S);
+    let jerk = evaluated_peak(&TIMES_S);
     let tight = [[peak[0] * 9.0, peak[1] * 9.0, jerk / 1.5]];
     let printed = SplineTime::new(&points(1), &tight, [0.1, 3.0], Reading::Printed).expect("a problem");
-    let broken = printed.judge(&TIMES_S).expect("a spline");
+    let broken = printed.evaluate(&TIMES_S).expect("a spline");
     assert_eq!(broken.broken, 1);
-    assert!((broken.cost - judged.cost - 0.5).abs() < 1e-9, "{broken:?}");
+    assert!((broken.cost - evaluated.cost - 0.5).abs() < 1e-9, "{broken:?}");
     let corrected = SplineTime::new(&points(1), &tight, [0.1, 3.0], Reading::Corrected).expect("a problem");
-    let hard = corrected.judge(&TIMES_S).expect("a spline");
+    let hard = corrected.evaluate(&TIMES_S).expect("a spline");
     assert!((hard.excess - 0.5).abs() < 1e-9 && hard.cost > HARD * 0.5, "{hard:?}");
 }
 
 /// The highest jerk at the samples of the objective.
-fn judged_peak(times_s: &[f64]) -> f64 {
+fn evaluated_peak(times_s: &[f64]) -> f64 {
     let spline = Spline::through(&points(1), times_s).expect("a spline");
     let joins = spline.joins_s();
     let samples =
@@ -145,9 +145,9 @@ fn spline_time_optimised_beats_even_times_within_the_limits() {
         let (is_over, mut watch) = (|| false, |_: &Progress| ());
         let run = Run { seed: 1, evaluations_max: 2_000, guesses: &[], is_over: &is_over, watch: &mut watch };
         let found = optimizer.minimise(&problem, run).expect("sane");
-        let judged = problem.judge(&found.x).expect("a spline");
+        let evaluated = problem.evaluate(&found.x).expect("a spline");
         let even =
             (1..=58).map(|i| problem.cost(&[0.2 + 0.1 * f64::from(i); 5])).fold(f64::INFINITY, f64::min);
-        assert!(judged.broken == 0 && judged.cost < even, "{method}: {judged:?}, even times {even}");
+        assert!(evaluated.broken == 0 && evaluated.cost < even, "{method}: {evaluated:?}, even times {even}");
     }
 }

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::draw::Draw;
+use taustream_planner::budget::Budget;
 use taustream_planner::optimize::{METHODS, Problem, Setup, by_name};
 use taustream_planner::refine::{PathProblem, refine};
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Space;
-use taustream_planner::work::Work;
 use taustream_planner::world::World;
 use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan, verify};
 
@@ -18,9 +18,9 @@ fn options(seed: u64, deadline_ms: u64, planner: PlannerKind) -> PlanOptions {
 }
 
 /// A pose that the independent check finds free, away from the edge of the margin.
-fn free_pose(robot: &Robot, scene: &Scene, draw: &mut Draw) -> JointArray {
+fn free_pose(robot: &Robot, scene: &Scene, rng: &mut SeededRng) -> JointArray {
     loop {
-        let q = pose(std::array::from_fn(|_| draw.within(-3.1, 3.1)));
+        let q = pose(std::array::from_fn(|_| rng.within(-3.1, 3.1)));
         let (spheres_m, links_m) = ur5_distances_m(robot, scene, &q);
         if spheres_m > scene.margin_m + 0.01 && links_m > 0.01 {
             return q;
@@ -34,9 +34,9 @@ fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
     let robot = ur5();
     let (mut found, mut round) = (0, 0);
     for seed in 0..25 {
-        let mut draw = Draw::new(seed, 100);
-        let scene = random_spheres(&mut draw);
-        let (start, goal) = (free_pose(&robot, &scene, &mut draw), free_pose(&robot, &scene, &mut draw));
+        let mut rng = SeededRng::new(seed, 100);
+        let scene = random_spheres(&mut rng);
+        let (start, goal) = (free_pose(&robot, &scene, &mut rng), free_pose(&robot, &scene, &mut rng));
         let ibfoa = PlannerKind::from_name("ibfoa").expect("registered");
         let kinds =
             [PlannerKind::Auto, PlannerKind::Straight, PlannerKind::RrtConnect, ibfoa, PlannerKind::Rrt];
@@ -55,7 +55,7 @@ fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
 /// Goal: joints that are slow against what they accelerate at take many strokes a radian; a message holds 512, and
 /// the motion must be found all the same, near the time that its velocity limit asks for.
 #[test]
-fn long_way_of_slow_joints_fits_into_one_message_near_full_speed() {
+fn long_motion_of_slow_joints_fits_into_one_message_near_full_speed() {
     for velocity_rad_s in [0.5, 0.1, 0.01, 1e-3] {
         let mut robot = ur5();
         for joint in &mut robot.joints {
@@ -130,10 +130,10 @@ fn planning_with_the_plain_tree_by_name_goes_round_pillars() {
 #[test]
 fn planning_to_an_unreachable_goal_fails_within_the_deadline_and_says_what_was_tried() {
     let robot = ur5();
-    let mut draw = Draw::new(3, 0);
+    let mut rng = SeededRng::new(3, 0);
     let open = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
-    let goal = free_pose(&robot, &open, &mut draw);
-    let start = free_pose(&robot, &open, &mut draw);
+    let goal = free_pose(&robot, &open, &mut rng);
+    let start = free_pose(&robot, &open, &mut rng);
     let elbow = common::ur5_origins_m(&goal)[3];
     // Six balls round the elbow's end, each a centimetre from the links beside it, hold the arm where it is.
     let mut obstacles = Vec::new();
@@ -164,7 +164,7 @@ fn planning_to_an_unreachable_goal_fails_within_the_deadline_and_says_what_was_t
 }
 
 #[test]
-fn planning_bad_poses_are_told_apart_with_their_offenders() {
+fn planning_bad_poses_are_distinguished_and_named() {
     let (robot, scene) = (ur5(), scene("pillars"));
     let home = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
     let try_goal =
@@ -229,12 +229,12 @@ fn planner_names_are_read_as_they_are_written() {
 /// the one it was given.
 #[test]
 fn refinement_takes_every_optimiser_by_name() {
-    let mut draw = Draw::new(3, 100);
-    let (robot, scene) = (ur5(), random_spheres(&mut draw));
+    let mut rng = SeededRng::new(3, 100);
+    let (robot, scene) = (ur5(), random_spheres(&mut rng));
     let world = World::new(&robot, &scene).expect("builds");
-    let work = Work::unbounded();
-    let space = Space::new(&world, &work);
-    let line = [free_pose(&robot, &scene, &mut draw), free_pose(&robot, &scene, &mut draw)];
+    let budget = Budget::unbounded();
+    let space = Space::new(&world, &budget);
+    let line = [free_pose(&robot, &scene, &mut rng), free_pose(&robot, &scene, &mut rng)];
     let problem = PathProblem::new(&space, line[0], line[1]);
     for method in METHODS {
         let optimizer =

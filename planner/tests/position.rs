@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::draw::Draw;
 use taustream_planner::optimize::METHODS;
 use taustream_planner::position::{ERROR_M_MAX, error_m, polish};
+use taustream_planner::rng::SeededRng;
 use taustream_planner::{
     PlanOptions, PositionError, PositionTask, Reached, StartMargin, plan_to_position, verify,
 };
@@ -93,12 +93,12 @@ fn positions_of_random_poses_are_reached_by_arms_of_two_to_eight_joints() {
     for (name, robot) in
         [("ur5", ur5()), ("piper", piper()), ("two joints", two_joints()), ("eight joints", eight_joints())]
     {
-        let mut draw = Draw::new(5, 60);
+        let mut rng = SeededRng::new(5, 60);
         let mut random = || -> JointArray {
             std::array::from_fn(|j| {
                 robot.joints.get(j).map_or(0.0, |joint| {
                     let [low, high] = joint.limits.position_rad;
-                    draw.within(low, high)
+                    rng.within(low, high)
                 })
             })
         };
@@ -208,13 +208,13 @@ fn polishing_ends_on_the_target_from_nearby_and_never_makes_worse() {
     let (mut there, mut tried) = (0, 0);
     for (robot, slack_rad) in [(ur5(), 0.1), (piper(), 0.1), (eight_joints(), 0.1), (two_joints(), 0.05)] {
         for seed in 0..100 {
-            let mut draw = Draw::new(seed, 61);
+            let mut rng = SeededRng::new(seed, 61);
             let mut q = [0.0; 8];
             let mut near = [0.0; 8];
             for (j, joint) in robot.joints.iter().enumerate() {
                 let [low, high] = joint.limits.position_rad;
-                q[j] = draw.within(low, high);
-                near[j] = (q[j] + draw.within(-slack_rad, slack_rad)).clamp(low, high);
+                q[j] = rng.within(low, high);
+                near[j] = (q[j] + rng.within(-slack_rad, slack_rad)).clamp(low, high);
             }
             let target = nalgebra::Vector3::from(tip_m(&robot, &q));
             let polished = polish(&robot, &near, &target);

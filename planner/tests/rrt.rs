@@ -1,7 +1,7 @@
 //! The plain tree of seed paper 000's third contender, against a program written from its report.
 use std::cell::Cell;
 use taustream_motion::{JointArray, MAX_JOINTS};
-use taustream_planner::draw::Draw;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::{Field, Search, rrt};
 
 /// The square of `oracles/rrt.py`.
@@ -42,9 +42,9 @@ impl Field for Square {
     fn is_over(&self) -> bool {
         self.checks.get() >= self.checks_until_over
     }
-    fn draw_pose(&self, draw: &mut Draw) -> JointArray {
+    fn random_pose(&self, rng: &mut SeededRng) -> JointArray {
         let mut pose = [0.0; MAX_JOINTS];
-        pose[..2].fill_with(|| draw.within(-3.0, 3.0));
+        pose[..2].fill_with(|| rng.within(-3.0, 3.0));
         pose
     }
 }
@@ -56,7 +56,7 @@ fn pose(x: f64, y: f64) -> JointArray {
 }
 
 fn grow(square: &Square, seed: u64, checks_max: usize) -> Search {
-    rrt(square, &pose(-2.0, -0.5), &pose(2.0, -0.4), checks_max, &mut Draw::new(seed, 0))
+    rrt(square, &pose(-2.0, -0.5), &pose(2.0, -0.4), checks_max, &mut SeededRng::new(seed, 0))
 }
 
 #[test]
@@ -128,13 +128,13 @@ impl Field for Endless {
     fn is_over(&self) -> bool {
         false
     }
-    fn draw_pose(&self, _draw: &mut Draw) -> JointArray {
+    fn random_pose(&self, _rng: &mut SeededRng) -> JointArray {
         pose(1.0, 1.0)
     }
 }
 
 #[test]
 fn rrt_in_a_field_without_end_ends_with_its_nodes() {
-    let search = rrt(&Endless, &pose(0.0, 0.0), &pose(f64::NAN, 0.0), usize::MAX, &mut Draw::new(1, 0));
+    let search = rrt(&Endless, &pose(0.0, 0.0), &pose(f64::NAN, 0.0), usize::MAX, &mut SeededRng::new(1, 0));
     assert!(search.path.is_none() && search.nodes == 20_000, "{} nodes", search.nodes);
 }

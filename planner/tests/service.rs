@@ -82,7 +82,7 @@ impl Played {
             while let Some(sample) = trajectories.receive().expect("received") {
                 let message = Box::new(*sample.payload());
                 let checked = CheckedTrajectory::try_from(&*message).expect("a good message");
-                let outcome = self.judge(&checked);
+                let outcome = self.evaluate(&checked);
                 receipts
                     .send_copy(Receipt::new(checked.trajectory_id, checked.generation, &outcome))
                     .expect("sent");
@@ -91,7 +91,7 @@ impl Played {
         }
     }
 
-    fn judge(&self, checked: &CheckedTrajectory) -> Outcome {
+    fn evaluate(&self, checked: &CheckedTrajectory) -> Outcome {
         if let Replaces::Cut { at_s, .. } = checked.replaces {
             self.cuts.fetch_add(1, Ordering::SeqCst);
             return Outcome::Rejected(Rejection::CutUnsupported { at_s });
@@ -153,10 +153,10 @@ fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanReques
 }
 
 /// Asks and waits for the answer.
-fn ask(arm: &str, asked: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> PlanOutcome {
+fn ask(arm: &str, requested: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> PlanOutcome {
     let wire = join(arm, "client");
     let client = wire.plan_client().expect("port");
-    let pending = client.send_copy(PlanRequest::from(asked)).expect("sent");
+    let pending = client.send_copy(PlanRequest::from(requested)).expect("sent");
     meanwhile();
     let since = Instant::now();
     loop {
@@ -245,14 +245,14 @@ fn service_bad_requests_are_refused_in_words_and_nothing_is_sent() {
         let far = CheckedPlanRequest { goal_rad: pose([9.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..good.clone() };
         let inside = CheckedPlanRequest { goal_rad: pose([0.0, 0.6, 0.0, 0.0, 0.0, 0.0]), ..good.clone() };
         let unknown = CheckedPlanRequest { planner: "teleport".to_owned(), ..good.clone() };
-        for (asked, word) in [
+        for (requested, word) in [
             (&seven, "7 joint values"),
             (&nan, "goal of joint 3"),
             (&far, "shoulder_pan"),
             (&inside, "table"),
             (&unknown, "unknown planner `teleport`; use one of auto, straight"),
         ] {
-            let outcome = ask(arm, asked, || ());
+            let outcome = ask(arm, requested, || ());
             assert!(reason_of(&outcome).contains(word), "{word}: {outcome:?}");
         }
         for phase in Phase::ALL.into_iter().filter(|p| !matches!(p, Phase::Holding | Phase::Moving)) {
@@ -302,8 +302,8 @@ fn service_motion_whose_requester_has_gone_is_not_sent() {
     with_service("gone", &played, |arm, _| {
         let wire = join(arm, "client");
         let client = wire.plan_client().expect("port");
-        let asked = PlanRequest::from(&request(When::AfterCurrent, "", pose(THERE)));
-        let pending = client.send_copy(asked).expect("sent");
+        let requested = PlanRequest::from(&request(When::AfterCurrent, "", pose(THERE)));
+        let pending = client.send_copy(requested).expect("sent");
         thread::sleep(Duration::from_millis(700));
         drop(pending);
         thread::sleep(Duration::from_millis(200));

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::limits::Quantity;
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
-use taustream_planner::draw::Draw;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::{PlanOptions, PlannerKind, Violation, plan, verify};
 
 const START: [f64; 6] = [-0.5, -0.7, 0.7, -1.57, -1.57, 0.0];
@@ -35,7 +35,7 @@ fn still(name: &str, center_m: [f64; 3], shape: Shape) -> Obstacle {
 }
 
 #[test]
-fn verify_doctored_motions_are_refused_and_the_original_is_not() {
+fn verify_corrupted_motions_are_refused_and_the_original_is_not() {
     let (robot, scene) = (ur5(), scene("pillars"));
     let good = planned();
     let proof = verify(&robot, &scene, &good).expect("the planner proved it");
@@ -115,8 +115,8 @@ fn verify_needle_thinner_than_any_sampling_step_is_caught_at_the_right_time() {
     let robot = stick();
     let mut missed_by_sampling = 0;
     for seed in 0..40 {
-        let mut draw = Draw::new(seed, 0);
-        let angle = draw.within(-1.0, 1.0);
+        let mut rng = SeededRng::new(seed, 0);
+        let angle = rng.within(-1.0, 1.0);
         let (x, y): (f64, f64) = (0.9 * angle.cos(), 0.9 * angle.sin());
         let needle = Shape::Cylinder { radius_m: 1e-4, length_m: 1.0 };
         let needle = scene_of(0.0, vec![still("needle", [x, y, 0.0], needle)]);
@@ -161,8 +161,8 @@ fn verify_margin_just_inside_and_just_outside_the_least_distance() {
     let motion = plan(&robot, &empty, &pose(START), &pose(GOAL), &options).expect("free").trajectory;
     let mut decided = 0;
     for seed in 0..30 {
-        let mut draw = Draw::new(seed, 0);
-        let center_m = [draw.within(-1.0, -0.5), draw.within(-0.5, 0.5), draw.within(0.3, 0.9)];
+        let mut rng = SeededRng::new(seed, 0);
+        let center_m = [rng.within(-1.0, -0.5), rng.within(-0.5, 0.5), rng.within(0.3, 0.9)];
         let ball = |margin_m| scene_of(margin_m, vec![sphere("ball", center_m, 0.05)]);
         let least_m = (0..=20_000)
             .map(|i| motion.duration_s() * f64::from(i) / 20_000.0)
@@ -225,8 +225,8 @@ fn verify_box_as_mesh_and_as_box_give_one_clearance() {
     let options = PlanOptions { planner: PlannerKind::Straight, ..PlanOptions::default() };
     let motion = plan(&robot, &scene_of(0.0, Vec::new()), &pose(START), &pose(GOAL), &options).expect("free");
     for seed in 0..10 {
-        let mut draw = Draw::new(seed, 0);
-        let center_m = [draw.within(-1.2, -0.3), draw.within(-0.6, 0.6), draw.within(0.2, 1.0)];
+        let mut rng = SeededRng::new(seed, 0);
+        let center_m = [rng.within(-1.2, -0.3), rng.within(-0.6, 0.6), rng.within(0.2, 1.0)];
         let solid = scene_of(0.0, vec![still("block", center_m, Shape::Box { size_m: [0.2; 3] })]);
         let mesh = scene_of(0.0, vec![still("block", center_m, cube(0.1, false))]);
         let (a, b) = (verify(&robot, &solid, &motion.trajectory), verify(&robot, &mesh, &motion.trajectory));
@@ -243,8 +243,8 @@ fn verify_hostile_trajectories_never_panic() {
     let sizes = [0.0, 1e-300, 1e-9, 1.0, 1e3, 1e12, 1e300];
     let mut refused = 0;
     for seed in 0..300 {
-        let mut draw = Draw::new(seed, 0);
-        let mut number = |scale: f64| draw.within(-scale, scale) * sizes[draw.index(sizes.len())];
+        let mut rng = SeededRng::new(seed, 0);
+        let mut number = |scale: f64| rng.within(-scale, scale) * sizes[rng.index(sizes.len())];
         let mut base: JointArray = [0.0; MAX_JOINTS];
         base.iter_mut().take(6).for_each(|q| *q = number(1.0));
         let mut strokes: Vec<Stroke> = (0..8)

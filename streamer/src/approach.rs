@@ -16,11 +16,11 @@ pub struct Approach {
 }
 
 impl Approach {
-    /// From `held_rad` to `base_rad` in `duration_s`.
+    /// From `hold_pose_rad` to `base_rad` in `duration_s`.
     #[must_use]
-    pub fn new(held_rad: &JointArray, base_rad: &JointArray, duration_s: f64) -> Self {
+    pub fn new(hold_pose_rad: &JointArray, base_rad: &JointArray, duration_s: f64) -> Self {
         let mut offset_rad = [0.0; taustream_motion::MAX_JOINTS];
-        for (offset, (held, base)) in offset_rad.iter_mut().zip(held_rad.iter().zip(base_rad)) {
+        for (offset, (held, base)) in offset_rad.iter_mut().zip(hold_pose_rad.iter().zip(base_rad)) {
             *offset = held - base;
         }
         Self { offset_rad, duration_s, any: offset_rad.iter().any(|o| o.abs() > 0.0) }

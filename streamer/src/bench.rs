@@ -16,8 +16,8 @@ mod wake;
 
 use crate::buses::{Bus, Buses};
 use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
-use crate::facts::Asked;
-use crate::intake::{self, Desk};
+use crate::cycle_state::PendingCommand;
+use crate::intake::{self, CommandQueue};
 use crate::rt;
 use crate::tick::Schedule;
 pub use compare::{Compared, compare};
@@ -31,10 +31,10 @@ use taustream_drivers::codec::canopen::sync;
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, encode_rpdo};
 use taustream_drivers::codec::damiao_frames::{Request, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
-use taustream_drivers::codec::setpoint_frames::{Group, Rhythm, encode_pair, groups};
+use taustream_drivers::codec::setpoint_frames::{Group, SendSchedule, encode_pair, groups};
 use taustream_drivers::link::LinkChoice;
 use taustream_drivers::{
-    CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
+    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
@@ -152,7 +152,7 @@ pub fn cycle(options: &BenchOptions) -> Result<CycleBench, BenchError> {
 
 /// Does `work` on a thread of its own with the priority that the streamer's would have; tells it whether it has it.
 fn on_the_real_time_thread<T: Send + 'static>(
-    cycle: taustream_arm::settings::Cycle,
+    cycle: taustream_arm::settings::CycleSettings,
     allow_non_realtime: bool,
     work: impl FnOnce(bool) -> Result<T, BenchError> + Send + 'static,
 ) -> Result<T, BenchError> {
@@ -178,10 +178,10 @@ fn on_the_real_time_thread<T: Send + 'static>(
 struct BenchDriver {
     servos: Vec<Servo>,
     groups: Vec<Group>,
-    rhythm: Rhythm,
+    send_schedule: SendSchedule,
     joints: Vec<usize>,
     commands: [JointCommand; MAX_JOINTS],
-    wish: DriveWish,
+    drive_target: DriveTarget,
     now: Nanos,
 }
 
@@ -189,11 +189,11 @@ impl ServoDriver for BenchDriver {
     fn encode(
         &mut self,
         now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
-        (self.commands, self.wish, self.now) = (*commands, wish, now);
+        (self.commands, self.drive_target, self.now) = (*commands, drive_target, now);
         if self.servos.iter().any(|servo| servo.protocol.as_cia402().is_some()) {
             out.push(sync());
         }
@@ -202,7 +202,7 @@ impl ServoDriver for BenchDriver {
             |servo: &Servo| Some(counts_from_rad(&CountScale::of(servo)?, command(servo).position_rad));
         for (number, group) in self.groups.iter().enumerate() {
             let frame = match *group {
-                _ if !self.rhythm.is_turn(number) => None,
+                _ if !self.send_schedule.is_due(number) => None,
                 Group::One(at) => self.servos.get(at).map(|servo| setpoint(servo, &command(servo))),
                 Group::Pair([first, second]) => {
                     let pair = self.servos.get(first).zip(self.servos.get(second));
@@ -213,14 +213,14 @@ impl ServoDriver for BenchDriver {
                 out.push(frame);
             });
         }
-        self.rhythm.advance();
+        self.send_schedule.advance();
     }
     fn decode(&mut self, _now: Nanos, _frame: &CanFrame) {}
     fn joints(&self) -> &[usize] {
         &self.joints
     }
     fn status(&self, joint: usize) -> ServoStatus {
-        let enabled = self.wish == DriveWish::Enabled;
+        let enabled = self.drive_target == DriveTarget::Enabled;
         ServoStatus {
             state: if enabled { DriveState::Enabled } else { DriveState::Disabled },
             position_rad: self.commands.get(joint).map_or(f64::NAN, |c| c.position_rad),
@@ -283,7 +283,7 @@ impl Times {
 /// The streamer's cycle, ready, and the frames for the bare loop.
 struct Bench {
     core: Core,
-    desk: Desk,
+    command_queue: CommandQueue,
     frames: Vec<CanFrame>,
     batch: FrameBatch,
     peers: Peers,
@@ -310,21 +310,33 @@ impl Bench {
                 frames.extend(servos.iter().map(|servo| setpoint(servo, &JointCommand::default())));
             }
             let joints = servos.iter().map(|s| s.joint).collect();
-            let (wish, now) = (DriveWish::Disabled, Nanos(0));
+            let (drive_target, now) = (DriveTarget::Disabled, Nanos(0));
             let groups = groups(servos.len(), bus.traffic.packed);
-            let rhythm = Rhythm::new(bus.traffic);
-            let driver = BenchDriver { servos, groups, rhythm, joints, commands: at_base, wish, now };
+            let send_schedule = SendSchedule::new(bus.traffic);
+            let driver =
+                BenchDriver { servos, groups, send_schedule, joints, commands: at_base, drive_target, now };
             buses.push(Bus::new(peers.master(bus)?, Box::new(driver), settings));
         }
         let buses = Buses::new(buses).map_err(|e| BenchError::System(e.to_string()))?;
         let link = buses.describe();
-        let (queues, desk) = intake::pair();
+        let (queues, command_queue) = intake::pair();
         let core = Core::new(settings, buses, queues, false);
         let batch = FrameBatch::new();
         let joints = settings.robot.joints.len();
         let (generation, ticks, skipped) = (0, 0, 0);
-        let mut bench =
-            Self { core, desk, frames, batch, peers, link, base_rad, joints, generation, ticks, skipped };
+        let mut bench = Self {
+            core,
+            command_queue,
+            frames,
+            batch,
+            peers,
+            link,
+            base_rad,
+            joints,
+            generation,
+            ticks,
+            skipped,
+        };
         bench.get_moving(settings.cycle.period_us)?;
         Ok(bench)
     }
@@ -338,7 +350,9 @@ impl Bench {
                 return Ok(());
             }
             if phase == Phase::Disabled && cycle % 100 == 50 {
-                let _ = self.desk.ask(Asked { sequence: cycle, command: Command::Enable });
+                let _ = self
+                    .command_queue
+                    .push_command(PendingCommand { sequence: cycle, command: Command::Enable });
             }
             rt::sleep_until(schedule.deadline());
             self.cycle(&mut schedule, &mut NoProbe);
@@ -348,14 +362,14 @@ impl Bench {
 
     /// One cycle at its deadline, as `rt::run` does it, on tick numbers that never stall; (lateness, time) in ns.
     fn cycle<P: Probe>(&mut self, schedule: &mut Schedule, probe: &mut P) -> (u64, u64) {
-        let woke = rt::now();
-        let mut tick = schedule.wake(woke);
+        let wake_time = rt::now();
+        let mut tick = schedule.wake(wake_time);
         self.skipped += std::mem::take(&mut tick.skipped);
         let lateness_ns = tick.lateness_ns();
         self.ticks += 1;
         tick.number = self.ticks;
         let next = run_cycle(&mut self.core, tick, probe);
-        let time_ns = rt::now().0.saturating_sub(woke.0);
+        let time_ns = rt::now().0.saturating_sub(wake_time.0);
         debug_assert_eq!(next, Next::Go);
         self.keep_moving();
         (lateness_ns, time_ns)
@@ -363,14 +377,14 @@ impl Bench {
 
     /// Offers the way back when one has ended, and empties the queues that nobody reads here.
     fn keep_moving(&mut self) {
-        while self.desk.verdict().is_some() || self.desk.answer().is_some() {}
+        while self.command_queue.trajectory_result().is_some() || self.command_queue.answer().is_some() {}
         if self.core.supervisor().phase() != Phase::Holding {
             return;
         }
-        let Some(mut filled) = self.desk.empty_box() else { return };
+        let Some(mut filled) = self.command_queue.empty_box() else { return };
         self.generation += 1;
         let Ok(trajectory) = to_and_fro(&self.base_rad, self.joints) else {
-            return self.desk.put_back(filled);
+            return self.command_queue.return_unused(filled);
         };
         *filled = CheckedTrajectory {
             trajectory_id: self.generation,
@@ -379,7 +393,7 @@ impl Bench {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.desk.offer(filled);
+        self.command_queue.offer(filled);
     }
 
     fn streamer_slice(&mut self, period_us: u32, cycles: u64, into: &mut Times) {
@@ -397,13 +411,13 @@ impl Bench {
         let mut schedule = Schedule::starting_after(rt::now(), period_us);
         for cycle in 0..cycles {
             rt::sleep_until(schedule.deadline());
-            let woke = rt::now();
+            let wake_time = rt::now();
             for link in self.core.links_mut() {
                 link.send(&self.frames);
                 link.receive(&mut self.batch);
             }
-            let time_ns = rt::now().0.saturating_sub(woke.0);
-            let tick = schedule.wake(woke);
+            let time_ns = rt::now().0.saturating_sub(wake_time.0);
+            let tick = schedule.wake(wake_time);
             self.skipped += tick.skipped;
             into.take(cycle, tick.lateness_ns(), time_ns);
         }

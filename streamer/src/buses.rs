@@ -3,11 +3,11 @@
 //! One cycle makes one `sendmmsg` and one or two `recvmmsg` a bus, whatever arrives. A frame that was not
 //! taken is counted, never sent again: an old setpoint is worse than none. A bus that has failed is silent
 //! (`health.rs`) until its link was started over by the service thread.
-use crate::facts::{BUSES_MAX, Facts};
-use crate::health::{Health, Seen};
+use crate::cycle_state::{BUSES_MAX, CycleState};
+use crate::health::{BusActivity, Health};
 use taustream_arm::Settings;
 use taustream_drivers::{
-    CanId, CanLink, DriveWish, ErrorFrame, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
+    CanId, CanLink, DriveTarget, ErrorFrame, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
 };
 use taustream_motion::MAX_JOINTS;
 
@@ -88,12 +88,12 @@ impl Buses {
     /// Writes every bus's frames. On a failed bus nothing is said but torque off.
     ///
     /// Real time: no allocation.
-    pub fn encode(&mut self, now: Nanos, wish: DriveWish, commands: &[JointCommand; MAX_JOINTS]) {
+    pub fn encode(&mut self, now: Nanos, drive_target: DriveTarget, commands: &[JointCommand; MAX_JOINTS]) {
         for bus in &mut self.0 {
-            bus.live = matches!(wish, DriveWish::Enabled | DriveWish::Keep);
+            bus.live = matches!(drive_target, DriveTarget::Enabled | DriveTarget::Keep);
             bus.outgoing.clear();
-            if !bus.health.is_silent() || wish == DriveWish::TorqueOff {
-                bus.driver.encode(now, wish, commands, &mut bus.outgoing);
+            if !bus.health.is_silent() || drive_target == DriveTarget::TorqueOff {
+                bus.driver.encode(now, drive_target, commands, &mut bus.outgoing);
             }
         }
     }
@@ -101,8 +101,8 @@ impl Buses {
     /// Hands every bus's frames over, all of them before anything is read.
     ///
     /// Real time: one system call a bus, never waits.
-    pub fn send(&mut self, facts: &mut Facts) {
-        for (bus, found) in self.0.iter_mut().zip(&mut facts.buses) {
+    pub fn send(&mut self, cycle_state: &mut CycleState) {
+        for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
             let frames = bus.outgoing.frames();
             let sent = match &mut bus.link {
                 Some(link) if !frames.is_empty() => link.send(frames),
@@ -114,16 +114,16 @@ impl Buses {
             }
             bus.frames = bus.frames.saturating_add(u64::from(count(taken.len())));
             let complete = taken.len() == frames.len();
-            (found.wanted, found.sent) = (count(frames.len()), count(taken.len()));
+            (found.requested, found.sent) = (count(frames.len()), count(taken.len()));
             found.fault = sent.fault.filter(|_| !complete);
             (found.syncs, found.frames) = (bus.syncs, bus.frames);
             // Known before the commanded pose is: a bus that is silent has carried nothing.
             found.failed = bus.health.failed();
             for joint in bus.driver.joints() {
-                if let Some(held_back) = facts.held_back.get_mut(*joint) {
-                    *held_back = taken.is_empty() || !bus.driver.carries(*joint);
+                if let Some(not_sent) = cycle_state.not_sent.get_mut(*joint) {
+                    *not_sent = taken.is_empty() || !bus.driver.carries(*joint);
                 }
-                if let Some(out) = facts.out_of_reach.get_mut(*joint) {
+                if let Some(out) = cycle_state.unreachable.get_mut(*joint) {
                     *out = found.failed.is_some();
                 }
             }
@@ -133,8 +133,8 @@ impl Buses {
     /// Takes what has arrived, judges each bus, and asks the drivers what they know now.
     ///
     /// Real time: at most `RECEIVES_MAX` system calls a bus, never waits.
-    pub fn receive(&mut self, now: Nanos, facts: &mut Facts) {
-        for (bus, found) in self.0.iter_mut().zip(&mut facts.buses) {
+    pub fn receive(&mut self, now: Nanos, cycle_state: &mut CycleState) {
+        for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
             let Bus { link, driver, health, incoming, live, .. } = bus;
             let mut confirmed = None;
             if let Some(link) = link {
@@ -154,12 +154,12 @@ impl Buses {
                 }
                 confirmed = link.confirmed();
             }
-            health.judge(Seen { live: *live, confirmed }, found);
+            health.evaluate(BusActivity { live: *live, confirmed }, found);
             for joint in driver.joints() {
-                if let Some(servo) = facts.servos.get_mut(*joint) {
+                if let Some(servo) = cycle_state.servos.get_mut(*joint) {
                     *servo = driver.status(*joint);
                 }
-                if let Some(out) = facts.out_of_reach.get_mut(*joint) {
+                if let Some(out) = cycle_state.unreachable.get_mut(*joint) {
                     *out = found.failed.is_some();
                 }
             }
@@ -188,14 +188,14 @@ impl Buses {
         links
     }
 
-    /// Takes links back. When they are `well`, their buses begin anew: drives are looked at before anything is said.
+    /// Takes links back. When they are `recovered`, their buses begin anew: drives are looked at before anything is said.
     ///
     /// Real time: moves pointers, frees nothing.
-    pub fn take_back(&mut self, links: Links, well: bool) {
+    pub fn reclaim(&mut self, links: Links, recovered: bool) {
         for (bus, link) in self.0.iter_mut().zip(links) {
             let Some(link) = link else { continue };
             bus.link = Some(link);
-            if well {
+            if recovered {
                 bus.health.start_over();
                 bus.driver.start_over();
             }

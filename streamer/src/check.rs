@@ -122,7 +122,7 @@ impl Checker {
 mod tests {
     use super::*;
     use std::path::Path;
-    use taustream_messages::trajectory::Doctored;
+    use taustream_messages::trajectory::Corrupted;
     use taustream_motion::{Stroke, Trajectory};
 
     const BASE_RAD: [f64; MAX_JOINTS] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0];
@@ -149,24 +149,24 @@ mod tests {
     }
 
     #[test]
-    fn check_of_each_doctored_message_is_refused_with_its_reason() {
+    fn check_of_each_corrupted_message_is_refused_with_its_reason() {
         let rules = Rules::of(&robot());
-        let table: [(Doctored, &str); 12] = [
-            (Doctored::Layout(99), "layout version 99"),
-            (Doctored::Joints(9), "joint_count is 9"),
-            (Doctored::Joints(7), "wrong joint count: 7 for an arm of 6"),
-            (Doctored::StrokeCount(600), "stroke_count is 600"),
-            (Doctored::Exponent(3), "n is 3"),
-            (Doctored::Delta(f64::NAN), "delta_rad is not finite"),
-            (Doctored::Duration(0.0), "duration_s is 0"),
-            (Doctored::Start(-1.0), "start_s is -1"),
-            (Doctored::Base(f64::INFINITY), "base_rad of joint 0"),
-            (Doctored::Base(9.0), "limit of joint 1"),
-            (Doctored::Replaces(7), "replaces code 7"),
-            (Doctored::Digest(1), "wrong robot"),
+        let table: [(Corrupted, &str); 12] = [
+            (Corrupted::Layout(99), "layout version 99"),
+            (Corrupted::Joints(9), "joint_count is 9"),
+            (Corrupted::Joints(7), "wrong joint count: 7 for an arm of 6"),
+            (Corrupted::StrokeCount(600), "stroke_count is 600"),
+            (Corrupted::Exponent(3), "n is 3"),
+            (Corrupted::Delta(f64::NAN), "delta_rad is not finite"),
+            (Corrupted::Duration(0.0), "duration_s is 0"),
+            (Corrupted::Start(-1.0), "start_s is -1"),
+            (Corrupted::Base(f64::INFINITY), "base_rad of joint 0"),
+            (Corrupted::Base(9.0), "limit of joint 1"),
+            (Corrupted::Replaces(7), "replaces code 7"),
+            (Corrupted::Digest(1), "wrong robot"),
         ];
         for (how, words) in table {
-            let spoiled = message(2.0, Replaces::Rest).doctored(how);
+            let spoiled = message(2.0, Replaces::Rest).corrupted(how);
             let sentence = rules.check(&spoiled).unwrap_err().to_string();
             assert!(sentence.contains(words), "{how:?}: {sentence}");
         }

@@ -4,16 +4,16 @@
 //! another, none returns early, none reads a clock: everything is a function of the tick and of what arrived, so a
 //! recorded run replays exactly.
 use crate::buses::Buses;
-use crate::facts::Facts;
+use crate::cycle_state::CycleState;
 use crate::guard::Guard;
 use crate::intake::{Answers, Handover, Intake};
+use crate::referencing::LastPoses;
 use crate::report::Reporter;
-use crate::supervise::{Orders, Supervisor};
+use crate::supervise::{Actions, Supervisor};
 use crate::tick::Tick;
 use crate::track::Track;
-use crate::turns::Memory;
 use taustream_arm::Settings;
-use taustream_drivers::{CanLink, DriveWish};
+use taustream_drivers::{CanLink, DriveTarget};
 
 /// A stage of the cycle, named when it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,8 +112,8 @@ impl Core {
     }
 
     /// Takes the last pose that is known, before the first cycle.
-    pub fn recall(&mut self, memory: &Memory) {
-        self.supervisor.turns_mut().recall(memory);
+    pub fn restore_poses(&mut self, last_poses: &LastPoses) {
+        self.supervisor.referencing_mut().restore_poses(last_poses);
     }
 
     /// The reading ends of the cycle's queues.
@@ -134,25 +134,25 @@ impl Core {
     }
 
     /// Carries out what the judgement asks of the other stages.
-    fn obey(&mut self, orders: &Orders) {
-        if let Some(order) = orders.speed {
+    fn apply(&mut self, actions: &Actions) {
+        if let Some(order) = actions.speed {
             self.track.change_speed(order);
         }
-        if orders.drop_trajectory {
+        if actions.drop_trajectory {
             let spare = self.track.drop_trajectory();
-            self.intake.give_back(spare);
+            self.intake.recycle(spare);
             self.guard.release();
         }
-        if let Some(pose_rad) = &orders.pose_rad {
+        if let Some(pose_rad) = &actions.pose_rad {
             self.track.set_pose(pose_rad);
         }
-        if orders.clear_faults {
+        if actions.clear_faults {
             self.buses.clear_faults();
         }
-        if let Some(sequence) = orders.restore_buses {
-            let links = Handover { sequence, links: self.buses.hand_out(), well: false };
+        if let Some(sequence) = actions.restore_buses {
+            let links = Handover { sequence, links: self.buses.hand_out(), recovered: false };
             if let Some(refused) = self.intake.hand_out(links) {
-                self.buses.take_back(refused.links, false);
+                self.buses.reclaim(refused.links, false);
             }
         }
     }
@@ -172,47 +172,47 @@ pub enum Next {
 /// Runs one cycle, from the newest plan to the report.
 ///
 /// Every stage runs every time. A stage that cannot do its work hands on a value that is safe and writes the reason
-/// into `facts`; only `judge` turns reasons into a change of phase, which steers the next cycle.
+/// into `cycle_state`; only `evaluate` turns reasons into a change of phase, which steers the next cycle.
 ///
 /// Real time: no allocation, no lock, no log line, no clock; system calls are one send and at most two receives a bus.
 pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
-    let mut facts = Facts::begin(tick);
-    let wish = core.supervisor.wish();
+    let mut cycle_state = CycleState::begin(tick);
+    let drive_target = core.supervisor.drive_target();
 
-    let offer = core.intake.subscribe(&mut facts);
-    let restored = core.intake.take_back(&mut facts);
+    let offer = core.intake.subscribe(&mut cycle_state);
+    let restored = core.intake.reclaim(&mut cycle_state);
     probe.ended(Stage::Subscribe);
     let (phase, speed) = (core.supervisor.phase(), core.supervisor.speed());
-    let spare = core.track.splice(offer, phase, speed, &mut facts);
-    core.intake.give_back(spare);
+    let spare = core.track.splice(offer, phase, speed, &mut cycle_state);
+    core.intake.recycle(spare);
     probe.ended(Stage::Splice);
-    let wanted = core.track.sample(wish == DriveWish::Enabled, &mut facts);
+    let requested = core.track.sample(drive_target == DriveTarget::Enabled, &mut cycle_state);
     probe.ended(Stage::Sample);
-    let command = core.guard.limit(&wanted, &mut facts); // The last gate before metal.
+    let command = core.guard.limit(&requested, &mut cycle_state); // The last gate before metal.
     probe.ended(Stage::Guard);
 
-    let told = core.supervisor.turns().tell(command.joints());
-    core.buses.encode(tick.woke, wish, &told);
+    let drive_commands = core.supervisor.referencing().to_drives(command.joints());
+    core.buses.encode(tick.wake_time, drive_target, &drive_commands);
     probe.ended(Stage::Encode);
-    core.buses.send(&mut facts);
-    core.track.commit(&command.setpoint().position_rad, &mut facts);
-    core.guard.commit(&facts);
+    core.buses.send(&mut cycle_state);
+    core.track.commit(&command.setpoint().position_rad, &mut cycle_state);
+    core.guard.commit(&cycle_state);
     probe.ended(Stage::Send);
-    core.buses.receive(tick.woke, &mut facts);
-    core.supervisor.turns_mut().read(&mut facts);
+    core.buses.receive(tick.wake_time, &mut cycle_state);
+    core.supervisor.referencing_mut().read(&mut cycle_state);
     probe.ended(Stage::Receive);
 
     let mut answers: Answers = [None; _];
-    let orders = core.supervisor.judge(&facts, core.intake.leave(), &mut answers);
+    let actions = core.supervisor.evaluate(&cycle_state, core.intake.shutdown(), &mut answers);
     probe.ended(Stage::Supervise);
-    core.reporter.write(&facts, &command, &core.track, (&core.supervisor, &orders));
-    core.intake.answer(facts.verdict, &answers);
-    core.obey(&orders);
+    core.reporter.write(&cycle_state, &command, &core.track, (&core.supervisor, &actions));
+    core.intake.answer(cycle_state.trajectory_result, &answers);
+    core.apply(&actions);
     if let Some(back) = restored {
-        core.buses.take_back(back.links, back.well);
+        core.buses.reclaim(back.links, back.recovered);
     }
     probe.ended(Stage::Report);
-    match orders.leave {
+    match actions.shutdown {
         None => Next::Go,
         Some(true) => Next::Ended,
         Some(false) => Next::EndedAtOnce,

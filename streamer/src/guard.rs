@@ -10,8 +10,8 @@
 //! cycle before. A command that is held back is judged all the same, since the average holds for any step.
 //!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
-use crate::facts::{Braking, Facts, Trip, TripKind};
-use crate::track::Wanted;
+use crate::cycle_state::{Braking, CycleState, Trip, TripKind};
+use crate::track::RequestedSetpoint;
 use taustream_drivers::JointCommand;
 use taustream_motion::brake::{Brake, JointState};
 use taustream_motion::limits::Quantity;
@@ -150,24 +150,24 @@ impl Guard {
     /// Lets a setpoint pass, or replaces it by a braking command and says why.
     ///
     /// Real time: closed forms, no allocation.
-    pub fn limit(&mut self, wanted: &Wanted, facts: &mut Facts) -> GuardedCommand {
+    pub fn limit(&mut self, requested: &RequestedSetpoint, cycle_state: &mut CycleState) -> GuardedCommand {
         #[expect(clippy::cast_precision_loss, reason = "periods between two commands")]
-        let step_s = wanted.periods as f64 * self.period_s;
+        let step_s = requested.periods as f64 * self.period_s;
         self.next_step_s = step_s;
-        self.restarted = wanted.restart;
-        if wanted.restart && self.brake.is_none() {
-            self.remember_at_rest(&wanted.setpoint.position_rad);
+        self.restarted = requested.restart;
+        if requested.restart && self.brake.is_none() {
+            self.remember_at_rest(&requested.setpoint.position_rad);
         }
-        if wanted.live
+        if requested.live
             && self.brake.is_none()
-            && let Some(trip) = self.find_trip(wanted, step_s)
+            && let Some(trip) = self.find_trip(requested, step_s)
         {
-            facts.trip = Some(trip);
+            cycle_state.trip = Some(trip);
             self.brake = Some(self.begin_brake());
         }
         self.next = match self.brake {
-            None => wanted.setpoint,
-            Some(running) => self.braking_command(&running, step_s, facts),
+            None => requested.setpoint,
+            Some(running) => self.braking_command(&running, step_s, cycle_state),
         };
         GuardedCommand::new(self.next)
     }
@@ -175,15 +175,15 @@ impl Guard {
     /// Notes that the command has left.
     ///
     /// Real time: a copy.
-    pub fn commit(&mut self, facts: &Facts) {
-        if !facts.setpoints_left() {
+    pub fn commit(&mut self, cycle_state: &CycleState) {
+        if !cycle_state.setpoints_sent() {
             return;
         }
-        let joints = self.past.iter_mut().zip(self.next.position_rad).zip(facts.held_back);
-        for ((past, position_rad), held_back) in joints {
+        let joints = self.past.iter_mut().zip(self.next.position_rad).zip(cycle_state.not_sent);
+        for ((past, position_rad), not_sent) in joints {
             if self.restarted {
                 *past = Past::at_rest(position_rad, self.period_s);
-            } else if held_back {
+            } else if not_sent {
                 past.waited_s += self.next_step_s;
             } else {
                 past.push(position_rad, past.waited_s + self.next_step_s);
@@ -217,8 +217,8 @@ impl Guard {
         self.good = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
     }
 
-    fn find_trip(&self, wanted: &Wanted, step_s: f64) -> Option<Trip> {
-        let w = &wanted.setpoint;
+    fn find_trip(&self, requested: &RequestedSetpoint, step_s: f64) -> Option<Trip> {
+        let w = &requested.setpoint;
         let values = w.position_rad.iter().zip(&w.velocity_rad_s).zip(&w.acceleration_rad_s2);
         let states = values.map(|((position, velocity), acceleration)| JointState {
             position_rad: *position,
@@ -249,10 +249,10 @@ impl Guard {
         Running { brakes, sent_s: 0.0 }
     }
 
-    fn braking_command(&self, running: &Running, step_s: f64, facts: &mut Facts) -> Setpoint {
+    fn braking_command(&self, running: &Running, step_s: f64, cycle_state: &mut CycleState) -> Setpoint {
         // Behind a stall the drives stand still at the last command: the brake is over there.
-        if facts.frozen {
-            facts.braking = Braking::Rested;
+        if cycle_state.frozen {
+            cycle_state.braking = Braking::Rested;
             let position_rad = self.past.map(|past| past.position_rad[0]);
             return Setpoint { position_rad, ..Setpoint::default() };
         }
@@ -266,10 +266,10 @@ impl Guard {
             setpoint.velocity_rad_s[joint] = state.velocity_rad_s;
             setpoint.acceleration_rad_s2[joint] = state.acceleration_rad_s2;
             setpoint.jerk_rad_s3[joint] = jerk_rad_s3;
-            facts.sweep_rad[joint] = brake.sweep_rad();
+            cycle_state.sweep_rad[joint] = brake.sweep_rad();
         }
-        facts.braking = if rested { Braking::Rested } else { Braking::Running };
-        facts.trajectory_id = 0;
+        cycle_state.braking = if rested { Braking::Rested } else { Braking::Running };
+        cycle_state.trajectory_id = 0;
         setpoint
     }
 }
@@ -362,7 +362,7 @@ mod tests {
 
     /// Feeds one joint's positions with rates that belong to them, and returns the first trip.
     fn first_trip(motion: impl Fn(f64) -> JointState, ticks: u32) -> Option<(u32, Trip)> {
-        first_trip_told_every(1, motion, ticks)
+        first_trip_sent_every(1, motion, ticks)
     }
 
     /// A sine from rest: position 1 - cos, so velocity and acceleration begin at 0 and at its peak.
@@ -388,7 +388,7 @@ mod tests {
     }
 
     /// Feeds positions of which every `every`-th is told, and returns the first trip.
-    fn first_trip_told_every(
+    fn first_trip_sent_every(
         every: u32,
         motion: impl Fn(f64) -> JointState,
         ticks: u32,
@@ -396,30 +396,33 @@ mod tests {
         let mut guard = Guard::new(limits(), 6, 1_000);
         (0..ticks).find_map(|tick| {
             let state = motion(f64::from(tick) * PERIOD_S);
-            let mut facts = Facts::begin(Tick::default());
-            facts.held_back[2] = !tick.is_multiple_of(every);
+            let mut cycle_state = CycleState::begin(Tick::default());
+            cycle_state.not_sent[2] = !tick.is_multiple_of(every);
             let mut setpoint = Setpoint::default();
             setpoint.position_rad[2] = state.position_rad;
             setpoint.velocity_rad_s[2] = state.velocity_rad_s;
             setpoint.acceleration_rad_s2[2] = state.acceleration_rad_s2;
-            guard.limit(&Wanted { setpoint, periods: 1, restart: tick == 0, live: true }, &mut facts);
-            guard.commit(&facts);
-            facts.trip.map(|trip| (tick, trip))
+            guard.limit(
+                &RequestedSetpoint { setpoint, periods: 1, restart: tick == 0, live: true },
+                &mut cycle_state,
+            );
+            guard.commit(&cycle_state);
+            cycle_state.trip.map(|trip| (tick, trip))
         })
     }
 
     #[test]
-    fn guard_with_setpoints_that_take_turns_trips_on_what_the_drive_is_told_and_on_nothing_else() {
+    fn guard_with_decimated_setpoints_trips_on_what_the_drive_is_sent_and_on_nothing_else() {
         let smooth = wave(0.5, 4.0);
         for every in [1, 2, 4, 10] {
-            assert_eq!(first_trip_told_every(every, &smooth, 5_000), None, "every {every}");
+            assert_eq!(first_trip_sent_every(every, &smooth, 5_000), None, "every {every}");
             // A leap of the commands is seen in the cycle in which it comes, told or not.
             let leap = |t: f64| {
                 let state = smooth(t);
                 let by_rad = if t > 1.0 { 0.1 } else { 0.0 };
                 JointState { position_rad: state.position_rad + by_rad, ..state }
             };
-            let (tick, trip) = first_trip_told_every(every, leap, 5_000).unwrap();
+            let (tick, trip) = first_trip_sent_every(every, leap, 5_000).unwrap();
             assert_eq!((tick, trip.joint), (1_001, 2), "every {every}: {trip:?}");
         }
     }
@@ -444,8 +447,8 @@ mod tests {
             ),
         ];
         for (row, (spoil, expected)) in table.into_iter().enumerate() {
-            let doctored = |t: f64| if t > 1.0 { spoil(smooth(t)) } else { smooth(t) };
-            let (tick, trip) = first_trip(doctored, 5_000).unwrap_or_else(|| panic!("row {row} passed"));
+            let corrupted = |t: f64| if t > 1.0 { spoil(smooth(t)) } else { smooth(t) };
+            let (tick, trip) = first_trip(corrupted, 5_000).unwrap_or_else(|| panic!("row {row} passed"));
             assert_eq!((tick, trip.joint), (1_001, 2), "row {row}: {trip:?}");
             assert!(expected(trip.kind), "row {row}: {trip:?}");
         }

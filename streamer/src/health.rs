@@ -3,10 +3,10 @@
 //! A bus that has failed is *silent* from then on: no setpoint leaves on it until `clear-fault` has started it over. Its
 //! drives have stopped where their own watchdogs left them while the other buses went on along the path, so the first
 //! setpoint after an outage would be a step, and whatever still waits in a queue is old. Only torque off is still tried.
-use crate::facts::BusFacts;
+use crate::cycle_state::BusState;
 use taustream_arm::Settings;
 use taustream_drivers::{ErrorFrame, LinkFault};
-use taustream_messages::BusTrouble;
+use taustream_messages::BusFault;
 
 /// Longest history of what was sent, in cycles: a longer wait for confirmations is cut to it.
 const CYCLES_MAX: usize = 64;
@@ -38,8 +38,8 @@ impl Tolerance {
 #[derive(Debug)]
 pub(crate) struct Health {
     tolerance: Tolerance,
-    lost_in_a_row: u32,
-    failed: Option<BusTrouble>,
+    consecutive_lost: u32,
+    failed: Option<BusFault>,
     passive: bool,
     /// Frames handed over since the link was opened.
     sent: u64,
@@ -50,9 +50,9 @@ pub(crate) struct Health {
     error_frames: u64,
 }
 
-/// What one cycle has seen of a link, beside [`BusFacts`].
+/// What one cycle has seen of a link, beside [`BusState`].
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Seen {
+pub(crate) struct BusActivity {
     /// The drives were wished energised: lost setpoints matter.
     pub(crate) live: bool,
     /// Own frames that came back, since the link was opened; `None` where none do.
@@ -68,7 +68,7 @@ impl Health {
     fn with(tolerance: Tolerance) -> Self {
         Self {
             tolerance,
-            lost_in_a_row: 0,
+            consecutive_lost: 0,
             failed: None,
             passive: false,
             sent: 0,
@@ -85,7 +85,7 @@ impl Health {
     }
 
     /// Why, once it has failed.
-    pub(crate) fn failed(&self) -> Option<BusTrouble> {
+    pub(crate) fn failed(&self) -> Option<BusFault> {
         self.failed
     }
 
@@ -98,14 +98,14 @@ impl Health {
     /// Takes an error frame.
     ///
     /// Real time: arithmetic only.
-    pub(crate) fn take_error(&mut self, error: ErrorFrame, found: &mut BusFacts) {
+    pub(crate) fn take_error(&mut self, error: ErrorFrame, found: &mut BusState) {
         self.newest_error = error;
         self.error_frames = self.error_frames.saturating_add(1);
         found.errors += 1;
         if error.is_bus_off() {
-            self.fail(BusTrouble::BusOff);
+            self.fail(BusFault::BusOff);
         } else if error.is_restarted() {
-            self.fail(BusTrouble::Restarted);
+            self.fail(BusFault::Restarted);
         } else if error.is_passive() {
             self.passive = true;
         } else if error.is_recovered() {
@@ -116,27 +116,27 @@ impl Health {
     /// Judges the cycle that ends, and completes its facts.
     ///
     /// Real time: arithmetic only.
-    pub(crate) fn judge(&mut self, seen: Seen, found: &mut BusFacts) {
+    pub(crate) fn evaluate(&mut self, seen: BusActivity, found: &mut BusState) {
         self.sent = self.sent.saturating_add(u64::from(found.sent));
         let confirmed = seen.confirmed.unwrap_or(self.sent);
-        let complete = found.sent == found.wanted;
-        self.lost_in_a_row = if complete { 0 } else { self.lost_in_a_row.saturating_add(1) };
+        let complete = found.sent == found.requested;
+        self.consecutive_lost = if complete { 0 } else { self.consecutive_lost.saturating_add(1) };
         // What was sent so many cycles ago and is not confirmed now is as good as lost.
         let depth = self.tolerance.unconfirmed_cycles;
         self.slot = (self.slot + 1) % CYCLES_MAX;
         self.history[self.slot] = self.sent;
         let overdue = self.history[(self.slot + CYCLES_MAX - depth) % CYCLES_MAX] > confirmed;
         match found.fault {
-            Some(LinkFault::Gone) => self.fail(BusTrouble::Gone),
-            Some(LinkFault::Down) => self.fail(BusTrouble::Down),
-            Some(LinkFault::QueueFull) if self.is_lost(seen) => self.fail(BusTrouble::QueueFull),
-            Some(LinkFault::Os(_)) if self.is_lost(seen) => self.fail(BusTrouble::System),
+            Some(LinkFault::Gone) => self.fail(BusFault::Gone),
+            Some(LinkFault::Down) => self.fail(BusFault::Down),
+            Some(LinkFault::QueueFull) if self.is_lost(seen) => self.fail(BusFault::QueueFull),
+            Some(LinkFault::Os(_)) if self.is_lost(seen) => self.fail(BusFault::System),
             Some(LinkFault::QueueFull | LinkFault::Os(_)) | None if overdue && seen.live => {
-                self.fail(BusTrouble::Unconfirmed);
+                self.fail(BusFault::Unconfirmed);
             }
             Some(LinkFault::QueueFull | LinkFault::Os(_)) | None => {}
         }
-        found.lost_in_a_row = self.lost_in_a_row;
+        found.consecutive_lost = self.consecutive_lost;
         found.in_flight = u32::try_from(self.sent.saturating_sub(confirmed)).unwrap_or(u32::MAX);
         found.failed = self.failed;
         found.passive = self.passive;
@@ -145,23 +145,23 @@ impl Health {
 
     /// Before drives are energised nothing depends on a cycle: drives that have no power yet do not acknowledge, and
     /// waiting for them is no fault.
-    fn is_lost(&self, seen: Seen) -> bool {
-        seen.live && self.lost_in_a_row >= self.tolerance.lost_cycles
+    fn is_lost(&self, seen: BusActivity) -> bool {
+        seen.live && self.consecutive_lost >= self.tolerance.lost_cycles
     }
 
     /// The first trouble is the one to report, unless a later one says more: a lost interface hides behind a full queue.
-    fn fail(&mut self, trouble: BusTrouble) {
-        if self.failed.is_none_or(|before| telling(trouble) > telling(before)) {
-            self.failed = Some(trouble);
+    fn fail(&mut self, bus_fault: BusFault) {
+        if self.failed.is_none_or(|before| severity(bus_fault) > severity(before)) {
+            self.failed = Some(bus_fault);
         }
     }
 }
 
 /// How much a trouble tells of its cause.
-fn telling(trouble: BusTrouble) -> u8 {
-    match trouble {
-        BusTrouble::QueueFull | BusTrouble::Unconfirmed | BusTrouble::System | BusTrouble::ErrorPassive => 0,
-        BusTrouble::Down | BusTrouble::BusOff | BusTrouble::Restarted => 1,
-        BusTrouble::Gone => 2,
+fn severity(bus_fault: BusFault) -> u8 {
+    match bus_fault {
+        BusFault::QueueFull | BusFault::Unconfirmed | BusFault::System | BusFault::ErrorPassive => 0,
+        BusFault::Down | BusFault::BusOff | BusFault::Restarted => 1,
+        BusFault::Gone => 2,
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! Trajectories travel in boxes that are made at start and go round: empty from the cycle to the service thread,
 //! filled back. So nothing is allocated or freed on the real-time thread, and a sender that floods finds no box.
+use crate::answer::CommandAnswer;
 use crate::buses::Links;
-use crate::facts::{Asked, COMMANDS_MAX, Facts, Restored, Verdict};
-use crate::words::Answer;
+use crate::cycle_state::{COMMANDS_MAX, CycleState, PendingCommand, Restored, TrajectoryResult};
 use crossbeam_queue::ArrayQueue;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -17,14 +17,14 @@ const BOXES: usize = 4;
 pub const COMMANDS_PENDING_MAX: usize = 16;
 
 /// The answers of one cycle: to its commands, and to a `clear-fault` of before that waited for a bus.
-pub type Answers = [Option<Answer>; COMMANDS_MAX + 1];
+pub type Answers = [Option<CommandAnswer>; COMMANDS_MAX + 1];
 
 /// A trajectory in its box.
 pub type Boxed = Box<CheckedTrajectory>;
 
 /// How the streamer is asked to end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Leave {
+pub enum Shutdown {
     /// Not at all.
     #[default]
     No,
@@ -41,23 +41,23 @@ pub struct Handover {
     /// The links; none of the buses that are well.
     pub links: Links,
     /// On the way back: every one of them was started over.
-    pub well: bool,
+    pub recovered: bool,
 }
 
 struct Queues {
-    leave: AtomicU8,
+    shutdown: AtomicU8,
     failed_links: ArrayQueue<Handover>,
     restored_links: ArrayQueue<Handover>,
     empty: ArrayQueue<Boxed>,
     filled: ArrayQueue<Boxed>,
-    verdicts: ArrayQueue<Verdict>,
-    asked: ArrayQueue<Asked>,
-    answers: ArrayQueue<Answer>,
+    trajectory_results: ArrayQueue<TrajectoryResult>,
+    pending: ArrayQueue<PendingCommand>,
+    answers: ArrayQueue<CommandAnswer>,
 }
 
 impl std::fmt::Debug for Queues {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Queues").field("leave", &self.leave).finish_non_exhaustive()
+        f.debug_struct("Queues").field("leave", &self.shutdown).finish_non_exhaustive()
     }
 }
 
@@ -67,19 +67,19 @@ pub struct Intake(Arc<Queues>);
 
 /// The service thread's end of the queues.
 #[derive(Debug)]
-pub struct Desk(Arc<Queues>);
+pub struct CommandQueue(Arc<Queues>);
 
 /// Makes both ends, with all boxes at the service thread's.
 #[must_use]
-pub fn pair() -> (Intake, Desk) {
+pub fn pair() -> (Intake, CommandQueue) {
     let queues = Arc::new(Queues {
-        leave: AtomicU8::new(0),
+        shutdown: AtomicU8::new(0),
         failed_links: ArrayQueue::new(1),
         restored_links: ArrayQueue::new(1),
         empty: ArrayQueue::new(BOXES),
         filled: ArrayQueue::new(BOXES),
-        verdicts: ArrayQueue::new(BOXES),
-        asked: ArrayQueue::new(COMMANDS_PENDING_MAX),
+        trajectory_results: ArrayQueue::new(BOXES),
+        pending: ArrayQueue::new(COMMANDS_PENDING_MAX),
         answers: ArrayQueue::new(COMMANDS_PENDING_MAX),
     });
     // One joint and no stroke: a trajectory that the checks of `Trajectory` always let pass.
@@ -95,16 +95,16 @@ pub fn pair() -> (Intake, Desk) {
             break;
         }
     }
-    (Intake(Arc::clone(&queues)), Desk(queues))
+    (Intake(Arc::clone(&queues)), CommandQueue(queues))
 }
 
 impl Intake {
     /// Takes this cycle's commands, and one trajectory if one waits.
     ///
     /// Real time: at most [`COMMANDS_MAX`] commands and one trajectory; no allocation.
-    pub fn subscribe(&mut self, facts: &mut Facts) -> Option<Boxed> {
-        for slot in facts.commands.iter_mut().take(COMMANDS_MAX) {
-            *slot = self.0.asked.pop();
+    pub fn subscribe(&mut self, cycle_state: &mut CycleState) -> Option<Boxed> {
+        for slot in cycle_state.commands.iter_mut().take(COMMANDS_MAX) {
+            *slot = self.0.pending.pop();
         }
         self.0.filled.pop()
     }
@@ -112,7 +112,7 @@ impl Intake {
     /// Hands a box back that the track does not need any more.
     ///
     /// Real time: no allocation; never frees (there is room for every box that exists).
-    pub fn give_back(&mut self, spare: Option<Boxed>) {
+    pub fn recycle(&mut self, spare: Option<Boxed>) {
         if let Some(Err(stranger)) = spare.map(|b| self.0.empty.push(b)) {
             Box::leak(stranger);
         }
@@ -128,9 +128,9 @@ impl Intake {
     /// Takes links that come back.
     ///
     /// Real time: moves pointers.
-    pub fn take_back(&mut self, facts: &mut Facts) -> Option<Handover> {
+    pub fn reclaim(&mut self, cycle_state: &mut CycleState) -> Option<Handover> {
         let back = self.0.restored_links.pop()?;
-        facts.restored = Some(Restored { sequence: back.sequence, well: back.well });
+        cycle_state.restored = Some(Restored { sequence: back.sequence, recovered: back.recovered });
         Some(back)
     }
 
@@ -138,20 +138,20 @@ impl Intake {
     ///
     /// Real time: one atomic load.
     #[must_use]
-    pub fn leave(&self) -> Leave {
-        match self.0.leave.load(Ordering::Relaxed) {
-            0 => Leave::No,
-            1 => Leave::Orderly,
-            _ => Leave::AtOnce,
+    pub fn shutdown(&self) -> Shutdown {
+        match self.0.shutdown.load(Ordering::Relaxed) {
+            0 => Shutdown::No,
+            1 => Shutdown::Orderly,
+            _ => Shutdown::AtOnce,
         }
     }
 
     /// Answers the trajectory and the commands of a cycle. Every box and every command has room for its answer.
     ///
     /// Real time: no allocation.
-    pub fn answer(&mut self, verdict: Option<Verdict>, answers: &Answers) {
-        if let Some(verdict) = verdict {
-            self.0.verdicts.force_push(verdict);
+    pub fn answer(&mut self, trajectory_result: Option<TrajectoryResult>, answers: &Answers) {
+        if let Some(trajectory_result) = trajectory_result {
+            self.0.trajectory_results.force_push(trajectory_result);
         }
         for answer in answers.iter().flatten() {
             self.0.answers.force_push(*answer);
@@ -159,7 +159,7 @@ impl Intake {
     }
 }
 
-impl Desk {
+impl CommandQueue {
     /// An empty box to fill, if one is free.
     #[must_use]
     pub fn empty_box(&self) -> Option<Boxed> {
@@ -170,19 +170,19 @@ impl Desk {
     pub fn offer(&self, filled: Boxed) {
         // A box came out of `empty`, so there is room in `filled` for it.
         if let Err(refused) = self.0.filled.push(filled) {
-            self.put_back(refused);
+            self.return_unused(refused);
         }
     }
 
     /// Puts an unused box back.
-    pub fn put_back(&self, unused: Boxed) {
+    pub fn return_unused(&self, unused: Boxed) {
         drop(self.0.empty.push(unused));
     }
 
     /// Asks the cycle; false when too many commands are on their way.
     #[must_use]
-    pub fn ask(&self, asked: Asked) -> bool {
-        self.0.asked.push(asked).is_ok()
+    pub fn push_command(&self, pending: PendingCommand) -> bool {
+        self.0.pending.push(pending).is_ok()
     }
 
     /// Links that are to be started over.
@@ -192,42 +192,42 @@ impl Desk {
     }
 
     /// Gives links back to the cycle.
-    pub fn give_back_links(&self, links: Handover) {
+    pub fn return_links(&self, links: Handover) {
         // One handover is on its way at a time, so there is room.
         drop(self.0.restored_links.push(links));
     }
 
     /// A handle by which another thread asks the cycle to end.
     #[must_use]
-    pub fn leaver(&self) -> Leaver {
-        Leaver(Arc::clone(&self.0))
+    pub fn shutdown_handle(&self) -> ShutdownHandle {
+        ShutdownHandle(Arc::clone(&self.0))
     }
 
     /// The next answer to a command.
     #[must_use]
-    pub fn answer(&self) -> Option<Answer> {
+    pub fn answer(&self) -> Option<CommandAnswer> {
         self.0.answers.pop()
     }
 
     /// The next answer to a trajectory.
     #[must_use]
-    pub fn verdict(&self) -> Option<Verdict> {
-        self.0.verdicts.pop()
+    pub fn trajectory_result(&self) -> Option<TrajectoryResult> {
+        self.0.trajectory_results.pop()
     }
 }
 
 /// Asks the cycle to end.
 #[derive(Clone, Debug)]
-pub struct Leaver(Arc<Queues>);
+pub struct ShutdownHandle(Arc<Queues>);
 
-impl Leaver {
+impl ShutdownHandle {
     /// Asks; a stronger wish replaces a weaker one.
-    pub fn ask(&self, leave: Leave) {
-        let wish = match leave {
-            Leave::No => 0,
-            Leave::Orderly => 1,
-            Leave::AtOnce => 2,
+    pub fn request(&self, shutdown: Shutdown) {
+        let level = match shutdown {
+            Shutdown::No => 0,
+            Shutdown::Orderly => 1,
+            Shutdown::AtOnce => 2,
         };
-        self.0.leave.fetch_max(wish, Ordering::Relaxed);
+        self.0.shutdown.fetch_max(level, Ordering::Relaxed);
     }
 }

@@ -8,28 +8,28 @@
 //! This is not a safety function: its stops are best effort by software over a bus.
 #![deny(unsafe_code)]
 
+pub mod answer;
 pub mod approach;
 pub mod arguments;
 pub mod bench;
 pub mod buses;
 pub mod check;
 pub mod cycle;
-pub mod facts;
+pub mod cycle_state;
 pub mod guard;
 mod health;
 pub mod intake;
 pub mod log;
-pub mod memory;
 pub mod names;
 mod operator;
 pub mod phases;
+pub mod pose_store;
 pub mod recorder;
+pub mod referencing;
 pub mod report;
 pub mod rt;
 pub mod service;
 pub mod supervise;
 pub mod tick;
 pub mod track;
-pub mod turns;
 pub mod watch;
-pub mod words;

@@ -1,5 +1,5 @@
 //! Notes of the cycle as lines of the log.
-use crate::facts::{Transition, TripKind};
+use crate::cycle_state::{Transition, TripKind};
 use crate::names::Names;
 use crate::report::Note;
 use taustream_messages::Phase;
@@ -28,13 +28,13 @@ pub fn note(note: &Note, names: &Names) {
             "{}: {} ({count} error frames since the last such line); {}",
             names.bus(*bus),
             error.sentence(),
-            error.cure()
+            error.remedy()
         ),
-        Note::BusFailed { bus, trouble } => error!(
+        Note::BusFailed { bus, bus_fault } => error!(
             "{}: {}; it is silent until `clear-fault`; {}",
             names.bus(*bus),
-            trouble.word(),
-            trouble.cure(names.interface(*bus))
+            bus_fault.word(),
+            bus_fault.remedy(names.interface(*bus))
         ),
         Note::Stall { gap_s } => warn!("no setpoint left for {gap_s:.4} s: trajectory time stands still"),
     }

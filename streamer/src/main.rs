@@ -16,8 +16,8 @@ use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
-use taustream_streamer::intake::{self, Desk, Leave, Leaver};
-use taustream_streamer::memory::{self, Keeper};
+use taustream_streamer::intake::{self, CommandQueue, Shutdown, ShutdownHandle};
+use taustream_streamer::pose_store::{self, PoseStore};
 use taustream_streamer::recorder::{Candidate, Recorder};
 use taustream_streamer::report::Readers;
 use taustream_streamer::rt;
@@ -50,14 +50,14 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
     let buses = open_buses(&settings, arguments.link)?;
     let described = buses.describe();
-    let (queues, desk) = intake::pair();
-    let leaver = desk.leaver();
+    let (queues, command_queue) = intake::pair();
+    let shutdown_handle = command_queue.shutdown_handle();
     let recording = arguments.cycle_log.is_some();
     let mut core = Core::new(&settings, buses, queues, recording);
     let state = last_pose::directory(arguments.state_dir.as_deref());
-    core.recall(&memory::recall(&settings, &state));
-    let keeper =
-        Keeper::start(&settings, state).context("cannot start the thread that keeps the last pose")?;
+    core.restore_poses(&pose_store::restore_poses(&settings, &state));
+    let pose_store =
+        PoseStore::start(&settings, state).context("cannot start the thread that keeps the last pose")?;
     let readers = core.readers();
 
     lock_memory(arguments.allow_non_realtime)?;
@@ -72,8 +72,9 @@ fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
     let settings = Arc::new(settings);
     let stop = Arc::new(AtomicBool::new(false));
     let candidates = recording.then_some(candidates);
-    let service = start_service(&settings, (desk, readers), candidates, keeper, Arc::clone(&stop))?;
-    forward_signals(leaver)?;
+    let service =
+        start_service(&settings, (command_queue, readers), candidates, pose_store, Arc::clone(&stop))?;
+    forward_signals(shutdown_handle)?;
 
     let outcome = run_real_time(core, &settings, arguments.allow_non_realtime, &described);
     stop.store(true, Ordering::Release);
@@ -110,17 +111,17 @@ fn lock_memory(allowed_without: bool) -> Result<()> {
 
 fn start_service(
     settings: &Arc<Settings>,
-    (desk, readers): (Desk, Readers),
+    (command_queue, readers): (CommandQueue, Readers),
     candidates: Option<Sender<Candidate>>,
-    keeper: Keeper,
+    pose_store: PoseStore,
     stop: Arc<AtomicBool>,
 ) -> Result<thread::JoinHandle<()>> {
     let (opened, result) = channel();
     let settings = Arc::clone(settings);
-    let work = move || match Service::open(&settings, desk, readers, candidates) {
+    let work = move || match Service::open(&settings, command_queue, readers, candidates) {
         Ok(service) => {
             let _ = opened.send(Ok(()));
-            service.keeping(keeper).serve(&stop);
+            service.keeping(pose_store).serve(&stop);
         }
         Err(e) => {
             let _ = opened.send(Err(e));
@@ -131,12 +132,12 @@ fn start_service(
     Ok(thread)
 }
 
-fn forward_signals(leaver: Leaver) -> Result<()> {
+fn forward_signals(shutdown_handle: ShutdownHandle) -> Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let work = move || {
         for (count, _) in signals.forever().enumerate() {
             Manager::stopping();
-            leaver.ask(if count == 0 { Leave::Orderly } else { Leave::AtOnce });
+            shutdown_handle.request(if count == 0 { Shutdown::Orderly } else { Shutdown::AtOnce });
         }
     };
     thread::Builder::new().name("signals".into()).stack_size(256 << 10).spawn(work)?;

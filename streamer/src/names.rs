@@ -3,7 +3,7 @@
 use taustream_arm::Settings;
 use taustream_drivers::ErrorFrame;
 use taustream_drivers::bring_up::{explain, explain_refusal};
-use taustream_messages::{BusReport, BusTrouble, Cause, Evidence};
+use taustream_messages::{BusFault, BusReport, Cause, Evidence};
 
 /// A bus as its settings name it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -71,38 +71,38 @@ impl Names {
             Evidence::DriveError(code) => format!(": {}", explain(code)),
             Evidence::Refusal { code, object } => format!(": {}", explain_refusal(code, object)),
             Evidence::Statusword(word) => format!(": {word:#06x}"),
-            Evidence::Bus(trouble) => format!(": {}", self.trouble(cause, trouble)),
+            Evidence::Bus(bus_fault) => format!(": {}", self.bus_fault(cause, bus_fault)),
             Evidence::Value(value) => format!(": {value:.6}"),
             Evidence::Amount { value, limit } => format!(": {value:.6} against {limit:.6}"),
         };
         format!("{}{place}{evidence}", cause.reason.word())
     }
 
-    fn trouble(&self, cause: &Cause, trouble: Option<BusTrouble>) -> String {
-        let Some(trouble) = trouble else {
+    fn bus_fault(&self, cause: &Cause, bus_fault: Option<BusFault>) -> String {
+        let Some(bus_fault) = bus_fault else {
             return format!("trouble {} of another release", cause.code);
         };
-        let count = match trouble {
-            BusTrouble::QueueFull | BusTrouble::System => format!(" for {} cycles in a row", cause.value),
-            BusTrouble::Unconfirmed => format!(", {} in flight", cause.value),
-            BusTrouble::Down
-            | BusTrouble::Gone
-            | BusTrouble::BusOff
-            | BusTrouble::Restarted
-            | BusTrouble::ErrorPassive => String::new(),
+        let count = match bus_fault {
+            BusFault::QueueFull | BusFault::System => format!(" for {} cycles in a row", cause.value),
+            BusFault::Unconfirmed => format!(", {} in flight", cause.value),
+            BusFault::Down
+            | BusFault::Gone
+            | BusFault::BusOff
+            | BusFault::Restarted
+            | BusFault::ErrorPassive => String::new(),
         };
-        let cure = trouble.cure(cause.bus.map_or("IFACE", |bus| self.interface(bus)));
-        format!("{}{count}; {cure}", trouble.word())
+        let remedy = bus_fault.remedy(cause.bus.map_or("IFACE", |bus| self.interface(bus)));
+        format!("{}{count}; {remedy}", bus_fault.word())
     }
 
     /// The state of a bus: "well", or what is wrong with it and what its controller said last.
     #[must_use]
     pub fn bus_state(&self, bus: usize, report: &BusReport) -> String {
-        let state = match report.trouble() {
+        let state = match report.bus_fault() {
             None => "well".to_owned(),
-            Some(trouble) => {
+            Some(bus_fault) => {
                 let silent = if report.silent == 0 { "" } else { ", silent until `clear-fault`" };
-                format!("{}{silent}; {}", trouble.word(), trouble.cure(self.interface(bus)))
+                format!("{}{silent}; {}", bus_fault.word(), bus_fault.remedy(self.interface(bus)))
             }
         };
         let error = ErrorFrame { class: report.error_class, data: report.error_data };
@@ -160,16 +160,16 @@ mod tests {
                 "setpoint failed the guard at joint 8: NaN against 1.000000",
             ),
             (
-                Cause::bus(0, BusTrouble::Down, 0.0, 0.0),
+                Cause::bus(0, BusFault::Down, 0.0, 0.0),
                 "bus fault on bus `arm` (can3): interface is down (ENETDOWN); bring it up: ip link set can3 up",
             ),
             (
-                Cause::bus(0, BusTrouble::QueueFull, 3.0, 3.0),
+                Cause::bus(0, BusFault::QueueFull, 3.0, 3.0),
                 "bus fault on bus `arm` (can3): transmit queue full (ENOBUFS) for 3 cycles in a row; see that the drives \
                  are powered, the cable is whole, both ends are terminated and the bit rate is theirs",
             ),
             (
-                Cause { code: 99, ..Cause::bus(4, BusTrouble::Gone, 0.0, 0.0) },
+                Cause { code: 99, ..Cause::bus(4, BusFault::Gone, 0.0, 0.0) },
                 "bus fault on bus 5: trouble 99 of another release",
             ),
         ];
@@ -179,22 +179,22 @@ mod tests {
     }
 
     #[test]
-    fn bus_state_tells_trouble_cure_and_newest_error() {
-        let well = BusReport::default();
-        assert_eq!(names().bus_state(0, &well), "well");
+    fn bus_state_names_fault_remedy_and_newest_error() {
+        let recovered = BusReport::default();
+        assert_eq!(names().bus_state(0, &recovered), "well");
         let off = BusReport {
-            trouble: BusTrouble::BusOff.code(),
+            bus_fault: BusFault::BusOff.code(),
             silent: 1,
             error_frames: 2,
             error_class: 0x240,
             error_data: [0, 0, 0, 0, 0, 0, 248, 3],
-            ..well
+            ..recovered
         };
         let text = names().bus_state(0, &off);
         for part in ["bus-off", "silent until `clear-fault`", "ip link set can3 type can restart", "tx=248"] {
             assert!(text.contains(part), "no `{part}` in: {text}");
         }
-        let foreign = BusReport { trouble: 77, ..well };
+        let foreign = BusReport { bus_fault: 77, ..recovered };
         assert!(!names().bus_state(0, &foreign).starts_with("well"));
     }
 }

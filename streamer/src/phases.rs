@@ -14,9 +14,9 @@ pub enum Event {
     /// Drives were found holding from before this start, and are ours.
     HoldAdopted,
     /// The operator asked for energised drives.
-    EnableAsked,
+    EnableRequested,
     /// The operator asked for adopted drives to be taken over.
-    TakeOverAsked,
+    AdoptRequested,
     /// Every drive is energised and follows.
     DrivesEnabled,
     /// A trajectory was accepted.
@@ -24,11 +24,11 @@ pub enum Event {
     /// The trajectory has been run to its end.
     EndReached,
     /// The operator asked for a pause.
-    PauseAsked,
+    PauseRequested,
     /// The operator asked to go on.
-    ResumeAsked,
+    ResumeRequested,
     /// The operator asked to stop.
-    StopAsked,
+    StopRequested,
     /// sigma has come to 0, or the brake to its end.
     AtRest,
     /// The loop stalled for too long to go on by itself.
@@ -44,7 +44,7 @@ pub enum Event {
     /// The fault is cleared and nothing is energised.
     ClearedOff,
     /// The operator asked for de-energised drives.
-    DisableAsked,
+    DisableRequested,
     /// Every drive is de-energised.
     DrivesDisabled,
 }
@@ -55,14 +55,14 @@ impl Event {
         Self::DrivesReady,
         Self::DrivesLost,
         Self::HoldAdopted,
-        Self::EnableAsked,
-        Self::TakeOverAsked,
+        Self::EnableRequested,
+        Self::AdoptRequested,
         Self::DrivesEnabled,
         Self::Accepted,
         Self::EndReached,
-        Self::PauseAsked,
-        Self::ResumeAsked,
-        Self::StopAsked,
+        Self::PauseRequested,
+        Self::ResumeRequested,
+        Self::StopRequested,
         Self::AtRest,
         Self::StalledLong,
         Self::StopFault,
@@ -70,7 +70,7 @@ impl Event {
         Self::HardFault,
         Self::ClearedHolding,
         Self::ClearedOff,
-        Self::DisableAsked,
+        Self::DisableRequested,
         Self::DrivesDisabled,
     ];
 
@@ -81,14 +81,14 @@ impl Event {
             Self::DrivesReady => "drives ready",
             Self::DrivesLost => "a drive is not ready any more",
             Self::HoldAdopted => "drives found holding are adopted",
-            Self::EnableAsked => "enable asked",
-            Self::TakeOverAsked => "take-over asked",
+            Self::EnableRequested => "enable asked",
+            Self::AdoptRequested => "take-over asked",
             Self::DrivesEnabled => "drives energised",
             Self::Accepted => "trajectory accepted",
             Self::EndReached => "end of trajectory",
-            Self::PauseAsked => "pause asked",
-            Self::ResumeAsked => "resume asked",
-            Self::StopAsked => "stop asked",
+            Self::PauseRequested => "pause asked",
+            Self::ResumeRequested => "resume asked",
+            Self::StopRequested => "stop asked",
             Self::AtRest => "at rest",
             Self::StalledLong => "loop stalled",
             Self::StopFault => "fast stop",
@@ -96,7 +96,7 @@ impl Event {
             Self::HardFault => "fault",
             Self::ClearedHolding => "fault cleared, drives hold",
             Self::ClearedOff => "fault cleared, drives off",
-            Self::DisableAsked => "disable asked",
+            Self::DisableRequested => "disable asked",
             Self::DrivesDisabled => "drives de-energised",
         }
     }
@@ -118,16 +118,16 @@ pub fn next(phase: Phase, event: Event) -> Option<Phase> {
             P::Disabled
         }
         (P::Disabled, E::DrivesLost) => P::Configuring,
-        (P::Disabled, E::EnableAsked) | (P::Locked, E::TakeOverAsked) => P::Enabling,
-        (P::Enabling, E::DrivesEnabled) | (P::Locked, E::EnableAsked) => P::Holding,
+        (P::Disabled, E::EnableRequested) | (P::Locked, E::AdoptRequested) => P::Enabling,
+        (P::Enabling, E::DrivesEnabled) | (P::Locked, E::EnableRequested) => P::Holding,
 
-        (P::Holding, E::Accepted) | (P::Pausing | P::Paused, E::ResumeAsked) => P::Moving,
+        (P::Holding, E::Accepted) | (P::Pausing | P::Paused, E::ResumeRequested) => P::Moving,
         (P::Moving | P::Pausing | P::Stopping, E::EndReached)
         | (P::Stopping, E::AtRest)
-        | (P::Paused, E::StopAsked) => P::Holding,
-        (P::Moving, E::PauseAsked) => P::Pausing,
+        | (P::Paused, E::StopRequested) => P::Holding,
+        (P::Moving, E::PauseRequested) => P::Pausing,
         (P::Pausing, E::AtRest) | (P::Moving, E::StalledLong) => P::Paused,
-        (P::Moving | P::Pausing, E::StopAsked) => P::Stopping,
+        (P::Moving | P::Pausing, E::StopRequested) => P::Stopping,
 
         (P::Moving | P::Pausing | P::Stopping, E::StopFault) => P::FastStopping,
         (P::Moving | P::Pausing | P::Stopping | P::FastStopping, E::GuardTrip) => P::Braking,
@@ -137,7 +137,7 @@ pub fn next(phase: Phase, event: Event) -> Option<Phase> {
         | (P::Braking, E::AtRest) => P::Fault,
 
         (P::Fault, E::ClearedHolding) | (P::Configuring | P::Disabled, E::HoldAdopted) => P::Locked,
-        (P::Holding | P::Paused | P::Locked | P::Enabling, E::DisableAsked) => P::Disabling,
+        (P::Holding | P::Paused | P::Locked | P::Enabling, E::DisableRequested) => P::Disabling,
         _ => return None,
     })
 }

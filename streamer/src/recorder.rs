@@ -4,7 +4,7 @@
 //! logged time and compare with what was encoded. Writing never holds the cycle up: what does not fit into the queue
 //! is counted, and the count is a line of the log.
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
-use crate::facts::Transition;
+use crate::cycle_state::Transition;
 use crate::report::{CycleRecord, Record};
 use crossbeam_queue::ArrayQueue;
 use serde_json::{Value, json};
@@ -65,11 +65,11 @@ impl Recorder {
         }))?;
         log.out.flush()?;
         let stop = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&stop);
+        let pending = Arc::clone(&stop);
         let work = move || {
             loop {
                 // Read before the queue is emptied: what was pushed before the wish is still written.
-                let last = asked.load(Ordering::Acquire);
+                let last = pending.load(Ordering::Acquire);
                 log.take(&records, &candidates)?;
                 if last {
                     return log.out.flush();
@@ -115,7 +115,7 @@ impl Log {
                     self.accepted(tick, trajectory_id, &start_offset_rad)?;
                 }
                 Record::Transition(transition) => self.line(&phase_line(&transition))?,
-                Record::Cycle(cycle) => self.line(&self.cycle_line(&cycle))?,
+                Record::CycleSettings(cycle) => self.line(&self.cycle_line(&cycle))?,
                 Record::Lost(count) => self.line(&json!({ "event": "lost", "records": count }))?,
             }
         }
@@ -166,7 +166,7 @@ fn phase_line(t: &Transition) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facts::{BUSES_MAX, Cause};
+    use crate::cycle_state::{BUSES_MAX, Cause};
     use crate::phases::Event;
     use std::sync::mpsc::channel;
     use taustream_messages::{FaultReason, Phase};
@@ -211,7 +211,7 @@ mod tests {
         let start_offset_rad = [0.0; MAX_JOINTS];
         queue.push(Record::Accepted { tick: 41, trajectory_id: 7, start_offset_rad }).unwrap();
         let position_rad = trajectory.sample(0.777).position_rad;
-        queue.push(Record::Cycle(cycle(41, position_rad))).unwrap();
+        queue.push(Record::CycleSettings(cycle(41, position_rad))).unwrap();
         let cause = Some(Cause::new(FaultReason::FeedbackLate).at_joint(2).amount(0.021, 0.02));
         let (from, to, event) = (Phase::Moving, Phase::FastStopping, Event::StopFault);
         queue.push(Record::Transition(Transition { tick: 42, from, to, event, cause })).unwrap();

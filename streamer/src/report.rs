@@ -2,15 +2,15 @@
 //!
 //! Everything is a plain value pushed into a bounded queue. A full queue drops the newest value and counts it: the
 //! cycle never waits for a reader.
-use crate::facts::{BUSES_MAX, BusFacts, Decision};
-use crate::facts::{Facts, TRANSITIONS_MAX, Transition, Trip};
+use crate::cycle_state::{BUSES_MAX, BusState, Decision};
+use crate::cycle_state::{CycleState, TRANSITIONS_MAX, Transition, Trip};
 use crate::guard::GuardedCommand;
-use crate::supervise::{Orders, Supervisor, is_energised};
+use crate::supervise::{Actions, Supervisor, is_energised};
 use crate::track::Track;
 use crossbeam_queue::ArrayQueue;
 use std::sync::Arc;
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusTrouble, LAYOUT_VERSION, Phase, Report, RobotDigest};
+use taustream_messages::{BusFault, LAYOUT_VERSION, Phase, Report, RobotDigest};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Reports that may wait for the service thread.
@@ -57,7 +57,7 @@ pub enum Note {
         /// Index of the bus.
         bus: usize,
         /// Why.
-        trouble: BusTrouble,
+        bus_fault: BusFault,
     },
     /// No setpoint left for longer than the drives bridge.
     Stall {
@@ -109,7 +109,7 @@ pub enum Record {
     /// The phase changed.
     Transition(Transition),
     /// A cycle sent setpoints.
-    Cycle(CycleRecord),
+    CycleSettings(CycleRecord),
     /// This many records found the queue full.
     Lost(u64),
 }
@@ -150,7 +150,7 @@ struct NotedBus {
     error: ErrorFrame,
     error_frames: u64,
     tick: u64,
-    failed: Option<BusTrouble>,
+    failed: Option<BusFault>,
 }
 
 /// The trajectory that runs or ran last.
@@ -167,7 +167,7 @@ impl Reporter {
     pub fn new(
         digest: RobotDigest,
         (joints, buses): (usize, usize),
-        cycle: &taustream_arm::settings::Cycle,
+        cycle: &taustream_arm::settings::CycleSettings,
         recording: bool,
     ) -> Self {
         let period_ns = u64::from(cycle.period_us.max(1)) * 1_000;
@@ -214,45 +214,48 @@ impl Reporter {
     /// Real time: copies into queues; never waits, never allocates.
     pub fn write(
         &mut self,
-        facts: &Facts,
+        cycle_state: &CycleState,
         command: &GuardedCommand,
         track: &Track,
-        judged: (&Supervisor, &Orders),
+        supervision: (&Supervisor, &Actions),
     ) {
-        let (supervisor, orders) = judged;
-        let stalls = self.stalls_now(facts);
-        self.count(facts, stalls);
-        let joints = self.reached_rad.iter_mut().zip(&facts.commanded_rad).zip(&facts.out_of_reach);
-        for ((reached_rad, commanded_rad), out_of_reach) in joints {
-            if !out_of_reach {
+        let (supervisor, actions) = supervision;
+        let stalls = self.stalls_now(cycle_state);
+        self.count(cycle_state, stalls);
+        let joints =
+            self.reached_rad.iter_mut().zip(&cycle_state.commanded_rad).zip(&cycle_state.unreachable);
+        for ((reached_rad, commanded_rad), unreachable) in joints {
+            if !unreachable {
                 *reached_rad = *commanded_rad;
             }
         }
         if let Some(running) = track.running() {
             let duration_s = running.trajectory.duration_s();
-            self.last_running = Running { id: running.trajectory_id, s: facts.trajectory_s, duration_s };
+            self.last_running =
+                Running { id: running.trajectory_id, s: cycle_state.trajectory_s, duration_s };
         }
-        let timing = Timing { lateness_ns: facts.tick.lateness_ns(), cycle_ns: facts.tick.last_cycle_ns };
+        let timing =
+            Timing { lateness_ns: cycle_state.tick.lateness_ns(), cycle_ns: cycle_state.tick.last_cycle_ns };
         let _ = self.queues.timings.push(timing);
-        self.write_notes(facts, &orders.transitions);
+        self.write_notes(cycle_state, &actions.transitions);
         if self.recording {
-            self.write_records(facts, command, track, judged);
+            self.write_records(cycle_state, command, track, supervision);
         }
-        let changed = orders.transitions[0].is_some() || facts.verdict.is_some();
-        if changed || facts.tick.number >= self.next_tick {
-            self.next_tick = facts.tick.number + self.every_ticks;
-            let _ = self.queues.reports.push(self.report(facts, command, track, supervisor));
+        let changed = actions.transitions[0].is_some() || cycle_state.trajectory_result.is_some();
+        if changed || cycle_state.tick.number >= self.next_tick {
+            self.next_tick = cycle_state.tick.number + self.every_ticks;
+            let _ = self.queues.reports.push(self.report(cycle_state, command, track, supervisor));
         }
     }
 
-    fn count(&mut self, facts: &Facts, stalls: bool) {
+    fn count(&mut self, cycle_state: &CycleState, stalls: bool) {
         let c = &mut self.counts;
         c.cycles += 1;
-        c.cycles_skipped += facts.tick.skipped;
-        c.cycles_late += u64::from(facts.tick.lateness_ns() > self.period_ns / 2);
-        c.guard_trips += u64::from(facts.trip.is_some());
+        c.cycles_skipped += cycle_state.tick.skipped;
+        c.cycles_late += u64::from(cycle_state.tick.lateness_ns() > self.period_ns / 2);
+        c.guard_trips += u64::from(cycle_state.trip.is_some());
         c.stalls += u64::from(stalls);
-        for (found, bus) in facts.buses.iter().zip(&mut c.buses) {
+        for (found, bus) in cycle_state.buses.iter().zip(&mut c.buses) {
             let lost = u64::from(lost_frames(found));
             bus.frames_sent += u64::from(found.sent);
             bus.frames_lost += lost;
@@ -266,44 +269,44 @@ impl Reporter {
     }
 
     /// The trajectory begins to stand still because the loop was late; a failed bus is told as what it is.
-    fn stalls_now(&self, facts: &Facts) -> bool {
-        facts.frozen && !self.frozen_before && facts.failed_bus().is_none()
+    fn stalls_now(&self, cycle_state: &CycleState) -> bool {
+        cycle_state.frozen && !self.frozen_before && cycle_state.failed_bus().is_none()
     }
 
     /// Notes what a controller tells: what is new at most ten times a second, the same again once a second, with its
     /// count, so that a flood of error frames does not flood the log.
-    fn note_buses(&mut self, facts: &Facts) {
+    fn note_buses(&mut self, cycle_state: &CycleState) {
         let second_ticks = 1_000_000_000 / self.period_ns;
-        for (bus, (found, noted)) in facts.buses.iter().zip(&mut self.noted).enumerate() {
+        for (bus, (found, noted)) in cycle_state.buses.iter().zip(&mut self.noted).enumerate() {
             if found.failed != noted.failed {
                 noted.failed = found.failed;
-                if let Some(trouble) = found.failed {
-                    let _ = self.queues.notes.push(Note::BusFailed { bus, trouble });
+                if let Some(bus_fault) = found.failed {
+                    let _ = self.queues.notes.push(Note::BusFailed { bus, bus_fault });
                 }
             }
             let count = found.error_frames.saturating_sub(noted.error_frames);
             let is_new = kind(found.newest_error) != kind(noted.error);
             let rest_ticks = if is_new { second_ticks / 10 } else { second_ticks };
             let is_due =
-                noted.error_frames == 0 || facts.tick.number.saturating_sub(noted.tick) >= rest_ticks;
+                noted.error_frames == 0 || cycle_state.tick.number.saturating_sub(noted.tick) >= rest_ticks;
             if count > 0 && is_due {
                 let error = found.newest_error;
                 (noted.error, noted.error_frames, noted.tick) =
-                    (error, found.error_frames, facts.tick.number);
+                    (error, found.error_frames, cycle_state.tick.number);
                 let _ = self.queues.notes.push(Note::BusError { bus, error, count });
             }
         }
     }
 
-    fn write_notes(&mut self, facts: &Facts, transitions: &[Option<Transition>; TRANSITIONS_MAX]) {
-        if let Some(trip) = facts.trip {
-            let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: facts.sweep_rad });
+    fn write_notes(&mut self, cycle_state: &CycleState, transitions: &[Option<Transition>; TRANSITIONS_MAX]) {
+        if let Some(trip) = cycle_state.trip {
+            let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: cycle_state.sweep_rad });
         }
-        self.note_buses(facts);
-        if self.stalls_now(facts) {
-            let _ = self.queues.notes.push(Note::Stall { gap_s: facts.gap_s });
+        self.note_buses(cycle_state);
+        if self.stalls_now(cycle_state) {
+            let _ = self.queues.notes.push(Note::Stall { gap_s: cycle_state.gap_s });
         }
-        self.frozen_before = facts.frozen;
+        self.frozen_before = cycle_state.frozen;
         for transition in transitions.iter().flatten() {
             let _ = self.queues.notes.push(Note::Transition(*transition));
         }
@@ -311,33 +314,37 @@ impl Reporter {
 
     fn write_records(
         &mut self,
-        facts: &Facts,
+        cycle_state: &CycleState,
         command: &GuardedCommand,
         track: &Track,
-        (supervisor, orders): (&Supervisor, &Orders),
+        (supervisor, actions): (&Supervisor, &Actions),
     ) {
-        if let Some(verdict) = facts.verdict
-            && let Decision::Accepted { tick } = verdict.decision
+        if let Some(trajectory_result) = cycle_state.trajectory_result
+            && let Decision::Accepted { tick } = trajectory_result.decision
         {
             let start_offset_rad = *track.start_offset_rad();
-            self.record(Record::Accepted { tick, trajectory_id: verdict.trajectory_id, start_offset_rad });
+            self.record(Record::Accepted {
+                tick,
+                trajectory_id: trajectory_result.trajectory_id,
+                start_offset_rad,
+            });
         }
-        for transition in orders.transitions.iter().flatten() {
+        for transition in actions.transitions.iter().flatten() {
             self.record(Record::Transition(*transition));
         }
-        if facts.live {
-            self.record(Record::Cycle(CycleRecord {
-                tick: facts.tick.number,
-                time_ns: facts.tick.woke.0,
-                syncs: facts.buses.map(|b| b.syncs),
-                frames: facts.buses.map(|b| b.frames),
+        if cycle_state.live {
+            self.record(Record::CycleSettings(CycleRecord {
+                tick: cycle_state.tick.number,
+                time_ns: cycle_state.tick.wake_time.0,
+                syncs: cycle_state.buses.map(|b| b.syncs),
+                frames: cycle_state.buses.map(|b| b.frames),
                 phase: supervisor.phase(),
-                trajectory_id: facts.trajectory_id,
-                s: if facts.trajectory_id == 0 { 0.0 } else { facts.trajectory_s },
-                sigma: facts.scale.sigma,
+                trajectory_id: cycle_state.trajectory_id,
+                s: if cycle_state.trajectory_id == 0 { 0.0 } else { cycle_state.trajectory_s },
+                sigma: cycle_state.scale.sigma,
                 position_rad: command.setpoint().position_rad,
-                sent: facts.buses.map(|b| b.sent),
-                lost: facts.buses.map(|b| lost_frames(&b)),
+                sent: cycle_state.buses.map(|b| b.sent),
+                lost: cycle_state.buses.map(|b| lost_frames(&b)),
             }));
         }
     }
@@ -353,7 +360,7 @@ impl Reporter {
 
     fn report(
         &self,
-        facts: &Facts,
+        cycle_state: &CycleState,
         command: &GuardedCommand,
         track: &Track,
         supervisor: &Supervisor,
@@ -362,21 +369,22 @@ impl Reporter {
         let (tracking_error_rad, tracking_error_rad_max) = supervisor.watch().tracking_rad();
         let joints = self.counts.joints();
         let mut r = self.counts;
-        (r.tick, r.time_ns, r.phase) = (facts.tick.number, facts.tick.woke.0, supervisor.phase().code());
+        (r.tick, r.time_ns, r.phase) =
+            (cycle_state.tick.number, cycle_state.tick.wake_time.0, supervisor.phase().code());
         r.set_cause(supervisor.cause());
-        for (bus, found) in r.buses.iter_mut().zip(&facts.buses) {
-            let passive = found.passive.then_some(BusTrouble::ErrorPassive);
-            bus.trouble = found.failed.or(passive).map_or(0, BusTrouble::code);
+        for (bus, found) in r.buses.iter_mut().zip(&cycle_state.buses) {
+            let passive = found.passive.then_some(BusFault::ErrorPassive);
+            bus.bus_fault = found.failed.or(passive).map_or(0, BusFault::code);
             bus.silent = u32::from(found.failed.is_some());
             bus.in_flight = found.in_flight;
             (bus.error_class, bus.error_data) = (found.newest_error.class, found.newest_error.data);
         }
-        r.energised = u32::from(facts.servos.iter().take(joints).any(|s| is_energised(s.state)));
+        r.energised = u32::from(cycle_state.servos.iter().take(joints).any(|s| is_energised(s.state)));
         r.generation = track.newest_generation();
         let run = self.last_running;
         (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
-        r.end_rad = track.running().map_or(facts.commanded_rad, |t| t.trajectory.end_rad());
-        (r.sigma, r.speed_percent) = (facts.scale.sigma, supervisor.speed() * 100.0);
+        r.end_rad = track.running().map_or(cycle_state.commanded_rad, |t| t.trajectory.end_rad());
+        (r.sigma, r.speed_percent) = (cycle_state.scale.sigma, supervisor.speed() * 100.0);
         r.command_rad = self.reached_rad;
         r.command_velocity_rad_s = setpoint.velocity_rad_s;
         r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
@@ -384,15 +392,16 @@ impl Reporter {
         (r.tracking_error_rad, r.tracking_error_rad_max) = (tracking_error_rad, tracking_error_rad_max);
         (r.first_speed, r.adopted) =
             (u32::from(supervisor.is_first_speed()), u32::from(supervisor.has_adopted()));
-        r.turn_offset_rad = supervisor.turns().offsets_rad();
-        r.standing = std::array::from_fn(|joint| supervisor.turns().resolved(joint).standing.code());
-        for (joint, servo) in facts.servos.iter().enumerate().take(joints) {
+        r.multi_turn_offset_rad = supervisor.referencing().offsets_rad();
+        r.reference_state =
+            std::array::from_fn(|joint| supervisor.referencing().resolved(joint).reference_state.code());
+        for (joint, servo) in cycle_state.servos.iter().enumerate().take(joints) {
             r.measured_rad[joint] = servo.position_rad;
             r.measured_velocity_rad_s[joint] = servo.velocity_rad_s;
-            r.feedback_age_s[joint] = supervisor.watch().age_s(facts, joint);
+            r.feedback_age_s[joint] = supervisor.watch().age_s(cycle_state, joint);
             r.drive_status[joint] = servo.status_word;
             r.drive_error[joint] = servo.error_code;
-            if facts.out_of_reach[joint] {
+            if cycle_state.unreachable[joint] {
                 // Nothing is commanded there any more.
                 r.command_velocity_rad_s[joint] = 0.0;
                 r.command_acceleration_rad_s2[joint] = 0.0;
@@ -403,8 +412,8 @@ impl Reporter {
     }
 }
 
-fn lost_frames(found: &BusFacts) -> u32 {
-    found.wanted.saturating_sub(found.sent)
+fn lost_frames(found: &BusState) -> u32 {
+    found.requested.saturating_sub(found.sent)
 }
 
 /// An error without its counters, which change with every frame.

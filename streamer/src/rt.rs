@@ -35,7 +35,7 @@ pub enum RightError {
          `setcap cap_sys_nice,cap_ipc_lock+ep taustream-streamer`, with `LimitMEMLOCK=infinity` in its systemd unit or \
          `memlock unlimited` in /etc/security/limits.conf, or start with --allow-non-realtime"
     )]
-    Memory {
+    LastPoses {
         /// `RLIMIT_MEMLOCK`.
         limit: u64,
         /// The kernel's answer.
@@ -99,7 +99,7 @@ pub fn lock_memory() -> Result<(), RightError> {
         return Ok(());
     }
     let error = io::Error::last_os_error();
-    Err(RightError::Memory { limit: soft_limit(libc::RLIMIT_MEMLOCK), error })
+    Err(RightError::LastPoses { limit: soft_limit(libc::RLIMIT_MEMLOCK), error })
 }
 
 /// Gives the calling thread its priority, CPU, exact timers and a stack that is there. Signals go to other threads.
@@ -146,11 +146,11 @@ pub fn run(core: &mut Core, period_us: u32) -> Next {
     let mut last_cycle_ns = 0;
     loop {
         sleep_until(schedule.deadline());
-        let woke = now();
-        let mut tick = schedule.wake(woke);
+        let wake_time = now();
+        let mut tick = schedule.wake(wake_time);
         tick.last_cycle_ns = last_cycle_ns;
         let next = run_cycle(core, tick, &mut NoProbe);
-        last_cycle_ns = now().0.saturating_sub(woke.0);
+        last_cycle_ns = now().0.saturating_sub(wake_time.0);
         if next != Next::Go {
             return next;
         }

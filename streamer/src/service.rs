@@ -5,11 +5,11 @@
 //! the histograms and writes the log. It may wait and allocate: the cycle does not notice.
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
 use crate::check::{Checked, Checker};
-use crate::facts::{Asked, Decision, Verdict};
-use crate::intake::{COMMANDS_PENDING_MAX, Desk};
+use crate::cycle_state::{Decision, PendingCommand, TrajectoryResult};
+use crate::intake::{COMMANDS_PENDING_MAX, CommandQueue};
 use crate::log;
-use crate::memory::Keeper;
 use crate::names::Names;
+use crate::pose_store::PoseStore;
 use crate::recorder::Candidate;
 use crate::report::{Note, Readers};
 use crate::rt;
@@ -47,7 +47,7 @@ struct Pending {
 
 /// Everything that the service thread owns.
 pub struct Service {
-    desk: Desk,
+    command_queue: CommandQueue,
     readers: Readers,
     names: Names,
     arm: String,
@@ -70,8 +70,8 @@ pub struct Service {
     accepted: u64,
     rejected: u64,
     manager: Manager,
-    told: Option<Phase>,
-    keeper: Option<Keeper>,
+    notified: Option<Phase>,
+    pose_store: Option<PoseStore>,
 }
 
 /// Why the service thread cannot serve.
@@ -95,7 +95,7 @@ impl Service {
     /// When shared memory refuses, for instance because a streamer serves this arm already.
     pub fn open(
         settings: &Settings,
-        desk: Desk,
+        command_queue: CommandQueue,
         readers: Readers,
         candidates: Option<Sender<Candidate>>,
     ) -> Result<Self, StartError> {
@@ -105,7 +105,7 @@ impl Service {
         let histogram =
             || Histogram::new_with_bounds(1, LONGEST_NS, 3).map_err(|e| StartError::System(e.to_string()));
         Ok(Self {
-            desk,
+            command_queue,
             readers,
             names: Names::of(settings),
             arm: settings.name.clone(),
@@ -128,15 +128,15 @@ impl Service {
             accepted: 0,
             rejected: 0,
             manager: Manager::from_environment(),
-            told: None,
-            keeper: None,
+            notified: None,
+            pose_store: None,
         })
     }
 
     /// The same, keeping the last pose on disk.
     #[must_use]
-    pub fn keeping(self, keeper: Keeper) -> Self {
-        Self { keeper: Some(keeper), ..self }
+    pub fn keeping(self, pose_store: PoseStore) -> Self {
+        Self { pose_store: Some(pose_store), ..self }
     }
 
     /// Serves until `stop`; then tells what is left to tell.
@@ -149,11 +149,11 @@ impl Service {
             self.restore_buses();
             self.return_answers();
             self.return_checked();
-            self.return_verdicts();
+            self.send_receipts();
             let cycles = self.take_timings();
             self.publish_reports();
             self.write_notes();
-            self.tell_manager(cycles);
+            self.notify_manager(cycles);
             if last {
                 return;
             }
@@ -178,7 +178,7 @@ impl Service {
             info!(?command, "asked");
             let sequence = self.next_sequence;
             self.next_sequence += 1;
-            if self.desk.ask(Asked { sequence, command }) {
+            if self.command_queue.push_command(PendingCommand { sequence, command }) {
                 self.pending.push(Pending { sequence, since: rt::now(), question });
             } else {
                 let text = "too many commands at once; ask again";
@@ -189,7 +189,7 @@ impl Service {
 
     /// Starts the links of failed buses over. What stands in the way is the answer to the `clear-fault` that asked.
     fn restore_buses(&mut self) {
-        let Some(mut handover) = self.desk.failed_links() else { return };
+        let Some(mut handover) = self.command_queue.failed_links() else { return };
         let mut obstacles = Vec::new();
         for (bus, link) in handover.links.iter_mut().enumerate() {
             match link.as_mut().map(|link| link.reopen()) {
@@ -198,9 +198,9 @@ impl Service {
                 Some(Err(e)) => obstacles.push(format!("{}: {e}", self.names.bus(bus))),
             }
         }
-        handover.well = obstacles.is_empty();
+        handover.recovered = obstacles.is_empty();
         let sequence = handover.sequence;
-        self.desk.give_back_links(handover);
+        self.command_queue.return_links(handover);
         if !obstacles.is_empty() {
             self.answer(sequence, (false, Phase::Fault), &obstacles.join("; "));
         }
@@ -215,7 +215,7 @@ impl Service {
     }
 
     fn return_answers(&mut self) {
-        while let Some(answer) = self.desk.answer() {
+        while let Some(answer) = self.command_queue.answer() {
             let text = answer.why.sentence(&self.names);
             self.answer(answer.sequence, (answer.accepted, answer.phase), &text);
         }
@@ -250,19 +250,20 @@ impl Service {
     fn return_checked(&mut self) {
         while let Some(Checked { id, generation, result }) = self.checker.checked() {
             let newest = self.newest_generation;
-            let result = result.and_then(|checked| match (generation > newest, self.desk.empty_box()) {
-                (false, unused) => {
-                    unused.into_iter().for_each(|b| self.desk.put_back(b));
-                    Err(Rejection::StaleGeneration { got: generation, newest })
-                }
-                (true, None) => Err(Rejection::Busy),
-                (true, Some(empty)) => Ok((checked, empty)),
-            });
+            let result =
+                result.and_then(|checked| match (generation > newest, self.command_queue.empty_box()) {
+                    (false, unused) => {
+                        unused.into_iter().for_each(|b| self.command_queue.return_unused(b));
+                        Err(Rejection::StaleGeneration { got: generation, newest })
+                    }
+                    (true, None) => Err(Rejection::Busy),
+                    (true, Some(empty)) => Ok((checked, empty)),
+                });
             match result {
                 Ok((checked, mut empty)) => {
                     self.send_candidate(&checked);
                     *empty = *checked;
-                    self.desk.offer(empty);
+                    self.command_queue.offer(empty);
                 }
                 Err(rejection) => self.receipt(id, generation, &Outcome::Rejected(rejection)),
             }
@@ -283,8 +284,10 @@ impl Service {
         }
     }
 
-    fn return_verdicts(&mut self) {
-        while let Some(Verdict { trajectory_id, generation, decision }) = self.desk.verdict() {
+    fn send_receipts(&mut self) {
+        while let Some(TrajectoryResult { trajectory_id, generation, decision }) =
+            self.command_queue.trajectory_result()
+        {
             let outcome = match decision {
                 Decision::Accepted { tick } => {
                     self.newest_generation = generation;
@@ -334,13 +337,13 @@ impl Service {
     }
 
     /// Readiness and the watchdog hang on cycles that have run: this thread's own life says nothing about the arm.
-    fn tell_manager(&mut self, cycles: usize) {
+    fn notify_manager(&mut self, cycles: usize) {
         if cycles == 0 {
             return;
         }
         self.manager.progress();
-        if self.told != Some(self.phase) {
-            self.told = Some(self.phase);
+        if self.notified != Some(self.phase) {
+            self.notified = Some(self.phase);
             self.manager.status(&format!("arm {}: {}", self.arm, self.phase.word()));
         }
     }
@@ -362,8 +365,8 @@ impl Service {
             };
             self.report_sequence += 1;
             self.lateness_window.reset();
-            if let Some(keeper) = &mut self.keeper {
-                keeper.note(&report);
+            if let Some(pose_store) = &mut self.pose_store {
+                pose_store.note(&report);
             }
             if let Err(e) = self.reports.send_copy(report) {
                 error!("cannot publish a report: {e:?}");

@@ -3,31 +3,31 @@
 //! It is the only owner of the phase. What it decides steers the next cycle: what the drives are wished to be, how the
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
 //! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
-use crate::facts::{Braking, Cause, Decision, Facts, TRANSITIONS_MAX, Transition};
-use crate::intake::{Answers, Leave};
+use crate::answer::{AnswerReason, CommandAnswer};
+use crate::cycle_state::{Braking, Cause, CycleState, Decision, TRANSITIONS_MAX, Transition};
+use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
-use crate::track::ScaleOrder;
-use crate::turns::Turns;
+use crate::referencing::Referencing;
+use crate::track::SpeedChange;
 use crate::watch::Watch;
-use crate::words::{Answer, Why};
 use taustream_arm::Settings;
 use taustream_arm::settings::Supervision;
-use taustream_drivers::{DriveState, DriveWish, Nanos, ServoStatus};
+use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Phase};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// How long the drives may take to come to rest after a stall before the arm stays paused, s.
 const STALL_REST_S: f64 = 1.0;
 /// How long leaving orderly may take: the longest ramp, the drives' time-out and a margin, s.
-const LEAVE_S_MAX: f64 = 10.0;
+const SHUTDOWN_S_MAX: f64 = 10.0;
 /// How long torque off is repeated before leaving at once, s.
-const LEAVE_AT_ONCE_S: f64 = 0.05;
+const SHUTDOWN_AT_ONCE_S: f64 = 0.05;
 
 /// What one cycle's judgement asks of the other stages.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Orders {
+pub struct Actions {
     /// How the speed along the path changes.
-    pub speed: Option<ScaleOrder>,
+    pub speed: Option<SpeedChange>,
     /// The trajectory is dropped and the last pose held.
     pub drop_trajectory: bool,
     /// This pose becomes the commanded one.
@@ -39,7 +39,7 @@ pub struct Orders {
     /// The changes of phase, in order.
     pub transitions: [Option<Transition>; TRANSITIONS_MAX],
     /// The cycle ends after this one; true: orderly.
-    pub leave: Option<bool>,
+    pub shutdown: Option<bool>,
 }
 
 /// The arm's phase and everything that decides it.
@@ -58,7 +58,7 @@ pub struct Supervisor {
     pub(crate) holds: bool,
     /// Drives are kept that were found holding at start.
     pub(crate) adopted: bool,
-    pub(crate) turns: Turns,
+    pub(crate) referencing: Referencing,
     pub(crate) torque_off: bool,
     pub(crate) speed: f64,
     /// Somebody has chosen the speed since the start.
@@ -68,8 +68,8 @@ pub struct Supervisor {
     pub(crate) resetting_since: Option<Nanos>,
     /// Failed buses are being started over, for this `clear-fault`.
     pub(crate) restoring: Option<u64>,
-    pub(crate) leaving: Leave,
-    leaving_since: Nanos,
+    pub(crate) shutting_down: Shutdown,
+    shutdown_since: Nanos,
 }
 
 impl Supervisor {
@@ -91,25 +91,25 @@ impl Supervisor {
             cause: None,
             holds: false,
             adopted: false,
-            turns: Turns::new(settings),
+            referencing: Referencing::new(settings),
             torque_off: false,
             speed_chosen: false,
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
             resetting_since: None,
             restoring: None,
-            leaving: Leave::No,
-            leaving_since: Nanos(0),
+            shutting_down: Shutdown::No,
+            shutdown_since: Nanos(0),
         }
     }
 
     /// The turns of the joints.
     #[must_use]
-    pub fn turns(&self) -> &Turns {
-        &self.turns
+    pub fn referencing(&self) -> &Referencing {
+        &self.referencing
     }
-    pub(crate) fn turns_mut(&mut self) -> &mut Turns {
-        &mut self.turns
+    pub(crate) fn referencing_mut(&mut self) -> &mut Referencing {
+        &mut self.referencing
     }
     /// Drives are kept that were found holding at start.
     #[must_use]
@@ -144,14 +144,14 @@ impl Supervisor {
 
     /// What the drives should be.
     #[must_use]
-    pub fn wish(&self) -> DriveWish {
+    pub fn drive_target(&self) -> DriveTarget {
         if self.torque_off {
-            return DriveWish::TorqueOff;
+            return DriveTarget::TorqueOff;
         }
         match self.phase {
-            Phase::Configuring | Phase::Disabled | Phase::Disabling => DriveWish::Disabled,
-            Phase::Fault if !self.holds => DriveWish::Disabled,
-            Phase::Fault | Phase::Locked if self.adopted => DriveWish::Keep,
+            Phase::Configuring | Phase::Disabled | Phase::Disabling => DriveTarget::Disabled,
+            Phase::Fault if !self.holds => DriveTarget::Disabled,
+            Phase::Fault | Phase::Locked if self.adopted => DriveTarget::Keep,
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -161,46 +161,51 @@ impl Supervisor {
             | Phase::FastStopping
             | Phase::Braking
             | Phase::Fault
-            | Phase::Locked => DriveWish::Enabled,
+            | Phase::Locked => DriveTarget::Enabled,
         }
     }
 
     /// Judges one cycle: its facts first, then its commands, then leaving. `answers` takes the commands' answers.
     ///
     /// Real time: bounded work, no allocation.
-    pub fn judge(&mut self, facts: &Facts, leave: Leave, answers: &mut Answers) -> Orders {
-        let mut orders = Orders::default();
-        self.watch.observe(facts);
-        self.judge_motion(facts, &mut orders);
-        self.judge_stall(facts, &mut orders);
-        self.judge_drives(facts, &mut orders);
+    pub fn evaluate(
+        &mut self,
+        cycle_state: &CycleState,
+        shutdown: Shutdown,
+        answers: &mut Answers,
+    ) -> Actions {
+        let mut actions = Actions::default();
+        self.watch.observe(cycle_state);
+        self.evaluate_motion(cycle_state, &mut actions);
+        self.evaluate_stall(cycle_state, &mut actions);
+        self.evaluate_drives(cycle_state, &mut actions);
         let [answers @ .., restored] = answers;
-        *restored = self.judge_restored(facts, &mut orders);
-        for (asked, answer) in facts.commands.iter().zip(answers) {
-            *answer = asked.and_then(|asked| self.command(asked, facts, &mut orders));
+        *restored = self.evaluate_restored(cycle_state, &mut actions);
+        for (pending, answer) in cycle_state.commands.iter().zip(answers) {
+            *answer = pending.and_then(|pending| self.command(pending, cycle_state, &mut actions));
         }
-        self.judge_leaving(leave, facts, &mut orders);
-        self.follow_measured(facts, &mut orders);
-        orders
+        self.evaluate_shutdown(shutdown, cycle_state, &mut actions);
+        self.follow_measured(cycle_state, &mut actions);
+        actions
     }
 
     /// Applies an event to the table, and what every entry into a phase brings with it.
-    pub(crate) fn step(&mut self, event: Event, facts: &Facts, orders: &mut Orders) -> bool {
+    pub(crate) fn step(&mut self, event: Event, cycle_state: &CycleState, actions: &mut Actions) -> bool {
         let Some(to) = phases::next(self.phase, event) else { return false };
         let transition =
-            Transition { tick: facts.tick.number, from: self.phase, to, event, cause: self.cause };
-        if let Some(slot) = orders.transitions.iter_mut().find(|slot| slot.is_none()) {
+            Transition { tick: cycle_state.tick.number, from: self.phase, to, event, cause: self.cause };
+        if let Some(slot) = actions.transitions.iter_mut().find(|slot| slot.is_none()) {
             *slot = Some(transition);
         }
-        (self.phase, self.since) = (to, facts.tick.woke);
+        (self.phase, self.since) = (to, cycle_state.tick.wake_time);
         // Drives that follow commands, or are let go, are kept no more.
         self.adopted &= !matches!(to, Phase::Holding | Phase::Disabling | Phase::Disabled);
         match to {
             Phase::Holding | Phase::Fault | Phase::Disabling | Phase::Locked => {
-                orders.drop_trajectory = true;
+                actions.drop_trajectory = true;
             }
             Phase::Stopping | Phase::FastStopping | Phase::Pausing => {
-                orders.speed = Some(ScaleOrder::Stop);
+                actions.speed = Some(SpeedChange::Stop);
                 self.stalled_since = None;
             }
             Phase::Configuring
@@ -213,10 +218,16 @@ impl Supervisor {
         true
     }
 
-    pub(crate) fn raise(&mut self, event: Event, cause: Cause, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn raise(
+        &mut self,
+        event: Event,
+        cause: Cause,
+        cycle_state: &CycleState,
+        actions: &mut Actions,
+    ) {
         // Drives that were on their way to energised go back; drives that carry the arm hold.
-        let wanted = matches!(self.wish(), DriveWish::Enabled | DriveWish::Keep);
-        let holds = wanted && (self.phase != Phase::Enabling || self.adopted);
+        let requested = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep);
+        let holds = requested && (self.phase != Phase::Enabling || self.adopted);
         let before = self.cause.replace(cause);
         if phases::next(self.phase, event).is_none() {
             self.cause = before;
@@ -224,91 +235,95 @@ impl Supervisor {
         }
         self.holds = holds && event != Event::HardFault;
         self.adopted &= self.holds;
-        self.step(event, facts, orders);
+        self.step(event, cycle_state, actions);
     }
 
-    fn judge_motion(&mut self, facts: &Facts, orders: &mut Orders) {
-        if facts.verdict.is_some_and(|v| matches!(v.decision, Decision::Accepted { .. })) {
+    fn evaluate_motion(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
+        if cycle_state.trajectory_result.is_some_and(|v| matches!(v.decision, Decision::Accepted { .. })) {
             self.stalled_since = None;
-            self.step(Event::Accepted, facts, orders);
+            self.step(Event::Accepted, cycle_state, actions);
         }
-        if let Some(trip) = facts.trip {
+        if let Some(trip) = cycle_state.trip {
             let cause = Cause::new(FaultReason::Guard).at_joint(trip.joint).amount(trip.value, trip.limit);
             // In a fast stop the first cause stays the one to report.
             let cause = if self.phase == Phase::FastStopping { self.cause.unwrap_or(cause) } else { cause };
-            self.raise(Event::GuardTrip, cause, facts, orders);
+            self.raise(Event::GuardTrip, cause, cycle_state, actions);
         }
         if self.phase == Phase::Braking {
-            if facts.braking == Braking::Rested {
-                self.step(Event::AtRest, facts, orders);
+            if cycle_state.braking == Braking::Rested {
+                self.step(Event::AtRest, cycle_state, actions);
             }
-        } else if facts.end_reached {
-            self.step(Event::EndReached, facts, orders);
-        } else if facts.at_rest {
-            self.step(Event::AtRest, facts, orders);
+        } else if cycle_state.end_reached {
+            self.step(Event::EndReached, cycle_state, actions);
+        } else if cycle_state.at_rest {
+            self.step(Event::AtRest, cycle_state, actions);
         }
     }
 
     /// Gaps beyond what the drives bridge (design section 4).
-    fn judge_stall(&mut self, facts: &Facts, orders: &mut Orders) {
-        let energised = self.wish() == DriveWish::Enabled && self.phase != Phase::Fault;
-        if energised && facts.gap_s > self.watchdog_s {
-            let cause = Cause::new(FaultReason::Stall).amount(facts.gap_s, self.watchdog_s);
-            self.raise(Event::StopFault, cause, facts, orders);
+    fn evaluate_stall(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
+        let energised = self.drive_target() == DriveTarget::Enabled && self.phase != Phase::Fault;
+        if energised && cycle_state.gap_s > self.watchdog_s {
+            let cause = Cause::new(FaultReason::Stall).amount(cycle_state.gap_s, self.watchdog_s);
+            self.raise(Event::StopFault, cause, cycle_state, actions);
         }
         if self.phase != Phase::Moving {
             return;
         }
-        if facts.frozen {
-            self.stalled_since = Some(facts.tick.woke);
-            if facts.gap_s > self.stall_resume_s {
+        if cycle_state.frozen {
+            self.stalled_since = Some(cycle_state.tick.wake_time);
+            if cycle_state.gap_s > self.stall_resume_s {
                 self.stalled_since = None;
-                self.step(Event::StalledLong, facts, orders);
+                self.step(Event::StalledLong, cycle_state, actions);
             }
             return;
         }
         let Some(since) = self.stalled_since else { return };
-        if self.watch.is_at_rest() && facts.can_ramp {
+        if self.watch.is_at_rest() && cycle_state.can_ramp {
             self.stalled_since = None;
-            orders.speed = Some(ScaleOrder::Wish(self.speed));
-        } else if facts.tick.woke.since_s(since) > STALL_REST_S {
+            actions.speed = Some(SpeedChange::Target(self.speed));
+        } else if cycle_state.tick.wake_time.since_s(since) > STALL_REST_S {
             self.stalled_since = None;
-            self.step(Event::StalledLong, facts, orders);
+            self.step(Event::StalledLong, cycle_state, actions);
         }
     }
 
     /// Failed buses are back, or not: the `clear-fault` that asked for it goes on, or was refused in the service
     /// thread's own words.
-    fn judge_restored(&mut self, facts: &Facts, orders: &mut Orders) -> Option<Answer> {
-        let restored = facts.restored?;
+    fn evaluate_restored(
+        &mut self,
+        cycle_state: &CycleState,
+        actions: &mut Actions,
+    ) -> Option<CommandAnswer> {
+        let restored = cycle_state.restored?;
         self.restoring = None;
-        if !restored.well || self.phase != Phase::Fault {
+        if !restored.recovered || self.phase != Phase::Fault {
             return None;
         }
-        self.clear(Event::ClearedOff, facts, orders);
+        self.clear(Event::ClearedOff, cycle_state, actions);
         let (sequence, phase) = (restored.sequence, self.phase);
-        Some(Answer { sequence, accepted: true, phase, why: Why::BusRestored })
+        Some(CommandAnswer { sequence, accepted: true, phase, why: AnswerReason::BusRestored })
     }
 
-    fn judge_drives(&mut self, facts: &Facts, orders: &mut Orders) {
+    fn evaluate_drives(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         // Buses that just came back are judged from the next cycle on.
-        let failed = facts.failed_bus().is_some() && facts.restored.is_none();
+        let failed = cycle_state.failed_bus().is_some() && cycle_state.restored.is_none();
         match self.phase {
             Phase::Configuring | Phase::Disabled | Phase::Disabling if failed => {
-                if let Some(cause) = self.watch.bus_cause(facts) {
-                    self.raise(Event::HardFault, cause, facts, orders);
+                if let Some(cause) = self.watch.bus_cause(cycle_state) {
+                    self.raise(Event::HardFault, cause, cycle_state, actions);
                 }
             }
-            Phase::Configuring | Phase::Disabled => self.judge_bring_up(facts, orders),
+            Phase::Configuring | Phase::Disabled => self.evaluate_bring_up(cycle_state, actions),
             Phase::Disabling => {
-                if self.all(facts, |s| s.state == DriveState::Disabled) {
-                    self.step(Event::DrivesDisabled, facts, orders);
-                } else if let Some(cause) = self.overdue(facts, |s| s.state == DriveState::Disabled) {
-                    self.raise(Event::HardFault, cause, facts, orders);
+                if self.all(cycle_state, |s| s.state == DriveState::Disabled) {
+                    self.step(Event::DrivesDisabled, cycle_state, actions);
+                } else if let Some(cause) = self.overdue(cycle_state, |s| s.state == DriveState::Disabled) {
+                    self.raise(Event::HardFault, cause, cycle_state, actions);
                 }
             }
-            Phase::Fault => self.judge_fault(facts, orders),
-            Phase::Locked if self.adopted => self.judge_adopted(facts, orders),
+            Phase::Fault => self.evaluate_fault(cycle_state, actions),
+            Phase::Locked if self.adopted => self.evaluate_adopted(cycle_state, actions),
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -318,12 +333,12 @@ impl Supervisor {
             | Phase::Locked => {
                 let enabling = self.phase == Phase::Enabling;
                 let enabled = |s: &ServoStatus| s.state == DriveState::Enabled;
-                if let Some(cause) = self.watch.find_cause(facts, enabling) {
-                    self.raise(Event::StopFault, cause, facts, orders);
-                } else if enabling && self.all(facts, enabled) {
-                    self.step(Event::DrivesEnabled, facts, orders);
-                } else if let Some(cause) = self.overdue(facts, enabled).filter(|_| enabling) {
-                    self.raise(Event::StopFault, cause, facts, orders);
+                if let Some(cause) = self.watch.find_cause(cycle_state, enabling) {
+                    self.raise(Event::StopFault, cause, cycle_state, actions);
+                } else if enabling && self.all(cycle_state, enabled) {
+                    self.step(Event::DrivesEnabled, cycle_state, actions);
+                } else if let Some(cause) = self.overdue(cycle_state, enabled).filter(|_| enabling) {
+                    self.raise(Event::StopFault, cause, cycle_state, actions);
                 }
             }
             // The arm is on its way to rest already; nothing that drives say changes how.
@@ -331,8 +346,8 @@ impl Supervisor {
         }
     }
 
-    fn judge_bring_up(&mut self, facts: &Facts, orders: &mut Orders) {
-        let bad = self.servos(facts).find_map(|(joint, servo)| {
+    fn evaluate_bring_up(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
+        let bad = self.servos(cycle_state).find_map(|(joint, servo)| {
             let reason = match servo.state {
                 DriveState::Refused => FaultReason::ConfigurationRefused,
                 DriveState::EnergisedUnowned => FaultReason::EnergisedUnowned,
@@ -349,30 +364,31 @@ impl Supervisor {
             Some(Cause { object: servo.refused_object, ..cause })
         });
         if let Some(cause) = bad {
-            self.raise(Event::HardFault, cause, facts, orders);
-        } else if self.all(facts, |s| matches!(s.state, DriveState::Disabled | DriveState::Adopted))
-            && self.servos(facts).any(|(_, s)| s.state == DriveState::Adopted)
+            self.raise(Event::HardFault, cause, cycle_state, actions);
+        } else if self.all(cycle_state, |s| matches!(s.state, DriveState::Disabled | DriveState::Adopted))
+            && self.servos(cycle_state).any(|(_, s)| s.state == DriveState::Adopted)
         {
             self.adopted = true;
-            self.step(Event::HoldAdopted, facts, orders);
-        } else if self.all(facts, |s| s.state == DriveState::Disabled) && self.watch.fastest().is_some() {
+            self.step(Event::HoldAdopted, cycle_state, actions);
+        } else if self.all(cycle_state, |s| s.state == DriveState::Disabled) && self.watch.fastest().is_some()
+        {
             // Ready to be energised includes that rest can be told from motion: the first `enable` is not refused for it.
-            self.step(Event::DrivesReady, facts, orders);
+            self.step(Event::DrivesReady, cycle_state, actions);
         } else {
-            self.step(Event::DrivesLost, facts, orders);
+            self.step(Event::DrivesLost, cycle_state, actions);
         }
     }
 
     /// Drives that hold from before: each is either kept or off, and those that are kept answer and stay.
-    fn judge_adopted(&mut self, facts: &Facts, orders: &mut Orders) {
+    fn evaluate_adopted(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         let rules = self.rules;
-        let unheard = |this: &Self, joint| this.watch.age_s(facts, joint).is_infinite();
-        let lost = self.servos(facts).find_map(|(joint, servo)| match servo.state {
+        let without_feedback = |this: &Self, joint| this.watch.age_s(cycle_state, joint).is_infinite();
+        let lost = self.servos(cycle_state).find_map(|(joint, servo)| match servo.state {
             DriveState::Disabled => None,
             // Its process data is only being begun.
-            DriveState::Adopted if unheard(self, joint) => None,
+            DriveState::Adopted if without_feedback(self, joint) => None,
             DriveState::Adopted => {
-                let sag_rad = (servo.position_rad - servo.held_rad).abs();
+                let sag_rad = (servo.position_rad - servo.hold_position_rad).abs();
                 let limit = rules.tracking_error_rad_max;
                 let far = Cause::new(FaultReason::TrackingError).at_joint(joint).amount(sag_rad, limit);
                 let late = self.watch.late_cause(joint);
@@ -385,74 +401,78 @@ impl Supervisor {
             | DriveState::Enabled
             | DriveState::Disabling
             | DriveState::Fault
-            | DriveState::Refused => self.watch.drive_cause(facts, joint),
+            | DriveState::Refused => self.watch.drive_cause(cycle_state, joint),
         });
         let begun = |s: &ServoStatus| s.state != DriveState::Adopted || s.received.is_some();
-        let overdue = || self.overdue(facts, begun).filter(|_| !self.all(facts, begun));
-        let cause = self.watch.bus_cause(facts).or(lost).or_else(overdue);
+        let overdue = || self.overdue(cycle_state, begun).filter(|_| !self.all(cycle_state, begun));
+        let cause = self.watch.bus_cause(cycle_state).or(lost).or_else(overdue);
         if let Some(cause) = cause {
-            self.raise(Event::StopFault, cause, facts, orders);
+            self.raise(Event::StopFault, cause, cycle_state, actions);
         }
     }
 
-    fn judge_fault(&mut self, facts: &Facts, orders: &mut Orders) {
+    fn evaluate_fault(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         // Drives that have all dropped out do not come back by themselves.
-        if self.holds && self.energised(facts).is_none() {
+        if self.holds && self.energised(cycle_state).is_none() {
             (self.holds, self.adopted) = (false, false);
         }
         let Some(since) = self.resetting_since else { return };
         let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
-        if self.servos(facts).any(|(_, s)| faulty(s)) {
-            if facts.tick.woke.since_s(since) > self.rules.drive_timeout_s {
+        if self.servos(cycle_state).any(|(_, s)| faulty(s)) {
+            if cycle_state.tick.wake_time.since_s(since) > self.rules.drive_timeout_s {
                 self.resetting_since = None;
             }
         } else {
-            self.clear(Event::ClearedOff, facts, orders);
+            self.clear(Event::ClearedOff, cycle_state, actions);
         }
     }
 
-    pub(crate) fn clear(&mut self, event: Event, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn clear(&mut self, event: Event, cycle_state: &CycleState, actions: &mut Actions) {
         self.resetting_since = None;
         (self.cause, self.torque_off, self.holds) = (None, false, false);
-        self.step(event, facts, orders);
+        self.step(event, cycle_state, actions);
     }
 
     /// While nothing is energised, the commanded pose is the measured one, so that enabling moves nothing.
-    fn follow_measured(&mut self, facts: &Facts, orders: &mut Orders) {
-        if self.wish() == DriveWish::Enabled || orders.pose_rad.is_some() {
+    fn follow_measured(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
+        if self.drive_target() == DriveTarget::Enabled || actions.pose_rad.is_some() {
             return;
         }
-        let mut pose_rad = facts.commanded_rad;
-        for (joint, servo) in self.servos(facts) {
+        let mut pose_rad = cycle_state.commanded_rad;
+        for (joint, servo) in self.servos(cycle_state) {
             // What holds keeps its own target: following a sag would creep.
-            let at_rad = if servo.held_rad.is_finite() { servo.held_rad } else { servo.position_rad };
+            let at_rad = if servo.hold_position_rad.is_finite() {
+                servo.hold_position_rad
+            } else {
+                servo.position_rad
+            };
             if at_rad.is_finite() {
                 pose_rad[joint] = at_rad;
             }
         }
-        orders.pose_rad = Some(pose_rad);
+        actions.pose_rad = Some(pose_rad);
     }
 
-    fn judge_leaving(&mut self, leave: Leave, facts: &Facts, orders: &mut Orders) {
-        if leave > self.leaving {
-            (self.leaving, self.leaving_since) = (leave, facts.tick.woke);
+    fn evaluate_shutdown(&mut self, shutdown: Shutdown, cycle_state: &CycleState, actions: &mut Actions) {
+        if shutdown > self.shutting_down {
+            (self.shutting_down, self.shutdown_since) = (shutdown, cycle_state.tick.wake_time);
         }
-        let time_s = facts.tick.woke.since_s(self.leaving_since);
-        match self.leaving {
-            Leave::No => {}
-            Leave::AtOnce => {
-                self.switch_off(facts, orders);
-                if time_s > LEAVE_AT_ONCE_S {
-                    orders.leave = Some(false);
+        let time_s = cycle_state.tick.wake_time.since_s(self.shutdown_since);
+        match self.shutting_down {
+            Shutdown::No => {}
+            Shutdown::AtOnce => {
+                self.switch_off(cycle_state, actions);
+                if time_s > SHUTDOWN_AT_ONCE_S {
+                    actions.shutdown = Some(false);
                 }
             }
-            Leave::Orderly => {
+            Shutdown::Orderly => {
                 match self.phase {
                     Phase::Moving | Phase::Pausing | Phase::Paused => {
-                        self.step(Event::StopAsked, facts, orders);
+                        self.step(Event::StopRequested, cycle_state, actions);
                     }
                     Phase::Holding | Phase::Locked | Phase::Enabling => {
-                        self.step(Event::DisableAsked, facts, orders);
+                        self.step(Event::DisableRequested, cycle_state, actions);
                     }
                     Phase::Fault => (self.holds, self.adopted) = (false, false),
                     Phase::Configuring
@@ -463,52 +483,52 @@ impl Supervisor {
                     | Phase::Disabling => {}
                 }
                 let off = matches!(self.phase, Phase::Configuring | Phase::Disabled | Phase::Fault);
-                if off && self.energised(facts).is_none() {
-                    orders.leave = Some(true);
-                } else if time_s > LEAVE_S_MAX {
-                    orders.leave = Some(false);
+                if off && self.energised(cycle_state).is_none() {
+                    actions.shutdown = Some(true);
+                } else if time_s > SHUTDOWN_S_MAX {
+                    actions.shutdown = Some(false);
                 }
             }
         }
     }
 
-    pub(crate) fn switch_off(&mut self, facts: &Facts, orders: &mut Orders) {
+    pub(crate) fn switch_off(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         self.torque_off = true;
         (self.holds, self.adopted) = (false, false);
         self.resetting_since = None;
-        let asked = Cause::new(FaultReason::TorqueOff);
+        let pending = Cause::new(FaultReason::TorqueOff);
         // A fault that stopped the arm before stays the one to report.
-        let cause = self.cause.unwrap_or(asked);
-        self.raise(Event::HardFault, cause, facts, orders);
+        let cause = self.cause.unwrap_or(pending);
+        self.raise(Event::HardFault, cause, cycle_state, actions);
     }
 
     pub(crate) fn servos<'a>(
         &self,
-        facts: &'a Facts,
+        cycle_state: &'a CycleState,
     ) -> impl Iterator<Item = (usize, &'a ServoStatus)> + use<'a> {
-        facts.servos.iter().enumerate().take(self.joints)
+        cycle_state.servos.iter().enumerate().take(self.joints)
     }
 
-    pub(crate) fn all(&self, facts: &Facts, test: impl Fn(&ServoStatus) -> bool) -> bool {
-        self.servos(facts).all(|(_, servo)| test(servo))
+    pub(crate) fn all(&self, cycle_state: &CycleState, test: impl Fn(&ServoStatus) -> bool) -> bool {
+        self.servos(cycle_state).all(|(_, servo)| test(servo))
     }
 
-    pub(crate) fn first_not(&self, facts: &Facts, state: DriveState) -> Option<Why> {
-        let mut others = self.servos(facts).filter(|(_, s)| s.state != state);
-        others.next().map(|(joint, s)| Why::NotConfigured { joint, state: s.state })
+    pub(crate) fn first_not(&self, cycle_state: &CycleState, state: DriveState) -> Option<AnswerReason> {
+        let mut others = self.servos(cycle_state).filter(|(_, s)| s.state != state);
+        others.next().map(|(joint, s)| AnswerReason::NotConfigured { joint, state: s.state })
     }
 
     /// The first drive that carries torque, or did when it was last heard.
-    pub(crate) fn energised(&self, facts: &Facts) -> Option<(usize, DriveState)> {
-        self.servos(facts).find(|(_, s)| is_energised(s.state)).map(|(joint, s)| (joint, s.state))
+    pub(crate) fn energised(&self, cycle_state: &CycleState) -> Option<(usize, DriveState)> {
+        self.servos(cycle_state).find(|(_, s)| is_energised(s.state)).map(|(joint, s)| (joint, s.state))
     }
 
-    fn overdue(&self, facts: &Facts, done: impl Fn(&ServoStatus) -> bool) -> Option<Cause> {
+    fn overdue(&self, cycle_state: &CycleState, done: impl Fn(&ServoStatus) -> bool) -> Option<Cause> {
         let limit = self.rules.drive_timeout_s;
-        if facts.tick.woke.since_s(self.since) <= limit {
+        if cycle_state.tick.wake_time.since_s(self.since) <= limit {
             return None;
         }
-        let joint = self.servos(facts).find(|(_, s)| !done(s)).map(|(joint, _)| joint);
+        let joint = self.servos(cycle_state).find(|(_, s)| !done(s)).map(|(joint, _)| joint);
         Some(Cause { joint, ..Cause::new(FaultReason::BringUp).amount(limit, limit) })
     }
 }

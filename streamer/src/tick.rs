@@ -13,7 +13,7 @@ pub struct Tick {
     /// When the cycle should have begun.
     pub deadline: Nanos,
     /// When it did.
-    pub woke: Nanos,
+    pub wake_time: Nanos,
     /// Deadlines given up since the last run.
     pub skipped: u64,
     /// How long the run before this one took, ns; 0 in the first.
@@ -24,7 +24,7 @@ impl Tick {
     /// How late the wake-up was, ns.
     #[must_use]
     pub fn lateness_ns(&self) -> u64 {
-        self.woke.0.saturating_sub(self.deadline.0)
+        self.wake_time.0.saturating_sub(self.deadline.0)
     }
 }
 
@@ -50,20 +50,20 @@ impl Schedule {
         self.time_of(self.next)
     }
 
-    /// The tick that a wake-up at `woke` serves; plans the next deadline at least half a period later.
+    /// The tick that a wake-up at `wake_time` serves; plans the next deadline at least half a period later.
     ///
     /// Real time: no loop, no allocation.
-    pub fn wake(&mut self, woke: Nanos) -> Tick {
-        let passed = woke.0.saturating_sub(self.origin_ns) / self.period_ns;
+    pub fn wake(&mut self, wake_time: Nanos) -> Tick {
+        let passed = wake_time.0.saturating_sub(self.origin_ns) / self.period_ns;
         let number = self.next.max(passed);
         let skipped = number - self.served - 1;
         self.served = number;
         self.next = number + 1;
-        let spacing_ns = self.deadline().0.saturating_sub(woke.0);
+        let spacing_ns = self.deadline().0.saturating_sub(wake_time.0);
         if spacing_ns < self.period_ns / 2 {
             self.next += 1;
         }
-        Tick { number, deadline: self.time_of(number), woke, skipped, last_cycle_ns: 0 }
+        Tick { number, deadline: self.time_of(number), wake_time, skipped, last_cycle_ns: 0 }
     }
 
     fn time_of(&self, number: u64) -> Nanos {
@@ -103,16 +103,20 @@ mod tests {
     fn schedule_under_any_lateness_keeps_spacing_and_loses_no_deadline() {
         for seed in 0..200_u64 {
             let mut schedule = Schedule::starting_after(Nanos(1_000), 1_000);
-            let (mut state, mut last_woke, mut accounted) = (seed * 2 + 1, 0, 0);
+            let (mut state, mut last_wake_time, mut accounted) = (seed * 2 + 1, 0, 0);
             for _ in 0..500 {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 let late_ns = (state >> 33) % if state % 7 == 0 { 9_000_000 } else { 900_000 };
-                let woke = Nanos(schedule.deadline().0 + late_ns);
-                let tick = schedule.wake(woke);
+                let wake_time = Nanos(schedule.deadline().0 + late_ns);
+                let tick = schedule.wake(wake_time);
                 accounted += 1 + tick.skipped;
                 assert_eq!(tick.number, accounted, "seed {seed}");
-                assert!(woke.0 - last_woke >= PERIOD_NS / 2, "seed {seed}: {} ns apart", woke.0 - last_woke);
-                last_woke = woke.0;
+                assert!(
+                    wake_time.0 - last_wake_time >= PERIOD_NS / 2,
+                    "seed {seed}: {} ns apart",
+                    wake_time.0 - last_wake_time
+                );
+                last_wake_time = wake_time.0;
             }
         }
     }

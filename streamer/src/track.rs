@@ -4,9 +4,9 @@
 //! refused, therefore costs nothing but a longer step, up to the gap that the drives bridge. Beyond it the drives
 //! have stopped by themselves: trajectory time stays where the last setpoint was, and sigma starts from 0.
 use crate::approach::Approach;
-use crate::facts::{Decision, Facts, Verdict};
+use crate::cycle_state::{CycleState, Decision, TrajectoryResult};
 use crate::intake::Boxed;
-use taustream_arm::settings::{Cycle, Supervision};
+use taustream_arm::settings::{CycleSettings, Supervision};
 use taustream_messages::Phase;
 use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
 use taustream_motion::trajectory::Cursor;
@@ -17,7 +17,7 @@ const AXIS_PERIODS_MAX: u64 = 60_000;
 
 /// What the guard is asked to let pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wanted {
+pub struct RequestedSetpoint {
     /// The setpoint, its derivatives by real time.
     pub setpoint: Setpoint,
     /// Periods since the last setpoint that left.
@@ -30,16 +30,16 @@ pub struct Wanted {
 
 /// How the speed along the path changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ScaleOrder {
+pub enum SpeedChange {
     /// sigma to 0; never refused.
     Stop,
     /// sigma to this value.
-    Wish(f64),
+    Target(f64),
 }
 
 /// A point of the track; `sent` is the last that left, `next` the one being sent.
 #[derive(Clone, Copy, Debug, Default)]
-struct Mark {
+struct TrackState {
     tick: u64,
     s: f64,
     /// Periods on the scale's time axis.
@@ -64,11 +64,11 @@ pub struct Track {
     starting: bool,
     restart: bool,
     newest_generation: u64,
-    sent: Mark,
-    next: Mark,
+    sent: TrackState,
+    next: TrackState,
     /// What each joint was last told; older than `sent` for one whose turn has not come, or whose bus is lost. When the
     /// drives have come to stand, they stand there, and the approach brings the joints together again.
-    told_rad: JointArray,
+    last_sent_rad: JointArray,
 }
 
 impl Track {
@@ -77,7 +77,7 @@ impl Track {
     pub fn new(
         limits: &[JointLimits; MAX_JOINTS],
         joints: usize,
-        cycle: &Cycle,
+        cycle: &CycleSettings,
         supervision: &Supervision,
     ) -> Self {
         // Clamped to what a stop may take; settings without room for a stop were refused before.
@@ -95,9 +95,9 @@ impl Track {
             starting: false,
             restart: true,
             newest_generation: 0,
-            sent: Mark::default(),
-            next: Mark::default(),
-            told_rad: [0.0; MAX_JOINTS],
+            sent: TrackState::default(),
+            next: TrackState::default(),
+            last_sent_rad: [0.0; MAX_JOINTS],
         }
     }
 
@@ -111,12 +111,15 @@ impl Track {
         offer: Option<Boxed>,
         phase: Phase,
         sigma: f64,
-        facts: &mut Facts,
+        cycle_state: &mut CycleState,
     ) -> Option<Boxed> {
         let offer = offer?;
-        let decision = self.decide(&offer, phase, facts.tick.number);
-        facts.verdict =
-            Some(Verdict { trajectory_id: offer.trajectory_id, generation: offer.generation, decision });
+        let decision = self.decide(&offer, phase, cycle_state.tick.number);
+        cycle_state.trajectory_result = Some(TrajectoryResult {
+            trajectory_id: offer.trajectory_id,
+            generation: offer.generation,
+            decision,
+        });
         if !matches!(decision, Decision::Accepted { .. }) {
             return Some(offer);
         }
@@ -138,8 +141,8 @@ impl Track {
             return Decision::NotReady { phase };
         }
         let base = offer.trajectory.base_rad().iter().zip(&self.sent.position_rad);
-        for (joint, (base_rad, held_rad)) in base.enumerate().take(self.joints) {
-            let by_rad = (base_rad - held_rad).abs();
+        for (joint, (base_rad, hold_position_rad)) in base.enumerate().take(self.joints) {
+            let by_rad = (base_rad - hold_position_rad).abs();
             if by_rad.is_nan() || by_rad > self.base_tolerance_rad {
                 return Decision::NotAtBase { joint, by_rad };
             }
@@ -150,22 +153,22 @@ impl Track {
     /// The setpoint of this tick.
     ///
     /// Real time: touches only the strokes that run.
-    pub fn sample(&mut self, live: bool, facts: &mut Facts) -> Wanted {
-        let tick = facts.tick.number;
+    pub fn sample(&mut self, live: bool, cycle_state: &mut CycleState) -> RequestedSetpoint {
+        let tick = cycle_state.tick.number;
         let periods = tick.saturating_sub(self.sent.tick).max(1);
         self.shorten_axis();
-        facts.gap_s = self.seconds(periods);
-        facts.live = live;
-        self.next = Mark { tick, ..self.sent };
+        cycle_state.gap_s = self.seconds(periods);
+        cycle_state.live = live;
+        self.next = TrackState { tick, ..self.sent };
         let mut setpoint = Setpoint { position_rad: self.sent.position_rad, ..Setpoint::default() };
         let mut restart = self.restart;
         if let Some(running) = &self.running {
-            facts.trajectory_id = running.trajectory_id;
+            cycle_state.trajectory_id = running.trajectory_id;
             if periods > self.tolerated_periods && !self.starting {
                 self.scale = TimeScale::settled(0.0, self.ramp_s);
                 (self.sent.axis, self.next.axis) = (0, 0);
-                (facts.frozen, restart) = (true, true);
-                self.sent.position_rad = self.told_rad;
+                (cycle_state.frozen, restart) = (true, true);
+                self.sent.position_rad = self.last_sent_rad;
                 self.next.position_rad = self.sent.position_rad;
                 setpoint.position_rad = self.sent.position_rad;
                 let reached_rad = running.trajectory.sample(self.sent.s).position_rad;
@@ -177,20 +180,20 @@ impl Track {
                 let (from_s, to_s) = (self.seconds(self.sent.axis), self.seconds(self.next.axis));
                 let end_s = running.trajectory.duration_s();
                 self.next.s = (self.sent.s + self.advance_s(from_s, to_s, step)).min(end_s);
-                facts.scale = self.scale.sample(to_s);
+                cycle_state.scale = self.scale.sample(to_s);
                 self.next.approach = self.sent.approach + step;
                 let approach_s = self.seconds(self.next.approach);
-                setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), facts.scale);
+                setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), cycle_state.scale);
                 self.approach.add_to(&mut setpoint, approach_s);
-                facts.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
+                cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
                 self.next.position_rad = setpoint.position_rad;
             }
             let now_s = self.seconds(self.next.axis);
             let approached = self.approach.has_ended(self.seconds(self.next.approach));
-            facts.at_rest = self.scale.wished() <= 0.0 && self.scale.is_settled(now_s) && approached;
+            cycle_state.at_rest = self.scale.requested() <= 0.0 && self.scale.is_settled(now_s) && approached;
         }
-        facts.trajectory_s = self.next.s;
-        Wanted { setpoint, periods, restart, live }
+        cycle_state.trajectory_s = self.next.s;
+        RequestedSetpoint { setpoint, periods, restart, live }
     }
 
     /// How far the pose that was held is from the base of the trajectory that runs, rad.
@@ -202,35 +205,37 @@ impl Track {
     /// Notes what left: `position_rad` is what the guard let pass.
     ///
     /// Real time: a copy.
-    pub fn commit(&mut self, position_rad: &JointArray, facts: &mut Facts) {
-        if facts.setpoints_left() {
-            self.sent = Mark { position_rad: *position_rad, ..self.next };
-            let told = self.told_rad.iter_mut().zip(position_rad).zip(&facts.held_back);
-            told.filter(|(_, held_back)| !**held_back).for_each(|((told, position), _)| *told = *position);
+    pub fn commit(&mut self, position_rad: &JointArray, cycle_state: &mut CycleState) {
+        if cycle_state.setpoints_sent() {
+            self.sent = TrackState { position_rad: *position_rad, ..self.next };
+            let last_sent = self.last_sent_rad.iter_mut().zip(position_rad).zip(&cycle_state.not_sent);
+            last_sent
+                .filter(|(_, not_sent)| !**not_sent)
+                .for_each(|((last_sent, position), _)| *last_sent = *position);
             (self.starting, self.restart) = (false, false);
         }
         // Where setpoints take turns, the last ones of a motion are still on their way: it ends when all are told.
-        let told = self.told_rad.iter().zip(&self.sent.position_rad).zip(&facts.out_of_reach);
-        let all_told = told
+        let last_sent = self.last_sent_rad.iter().zip(&self.sent.position_rad).zip(&cycle_state.unreachable);
+        let all_sent = last_sent
             .take(self.joints)
-            .all(|((told, sent), out_of_reach)| *out_of_reach || told.to_bits() == sent.to_bits());
-        facts.end_reached &= all_told;
-        facts.at_rest &= all_told;
-        facts.commanded_rad = self.sent.position_rad;
+            .all(|((last_sent, sent), unreachable)| *unreachable || last_sent.to_bits() == sent.to_bits());
+        cycle_state.end_reached &= all_sent;
+        cycle_state.at_rest &= all_sent;
+        cycle_state.commanded_rad = self.sent.position_rad;
         let mut trial = self.scale;
-        facts.can_ramp = trial.wish(1.0, self.seconds(self.sent.axis)).is_ok();
+        cycle_state.can_ramp = trial.request(1.0, self.seconds(self.sent.axis)).is_ok();
     }
 
     /// Changes the speed along the path from the last setpoint on.
     ///
     /// Real time: no allocation.
-    pub fn change_speed(&mut self, order: ScaleOrder) {
+    pub fn change_speed(&mut self, order: SpeedChange) {
         let now_s = self.seconds(self.sent.axis);
         match order {
-            ScaleOrder::Stop => self.scale.stop(now_s),
-            // `Facts::can_ramp` was asked first; a wish that is refused changes nothing.
-            ScaleOrder::Wish(sigma) => {
-                let _ = self.scale.wish(sigma, now_s);
+            SpeedChange::Stop => self.scale.stop(now_s),
+            // `CycleState::can_ramp` was asked first; a wish that is refused changes nothing.
+            SpeedChange::Target(sigma) => {
+                let _ = self.scale.request(sigma, now_s);
             }
         }
     }
@@ -240,7 +245,7 @@ impl Track {
     /// Real time: nothing is freed.
     pub fn drop_trajectory(&mut self) -> Option<Boxed> {
         (self.starting, self.restart) = (false, true);
-        self.sent.position_rad = self.told_rad;
+        self.sent.position_rad = self.last_sent_rad;
         self.sent.s = 0.0;
         self.scale = TimeScale::settled(0.0, self.ramp_s);
         self.sent.axis = 0;
@@ -252,7 +257,7 @@ impl Track {
     /// Real time: a copy.
     pub fn set_pose(&mut self, position_rad: &JointArray) {
         self.sent.position_rad = *position_rad;
-        self.told_rad = *position_rad;
+        self.last_sent_rad = *position_rad;
         self.restart = true;
     }
 
@@ -277,7 +282,7 @@ impl Track {
     /// A settled scale advances by a product: no rounding of long times enters.
     fn advance_s(&self, from_s: f64, to_s: f64, periods: u64) -> f64 {
         if self.scale.is_settled(from_s) {
-            self.scale.wished() * self.seconds(periods)
+            self.scale.requested() * self.seconds(periods)
         } else {
             self.scale.advance_s(from_s, to_s)
         }
@@ -285,7 +290,7 @@ impl Track {
 
     fn shorten_axis(&mut self) {
         if self.sent.axis > AXIS_PERIODS_MAX && self.scale.is_settled(self.seconds(self.sent.axis)) {
-            self.scale = TimeScale::settled(self.scale.wished(), self.ramp_s);
+            self.scale = TimeScale::settled(self.scale.requested(), self.ramp_s);
             self.sent.axis = 0;
         }
     }

@@ -4,11 +4,11 @@
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
 //! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
 //! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
-use crate::facts::{Cause, Facts};
+use crate::cycle_state::{Cause, CycleState};
 use taustream_arm::Settings;
 use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};
 use taustream_drivers::{DriveState, Nanos};
-use taustream_messages::{BusTrouble, FaultReason};
+use taustream_messages::{BusFault, FaultReason};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Cycles from a command to the measured position that answers it.
@@ -34,7 +34,7 @@ struct Answers {
     tracking_rad: f64,
     tracking_rad_max: f64,
     /// Cycles in a row in which the drive told its position.
-    told_cycles: u32,
+    commanded_cycles: u32,
     past_rad: [f64; REST_CYCLES],
     past_at: [Nanos; REST_CYCLES],
 }
@@ -48,7 +48,7 @@ impl Answers {
         jump_limit_rad: f64::INFINITY,
         tracking_rad: 0.0,
         tracking_rad_max: 0.0,
-        told_cycles: 0,
+        commanded_cycles: 0,
         past_rad: [f64::NAN; REST_CYCLES],
         past_at: [Nanos(0); REST_CYCLES],
     };
@@ -67,7 +67,7 @@ pub struct Watch {
     answers: [Answers; MAX_JOINTS],
     slot: usize,
     /// When the last cycle woke.
-    woke: Option<Nanos>,
+    wake_time: Option<Nanos>,
     /// Time in which the loop ran. Drives answer SYNC: while none leaves, their silence is no fault of theirs.
     attended_s: f64,
 }
@@ -85,7 +85,7 @@ impl Watch {
             commands_rad: [[0.0; MAX_JOINTS]; COMMANDS],
             answers: [Answers::NONE; MAX_JOINTS],
             slot: 0,
-            woke: None,
+            wake_time: None,
             attended_s: 0.0,
         }
     }
@@ -93,25 +93,25 @@ impl Watch {
     /// Takes in what this cycle has sent and received.
     ///
     /// Real time: no allocation.
-    pub fn observe(&mut self, facts: &Facts) {
-        if facts.setpoints_left() {
+    pub fn observe(&mut self, cycle_state: &CycleState) {
+        if cycle_state.setpoints_sent() {
             self.commands_rad.rotate_right(1);
-            self.commands_rad[0] = facts.commanded_rad;
+            self.commands_rad[0] = cycle_state.commanded_rad;
         }
-        let elapsed_s = self.woke.map_or(0.0, |woke| facts.tick.woke.since_s(woke));
-        self.woke = Some(facts.tick.woke);
+        let elapsed_s = self.wake_time.map_or(0.0, |wake_time| cycle_state.tick.wake_time.since_s(wake_time));
+        self.wake_time = Some(cycle_state.tick.wake_time);
         self.attended_s += elapsed_s.min(ATTENDED_PERIODS_MAX * self.period_s);
         self.slot = (self.slot + 1) % REST_CYCLES;
-        let joints = self.answers.iter_mut().zip(&facts.servos).zip(&self.transport_cycles);
+        let joints = self.answers.iter_mut().zip(&cycle_state.servos).zip(&self.transport_cycles);
         for (joint, (((answer, servo), transport_cycles), speed_max)) in
             joints.zip(&self.velocity_rad_s_max).enumerate().take(self.joints)
         {
             let command = self.commands_rad.get(*transport_cycles);
             let command_rad = command.and_then(|pose| pose.get(joint)).copied().unwrap_or(f64::NAN);
             answer.past_rad[self.slot] = servo.position_rad;
-            let told = servo.state.reports() && servo.position_rad.is_finite();
-            answer.told_cycles = if told { answer.told_cycles.saturating_add(1) } else { 0 };
-            answer.past_at[self.slot] = facts.tick.woke;
+            let sent = servo.state.reports() && servo.position_rad.is_finite();
+            answer.commanded_cycles = if sent { answer.commanded_cycles.saturating_add(1) } else { 0 };
+            answer.past_at[self.slot] = cycle_state.tick.wake_time;
             let Some(received) = servo.received else { continue };
             if answer.received == Some(received) {
                 continue;
@@ -125,7 +125,7 @@ impl Watch {
             (answer.received, answer.position_rad) = (Some(received), servo.position_rad);
             answer.attended_s = self.attended_s;
             answer.tracking_rad = (servo.position_rad - command_rad).abs();
-            if facts.live {
+            if cycle_state.live {
                 answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
             }
         }
@@ -146,36 +146,39 @@ impl Watch {
     ///
     /// Real time: no allocation.
     #[must_use]
-    pub fn find_cause(&self, facts: &Facts, enabling: bool) -> Option<Cause> {
-        self.bus_cause(facts).or_else(|| {
-            (0..self.joints)
-                .find_map(|joint| drive_cause(facts, joint, enabling).or_else(|| self.feedback_cause(joint)))
+    pub fn find_cause(&self, cycle_state: &CycleState, enabling: bool) -> Option<Cause> {
+        self.bus_cause(cycle_state).or_else(|| {
+            (0..self.joints).find_map(|joint| {
+                drive_cause(cycle_state, joint, enabling).or_else(|| self.feedback_cause(joint))
+            })
         })
     }
 
     /// A bus that does not carry setpoints any more, or may soon not.
     #[must_use]
-    pub fn bus_cause(&self, facts: &Facts) -> Option<Cause> {
-        facts.failed_bus().map(|(bus, trouble)| self.failed(facts, bus, trouble)).or_else(|| {
-            let bus = facts.buses.iter().position(|b| b.passive)?;
-            Some(Cause::bus(bus, BusTrouble::ErrorPassive, 0.0, 0.0))
-        })
+    pub fn bus_cause(&self, cycle_state: &CycleState) -> Option<Cause> {
+        cycle_state.failed_bus().map(|(bus, bus_fault)| self.failed(cycle_state, bus, bus_fault)).or_else(
+            || {
+                let bus = cycle_state.buses.iter().position(|b| b.passive)?;
+                Some(Cause::bus(bus, BusFault::ErrorPassive, 0.0, 0.0))
+            },
+        )
     }
 
     /// The cause that a failed bus is, with what was counted.
-    fn failed(&self, facts: &Facts, bus: usize, trouble: BusTrouble) -> Cause {
-        let found = facts.buses.get(bus).copied().unwrap_or_default();
+    fn failed(&self, cycle_state: &CycleState, bus: usize, bus_fault: BusFault) -> Cause {
+        let found = cycle_state.buses.get(bus).copied().unwrap_or_default();
         let limit = f64::from(self.rules.lost_cycles_max);
-        match trouble {
-            BusTrouble::QueueFull | BusTrouble::System => {
-                Cause::bus(bus, trouble, f64::from(found.lost_in_a_row), limit)
+        match bus_fault {
+            BusFault::QueueFull | BusFault::System => {
+                Cause::bus(bus, bus_fault, f64::from(found.consecutive_lost), limit)
             }
-            BusTrouble::Unconfirmed => Cause::bus(bus, trouble, f64::from(found.in_flight), 0.0),
-            BusTrouble::Down
-            | BusTrouble::Gone
-            | BusTrouble::BusOff
-            | BusTrouble::Restarted
-            | BusTrouble::ErrorPassive => Cause::bus(bus, trouble, 0.0, 0.0),
+            BusFault::Unconfirmed => Cause::bus(bus, bus_fault, f64::from(found.in_flight), 0.0),
+            BusFault::Down
+            | BusFault::Gone
+            | BusFault::BusOff
+            | BusFault::Restarted
+            | BusFault::ErrorPassive => Cause::bus(bus, bus_fault, 0.0, 0.0),
         }
     }
 
@@ -184,9 +187,9 @@ impl Watch {
     pub fn feedback_cause(&self, joint: usize) -> Option<Cause> {
         let answer = self.answers.get(joint)?;
         let rules = &self.rules;
-        let unheard_s = answer.received.map_or(f64::INFINITY, |_| self.attended_s - answer.attended_s);
+        let no_feedback_s = answer.received.map_or(f64::INFINITY, |_| self.attended_s - answer.attended_s);
         let checks = [
-            (FaultReason::FeedbackLate, unheard_s, rules.feedback_age_s_max),
+            (FaultReason::FeedbackLate, no_feedback_s, rules.feedback_age_s_max),
             (FaultReason::PositionJump, answer.jump_rad, answer.jump_limit_rad),
             (FaultReason::TrackingError, answer.tracking_rad, rules.tracking_error_rad_max),
         ];
@@ -203,15 +206,15 @@ impl Watch {
 
     /// Why a drive is not where it should be.
     #[must_use]
-    pub(crate) fn drive_cause(&self, facts: &Facts, joint: usize) -> Option<Cause> {
-        drive_cause(facts, joint, false)
+    pub(crate) fn drive_cause(&self, cycle_state: &CycleState, joint: usize) -> Option<Cause> {
+        drive_cause(cycle_state, joint, false)
     }
 
     /// Age of a joint's newest feedback, s; infinite before the first.
     #[must_use]
-    pub fn age_s(&self, facts: &Facts, joint: usize) -> f64 {
+    pub fn age_s(&self, cycle_state: &CycleState, joint: usize) -> f64 {
         let received = self.answers.get(joint).and_then(|a| a.received);
-        received.map_or(f64::INFINITY, |at| facts.tick.woke.since_s(at))
+        received.map_or(f64::INFINITY, |at| cycle_state.tick.wake_time.since_s(at))
     }
 
     /// The fastest joint and its speed over the last cycles, rad/s. `None` while one of the joints was heard for too
@@ -226,7 +229,7 @@ impl Watch {
             let time_s = answer.past_at[self.slot].since_s(answer.past_at[oldest]);
             let moved_rad = (answer.past_rad[self.slot] - answer.past_rad[oldest]).abs();
             let speed = moved_rad / time_s;
-            if (answer.told_cycles as usize) < REST_CYCLES || !speed.is_finite() {
+            if (answer.commanded_cycles as usize) < REST_CYCLES || !speed.is_finite() {
                 return None;
             }
             if speed > worst.1 {
@@ -262,8 +265,8 @@ fn transport_cycles(settings: &Settings) -> [usize; MAX_JOINTS] {
 }
 
 /// A drive that is not where it should be, or that warns.
-fn drive_cause(facts: &Facts, joint: usize, enabling: bool) -> Option<Cause> {
-    let servo = facts.servos.get(joint)?;
+fn drive_cause(cycle_state: &CycleState, joint: usize, enabling: bool) -> Option<Cause> {
+    let servo = cycle_state.servos.get(joint)?;
     let cause = |reason, code| Cause::new(reason).at_joint(joint).code(code);
     let fault = cause(FaultReason::DriveFault, servo.error_code);
     let dropped = cause(FaultReason::DriveDropped, servo.status_word);

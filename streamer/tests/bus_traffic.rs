@@ -11,9 +11,9 @@ mod arm;
 use arm::{Arm, JOINTS, shipped};
 use taustream_arm::{BusKind, Settings};
 use taustream_drivers::CanFrame;
-use taustream_drivers::sim::WiredRig;
+use taustream_drivers::sim::LinkedSimulator;
 use taustream_messages::{Command, FaultReason, Phase};
-use taustream_streamer::facts::Asked;
+use taustream_streamer::cycle_state::PendingCommand;
 
 /// The six servos of one virtual bus, with further keys for it.
 fn six_with(keys: &str) -> Settings {
@@ -25,7 +25,7 @@ fn six_with(keys: &str) -> Settings {
 
 /// A target that a drive was told, read from the wire without a line of the product's codec.
 #[derive(Clone, Copy, Debug)]
-struct Told {
+struct SentSetpoint {
     tick: u64,
     node: u32,
     counts: i32,
@@ -36,15 +36,17 @@ fn i32_at(data: &[u8], at: usize) -> i32 {
 }
 
 /// Targets of plain setpoints (RPDO 1, controlword first) and of packed ones (two targets at 0x300 plus the first node).
-fn told(tick: u64, frames: &[CanFrame]) -> Vec<Told> {
+fn setpoints_in(tick: u64, frames: &[CanFrame]) -> Vec<SentSetpoint> {
     let mut found = Vec::new();
     for frame in frames {
         let (id, data) = (frame.id().raw(), frame.data());
         match (id, data.len()) {
-            (0x201..=0x206, 6) => found.push(Told { tick, node: id - 0x200, counts: i32_at(data, 2) }),
+            (0x201..=0x206, 6) => {
+                found.push(SentSetpoint { tick, node: id - 0x200, counts: i32_at(data, 2) })
+            }
             (0x301..=0x306, 8) => {
-                found.push(Told { tick, node: id - 0x300, counts: i32_at(data, 0) });
-                found.push(Told { tick, node: id - 0x300 + 1, counts: i32_at(data, 4) });
+                found.push(SentSetpoint { tick, node: id - 0x300, counts: i32_at(data, 0) });
+                found.push(SentSetpoint { tick, node: id - 0x300 + 1, counts: i32_at(data, 4) });
             }
             _ => {}
         }
@@ -53,11 +55,11 @@ fn told(tick: u64, frames: &[CanFrame]) -> Vec<Told> {
 }
 
 /// Largest use of the stop limits by the targets that each drive was told, by plain differences over their true times.
-fn worst_use(settings: &Settings, heard: &[Told]) -> [f64; 3] {
+fn worst_use(settings: &Settings, received: &[SentSetpoint]) -> [f64; 3] {
     let limits = settings.robot.limits();
     let mut worst = [0.0_f64; 3];
     for (node, limits) in (1_u32..).zip(limits.iter().take(JOINTS)) {
-        let mine: Vec<&Told> = heard.iter().filter(|told| told.node == node).collect();
+        let mine: Vec<&SentSetpoint> = received.iter().filter(|setpoint| setpoint.node == node).collect();
         assert!(mine.len() > 100, "node {node} was told {} targets", mine.len());
         let per_rad = 101.0 * 131_072.0 / std::f64::consts::TAU;
         for window in mine.windows(4) {
@@ -79,35 +81,36 @@ fn worst_use(settings: &Settings, heard: &[Told]) -> [f64; 3] {
 }
 
 /// Cycles from one target of a node to the next, least and most.
-fn gaps(heard: &[Told], node: u32) -> (u64, u64) {
-    let ticks: Vec<u64> = heard.iter().filter(|told| told.node == node).map(|told| told.tick).collect();
+fn gaps(received: &[SentSetpoint], node: u32) -> (u64, u64) {
+    let ticks: Vec<u64> =
+        received.iter().filter(|setpoint| setpoint.node == node).map(|setpoint| setpoint.tick).collect();
     let steps = || ticks.windows(2).map(|pair| pair[1] - pair[0]);
     (steps().min().unwrap(), steps().max().unwrap())
 }
 
 /// Enables, moves to and fro, and returns what the drives were told while moving, and the largest tracking error.
-fn move_once(name: &str, settings: Settings) -> (Arm, Vec<Told>, f64) {
+fn move_once(name: &str, settings: Settings) -> (Arm, Vec<SentSetpoint>, f64) {
     let mut arm = Arm::new(name, settings);
     arm.enable();
     arm.move_it(1.0);
-    let (mut heard, mut worst_rad) = (Vec::new(), 0.0_f64);
+    let (mut received, mut worst_rad) = (Vec::new(), 0.0_f64);
     for _ in 0..8_000 {
         if arm.phase() != Phase::Moving {
             break;
         }
         arm.run(1);
-        heard.extend(told(arm.tick, &arm.sent[0]));
+        received.extend(setpoints_in(arm.tick, &arm.sent[0]));
         let (_, largest) = arm.core.supervisor().watch().tracking_rad();
         worst_rad = largest.iter().fold(worst_rad, |worst, error| worst.max(*error));
     }
     let cause = arm.core.supervisor().cause();
     assert_eq!(arm.phase(), Phase::Holding, "{name}: {cause:?}");
-    (arm, heard, worst_rad)
+    (arm, received, worst_rad)
 }
 
 /// Goal: every way to carry setpoints follows the motion within the stop limits, at its stated rate, to its end.
 #[test]
-fn every_way_to_carry_setpoints_follows_at_its_rate_inside_the_stop_limits() {
+fn every_setpoint_packing_follows_at_its_rate_inside_the_stop_limits() {
     let table = [
         ("plain", "virtual = true", 1),
         ("decimated", "virtual = true\nsetpoint_every = 2", 2),
@@ -119,18 +122,18 @@ fn every_way_to_carry_setpoints_follows_at_its_rate_inside_the_stop_limits() {
     ];
     let mut plain_rad = f64::INFINITY;
     for (name, keys, every) in table {
-        let (arm, heard, worst_rad) = move_once(&format!("way-{name}"), six_with(keys));
+        let (arm, received, worst_rad) = move_once(&format!("way-{name}"), six_with(keys));
         for node in 1..=6 {
-            assert_eq!(gaps(&heard, node), (every, every), "{name}: node {node}");
+            assert_eq!(gaps(&received, node), (every, every), "{name}: node {node}");
         }
-        let used = worst_use(&arm.settings, &heard);
+        let used = worst_use(&arm.settings, &received);
         assert!(used.iter().all(|share| *share <= 1.001), "{name}: {used:?} of the stop limits");
         assert!(used[0] > 0.2, "{name}: hardly moved, {used:?}");
         // The end of the motion itself was told, not the last turn before it.
-        let goal = arm.held_rad;
+        let goal = arm.hold_position_rad;
         for servo in &arm.settings.servos {
             let node = u32::from(servo.node_id);
-            let last = heard.iter().rev().find(|told| told.node == node).unwrap();
+            let last = received.iter().rev().find(|setpoint| setpoint.node == node).unwrap();
             let per_rad = servo.sign * 101.0 * 131_072.0 / std::f64::consts::TAU;
             let want = ((goal[servo.joint] - servo.zero_offset_rad) * per_rad).round();
             assert!(
@@ -162,7 +165,7 @@ fn staggered_setpoints_come_in_equal_shares() {
         let mut counts = Vec::new();
         for _ in 0..shares.len() {
             arm.run(1);
-            counts.push(told(arm.tick, &arm.sent[0]).len());
+            counts.push(setpoints_in(arm.tick, &arm.sent[0]).len());
         }
         counts.sort_unstable_by(|a, b| b.cmp(a));
         assert_eq!(counts, shares, "{keys}");
@@ -177,12 +180,12 @@ fn stall_with_decimated_setpoints_brings_the_joints_together_again() {
     arm.enable();
     arm.move_it(1.0);
     arm.run(500);
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     let mut run = |arm: &mut Arm, cycles: u64, after: bool| {
         for _ in 0..cycles {
             arm.run(1);
             if after {
-                heard.extend(told(arm.tick, &arm.sent[0]));
+                received.extend(setpoints_in(arm.tick, &arm.sent[0]));
             }
         }
     };
@@ -191,7 +194,7 @@ fn stall_with_decimated_setpoints_brings_the_joints_together_again() {
     arm.tick += 15;
     run(&mut arm, 4_000, true);
     assert_eq!(arm.phase(), Phase::Holding, "{:?}", arm.core.supervisor().cause());
-    let used = worst_use(&arm.settings, &heard);
+    let used = worst_use(&arm.settings, &received);
     assert!(used.iter().all(|share| *share <= 1.001), "{used:?} of the stop limits");
 }
 
@@ -227,7 +230,7 @@ fn one_overloaded_bus_loses_frames_and_stops_the_arm_where_two_do_not() {
     one.enable();
     one.move_it(1.0);
     one.run(300);
-    one.rig = WiredRig::new(one.rig.rig.clone(), &overloaded().buses, 64);
+    one.simulator = LinkedSimulator::new(one.simulator.simulator.clone(), &overloaded().buses, 64);
     for _ in 0..3_000 {
         if one.phase() == Phase::Fault {
             break;
@@ -238,8 +241,8 @@ fn one_overloaded_bus_loses_frames_and_stops_the_arm_where_two_do_not() {
     assert!(one.visited.contains(&Phase::FastStopping), "{:?} {cause:?}", one.visited);
     let stopped = matches!(cause.reason, FaultReason::FeedbackLate | FaultReason::DriveFault);
     assert!(stopped, "{cause:?}");
-    let seen = one.rig.wire(0).unwrap().facts();
-    let words = one.rig.wire(0).unwrap().in_words("one", one.now());
+    let seen = one.simulator.wire(0).unwrap().counters();
+    let words = one.simulator.wire(0).unwrap().in_words("one", one.now());
     assert!(seen.lost_from_master > 100 && seen.longest_queue == 64, "{words}");
 
     let mut settings = shipped("dual-bus.toml", str::to_owned);
@@ -249,8 +252,8 @@ fn one_overloaded_bus_loses_frames_and_stops_the_arm_where_two_do_not() {
     two.move_it(1.0);
     two.run_until(Phase::Holding, 8_000);
     for bus in 0..2 {
-        let wire = two.rig.wire(bus).unwrap();
-        let (found, planned) = (wire.facts(), two.settings.bus_load(bus).unwrap().percent);
+        let wire = two.simulator.wire(bus).unwrap();
+        let (found, planned) = (wire.counters(), two.settings.bus_load(bus).unwrap().percent);
         assert_eq!((found.lost_from_master, found.lost_from_drives), (0, 0), "{found:?}");
         assert!(found.longest_queue <= 8, "{found:?}");
         assert!(seen.longest_wait_ns > 5 * found.longest_wait_ns, "{seen:?} beside {found:?}");
@@ -269,11 +272,13 @@ fn overloaded_bus_starves_the_heartbeats_and_never_holds() {
         assert_ne!(arm.phase(), Phase::Holding);
         if arm.phase() == Phase::Disabled && arm.tick.is_multiple_of(100) {
             // Refused, or taken and not reached: both are fine, holding is not.
-            let _ = arm.desk.ask(Asked { sequence: arm.tick, command: Command::Enable });
+            let _ = arm
+                .command_queue
+                .push_command(PendingCommand { sequence: arm.tick, command: Command::Enable });
         }
-        let _answered = arm.desk.answer();
+        let _answered = arm.command_queue.answer();
     }
-    let seen = arm.rig.wire(0).unwrap().facts();
+    let seen = arm.simulator.wire(0).unwrap().counters();
     assert!(seen.longest_wait_ns > 100_000_000, "{seen:?}");
 }
 
@@ -286,10 +291,10 @@ fn lost_bus_stops_the_joints_of_the_other_on_the_path() {
     arm.run(600);
     assert_eq!(arm.phase(), Phase::Moving);
     arm.far_ends[1] = None;
-    let mut told_after = 0;
+    let mut sent_after = 0;
     for _ in 0..3_000 {
         arm.run(1);
-        told_after += told(arm.tick, &arm.sent[0]).len();
+        sent_after += setpoints_in(arm.tick, &arm.sent[0]).len();
         if arm.phase() == Phase::Fault {
             break;
         }
@@ -297,9 +302,9 @@ fn lost_bus_stops_the_joints_of_the_other_on_the_path() {
     let cause = arm.core.supervisor().cause().unwrap();
     assert_eq!((arm.phase(), cause.reason), (Phase::Fault, FaultReason::BusFault), "{cause:?}");
     assert!(arm.visited.contains(&Phase::FastStopping), "{:?}", arm.visited);
-    assert!(told_after > 150, "the joints within reach were told {told_after} targets on their way to rest");
+    assert!(sent_after > 150, "the joints within reach were told {sent_after} targets on their way to rest");
     for (joint, limits) in arm.settings.robot.limits().iter().enumerate().take(3) {
-        let speed_rad_s = arm.rig.rig.drive(joint).unwrap().velocity_rad_s();
+        let speed_rad_s = arm.simulator.simulator.drive(joint).unwrap().velocity_rad_s();
         assert!(speed_rad_s.abs() < 0.05 * limits.motion.velocity_rad_s, "joint {joint} moves");
     }
 }

@@ -11,29 +11,29 @@
 mod bus_faults;
 #[path = "cycle_suite/faults.rs"]
 mod faults;
+mod harness;
 #[path = "cycle_suite/motion.rs"]
 mod motion;
 #[path = "cycle_suite/power.rs"]
 mod power;
-mod rig;
 #[path = "cycle_suite/trust.rs"]
 mod trust;
 
-use rig::Rig;
+use harness::CycleHarness;
 use taustream_motion::Trajectory;
 
 /// Room for rounding only: a difference over a period averages the derivative, it cannot exceed it.
 const ROUNDING: f64 = 1.0 + 1e-6;
 
-fn assert_within_stop_limits(rig: &Rig) {
-    let worst = rig.worst_use_of_stop_limits();
+fn assert_within_stop_limits(harness: &CycleHarness) {
+    let worst = harness.worst_use_of_stop_limits();
     assert!(worst.iter().all(|w| *w <= ROUNDING), "use of stop limits (v, a, j): {worst:?}");
 }
 
 /// Every setpoint that a trajectory made is, bit for bit, that trajectory at the logged time.
-fn assert_on_path(rig: &Rig, trajectory: &Trajectory) {
+fn assert_on_path(harness: &CycleHarness, trajectory: &Trajectory) {
     let mut seen = 0;
-    for cycle in rig.cycles.iter().filter(|c| c.trajectory_id != 0) {
+    for cycle in harness.cycles.iter().filter(|c| c.trajectory_id != 0) {
         let expected = trajectory.sample(cycle.s).position_rad;
         assert_eq!(cycle.position_rad, expected, "tick {} at s = {}", cycle.tick, cycle.s);
         seen += 1;
@@ -41,6 +41,6 @@ fn assert_on_path(rig: &Rig, trajectory: &Trajectory) {
     assert!(seen > 10, "only {seen} setpoints of a trajectory");
 }
 
-fn arrived(rig: &Rig) -> taustream_motion::JointArray {
-    rig.world.lock().unwrap().arrived.last().unwrap().1
+fn arrived(harness: &CycleHarness) -> taustream_motion::JointArray {
+    harness.world.lock().unwrap().arrived.last().unwrap().1
 }

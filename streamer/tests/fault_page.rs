@@ -1,8 +1,8 @@
 //! The page for users against the code: every reason in its exact words, and no row for a reason that does not exist.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test ends by panicking")]
 use std::collections::BTreeSet;
-use taustream_drivers::bring_up::Trouble;
-use taustream_messages::{BusTrouble, FaultReason, Phase, Rejection};
+use taustream_drivers::bring_up::BringUpFault;
+use taustream_messages::{BusFault, FaultReason, Phase, Rejection};
 
 const PAGE: &str = include_str!("../../docs/faults.md");
 
@@ -47,15 +47,15 @@ fn rejections() -> Vec<String> {
 /// What page and code disagree about; empty when they agree.
 fn differences(page: &str) -> Vec<String> {
     let mut found = Vec::new();
-    let mut compare = |section: &str, wanted: BTreeSet<String>| {
+    let mut compare = |section: &str, requested: BTreeSet<String>| {
         let written = rows(page, section);
-        found.extend(wanted.difference(&written).map(|word| format!("{section}: no row for `{word}`")));
-        found.extend(written.difference(&wanted).map(|word| format!("{section}: nothing says `{word}`")));
+        found.extend(requested.difference(&written).map(|word| format!("{section}: no row for `{word}`")));
+        found.extend(written.difference(&requested).map(|word| format!("{section}: nothing says `{word}`")));
     };
     compare("Reasons", FaultReason::ALL.iter().map(|r| r.word().to_owned()).collect());
-    compare("Buses", BusTrouble::ALL.iter().map(|t| t.word().to_owned()).collect());
-    let finding = |t: &Trouble| t.sentence().split(';').next().unwrap().to_owned();
-    compare("What is found about a drive", Trouble::ALL.iter().map(finding).collect());
+    compare("Buses", BusFault::ALL.iter().map(|t| t.word().to_owned()).collect());
+    let finding = |t: &BringUpFault| t.sentence().split(';').next().unwrap().to_owned();
+    compare("What is found about a drive", BringUpFault::ALL.iter().map(finding).collect());
     // Receipts carry numbers: each begins with its row's words, and each row begins one.
     let (receipts, rows) = (rejections(), rows(page, "Rejected trajectories"));
     let begins = |receipt: &String| rows.iter().any(|row| receipt.starts_with(row.as_str()));
@@ -72,7 +72,7 @@ fn fault_page_has_every_reason_of_the_code_and_no_other() {
 
 /// Goal: the comparison can fail, both ways, in each section.
 #[test]
-fn fault_page_that_was_doctored_is_noticed() {
+fn fault_page_that_was_corrupted_is_noticed() {
     for word in ["loop stalled (s)", "controller is bus-off", "the drive does not answer", "busy: "] {
         let row = format!("\n| `{word}`");
         assert!(PAGE.contains(&row), "`{word}` is not on the page");

@@ -14,10 +14,10 @@ mod arm;
 use arm::{Arm, JOINTS, shipped};
 use taustream_arm::Settings;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
-use taustream_drivers::sim::FaultOrder;
+use taustream_drivers::sim::FaultRequest;
 use taustream_messages::{Command, Phase};
 use taustream_streamer::cycle::{Probe, Stage};
-use taustream_streamer::facts::Asked;
+use taustream_streamer::cycle_state::PendingCommand;
 
 #[path = "../../drivers/tests/counting/mod.rs"]
 mod counting;
@@ -59,14 +59,14 @@ fn cycle_over_two_buses_packed_and_staggered_never_allocates() {
 }
 
 fn fault(arm: &mut Arm, spec: &str) {
-    let order = FaultOrder::parse(spec, &arm.rig.rig.joints()).unwrap();
-    arm.rig.rig.order(arm.now(), order);
+    let request = FaultRequest::parse(spec, &arm.simulator.simulator.joints()).unwrap();
+    arm.simulator.simulator.request(arm.now(), request);
 }
 
 /// From fault back to holding, by the whole way down and up.
 fn recover(arm: &mut Arm) {
     arm.run_until(Phase::Fault, 3_000);
-    arm.rig.rig.clear(None);
+    arm.simulator.simulator.clear(None);
     arm.run(100);
     arm.ask(Command::Disable);
     arm.run(500);
@@ -88,15 +88,17 @@ fn lose_a_bus_and_restore_it(arm: &mut Arm) {
     }
     let servos = link::open(&arm.settings.buses[0], LinkChoice::Local, LinkRole::Servos, &arm.runtime);
     arm.far_ends[0] = Some(servos.unwrap());
-    assert!(arm.desk.ask(Asked { sequence: arm.tick, command: Command::ClearFault }));
+    assert!(
+        arm.command_queue.push_command(PendingCommand { sequence: arm.tick, command: Command::ClearFault })
+    );
     arm.run(1);
-    let mut handover = arm.desk.failed_links().expect("the failed bus's link is handed out");
-    handover.well = handover.links.iter_mut().flatten().all(|link| link.reopen().is_ok());
-    assert!(handover.well, "the link cannot be reopened");
+    let mut handover = arm.command_queue.failed_links().expect("the failed bus's link is handed out");
+    handover.recovered = handover.links.iter_mut().flatten().all(|link| link.reopen().is_ok());
+    assert!(handover.recovered, "the link cannot be reopened");
     arm.run(3);
-    arm.desk.give_back_links(handover);
+    arm.command_queue.return_links(handover);
     arm.run(1);
-    assert!(arm.desk.answer().unwrap().accepted);
+    assert!(arm.command_queue.answer().unwrap().accepted);
     // The drives' own watchdogs have left faults, which are reported once they were looked at anew.
     arm.run(1_000);
     if arm.phase() == Phase::Fault {

@@ -232,11 +232,11 @@ mod tests {
         ) {
             let _ = parse(&garbage);
             let line = "(1700000000.000250) vcan0 201#0F00E8030000\n";
-            let mut doctored = line.to_owned();
-            doctored.replace_range(at..=at, &with.to_string());
+            let mut corrupted = line.to_owned();
+            corrupted.replace_range(at..=at, &with.to_string());
             let same = |log: &str| parse(log) == parse(line);
-            let is_equal = doctored.eq_ignore_ascii_case(line);
-            proptest::prop_assert!(!same(&doctored) || is_equal, "{doctored:?} was read as {line:?}");
+            let is_equal = corrupted.eq_ignore_ascii_case(line);
+            proptest::prop_assert!(!same(&corrupted) || is_equal, "{corrupted:?} was read as {line:?}");
         }
     }
 }

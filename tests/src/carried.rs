@@ -1,5 +1,5 @@
 //! What one bus carried, cycle by cycle, and how much of it the log has claimed.
-use crate::cycle_log::Cycle;
+use crate::cycle_log::LoggedCycle;
 use crate::setpoints::{BusFrame, Encoding, Flaw, may_be_off, target};
 
 /// CANopen SYNC.
@@ -37,7 +37,7 @@ impl<'a> Carried<'a> {
     }
 
     /// Compares a cycle whose frames are all there; how many setpoints it had.
-    pub(crate) fn compare_whole(&mut self, cycle: &Cycle) -> Result<usize, Flaw> {
+    pub(crate) fn compare_whole(&mut self, cycle: &LoggedCycle) -> Result<usize, Flaw> {
         let flaw = self.flaw_in(cycle);
         let encodings = self.encodings;
         let sent = self.claim(cycle)?;
@@ -63,27 +63,28 @@ impl<'a> Carried<'a> {
                 return Err(flaw(format!("node {node} is not told to follow while {}", cycle.phase)));
             }
             let got = target(data).ok_or_else(|| flaw(format!("node {node} got {} bytes", data.len())))?;
-            let wish = cycle.position_rad.get(encoding.joint).copied();
-            let wish = wish.ok_or_else(|| flaw(format!("no setpoint of joint {}", encoding.joint + 1)))?;
-            let want = encoding.counts(wish);
+            let requested = cycle.position_rad.get(encoding.joint).copied();
+            let requested =
+                requested.ok_or_else(|| flaw(format!("no setpoint of joint {}", encoding.joint + 1)))?;
+            let want = encoding.counts(requested);
             if got != want {
-                return Err(flaw(format!("node {node} got target {got}, {wish} rad encodes to {want}")));
+                return Err(flaw(format!("node {node} got target {got}, {requested} rad encodes to {want}")));
             }
         }
         Ok(sent.len())
     }
 
     /// Compares what is left of a cycle that was lost in part: its SYNC, if that left, and the setpoints behind it.
-    pub(crate) fn compare_rest(&mut self, cycle: &Cycle) -> Result<usize, Flaw> {
+    pub(crate) fn compare_rest(&mut self, cycle: &LoggedCycle) -> Result<usize, Flaw> {
         let flaw = self.flaw_in(cycle);
         let encodings = self.encodings;
         let sent = self.claim(cycle)?;
         for (node, data) in sent.iter().filter(|(_, data)| follows_target(data)) {
             let encoding = encodings.iter().find(|e| e.node_id == *node);
-            let wish = encoding.and_then(|e| Some(e.counts(*cycle.position_rad.get(e.joint)?)));
-            if target(data) != wish {
+            let requested = encoding.and_then(|e| Some(e.counts(*cycle.position_rad.get(e.joint)?)));
+            if target(data) != requested {
                 return Err(flaw(format!(
-                    "node {node} got target {:?}, the setpoint encodes to {wish:?}",
+                    "node {node} got target {:?}, the setpoint encodes to {requested:?}",
                     target(data)
                 )));
             }
@@ -104,7 +105,7 @@ impl<'a> Carried<'a> {
     }
 
     /// The setpoints that followed a cycle's SYNC; from now on they count as claimed.
-    fn claim(&mut self, cycle: &Cycle) -> Result<&[Setpoint], Flaw> {
+    fn claim(&mut self, cycle: &LoggedCycle) -> Result<&[Setpoint], Flaw> {
         let sync = cycle.sync.get(self.bus).copied().unwrap_or(0);
         let at = sync.checked_sub(self.missing + 1).and_then(|at| usize::try_from(at).ok());
         let slot = at.and_then(|at| self.cycles.get(at).zip(self.claimed.get_mut(at)));
@@ -115,7 +116,7 @@ impl<'a> Carried<'a> {
         Ok(sent)
     }
 
-    fn flaw_in(&self, cycle: &Cycle) -> impl Fn(String) -> Flaw + use<> {
+    fn flaw_in(&self, cycle: &LoggedCycle) -> impl Fn(String) -> Flaw + use<> {
         let (sync, tick) = (cycle.sync.get(self.bus).copied().unwrap_or(0), cycle.tick);
         move |what| Flaw::Bus { sync, tick, what }
     }

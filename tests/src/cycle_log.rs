@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// One cycle that sent setpoints.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
-pub struct Cycle {
+pub struct LoggedCycle {
     /// Cycle number.
     pub tick: u64,
     /// CLOCK_MONOTONIC of the cycle.
@@ -59,7 +59,7 @@ pub enum Event {
         file: serde_json::Value,
     },
     /// Setpoints were sent.
-    Cycle(Cycle),
+    LoggedCycle(LoggedCycle),
     /// The phase changed.
     Phase {
         /// Cycle number.

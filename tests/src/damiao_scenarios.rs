@@ -1,6 +1,6 @@
 //! What must hold of an arm of Damiao motors over the real processes on a real vcan0.
 use crate::scenarios::{Goals, arrive_within, enable, set_off};
-use crate::stage::{PATIENCE, Stage};
+use crate::test_bench::{TIMEOUT, TestBench};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ pub struct Scenario {
     /// Area, event, condition.
     pub name: &'static str,
     /// What it does; it fails by an error.
-    pub run: fn(&mut Stage, &Goals) -> Result<()>,
+    pub run: fn(&mut TestBench, &Goals) -> Result<()>,
     /// It kills the streamer, whose log then ends in the middle of something.
     pub kills: bool,
 }
@@ -33,97 +33,97 @@ pub const ALL: &[Scenario] = &[
     Scenario { name: "damiao_streamer_killed_mid_motion_motors_let_go", run: streamer_killed, kills: true },
 ];
 
-fn goals_with_pause(stage: &mut Stage, goals: &Goals) -> Result<()> {
-    enable(stage)?;
+fn goals_with_pause(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    enable(bench)?;
     for index in 0..goals.0.len() {
-        let motion = set_off(stage, goals, index, 0.3)?;
+        let motion = set_off(bench, goals, index, 0.3)?;
         if index == 1 {
-            stage.cli_done(&["pause"])?;
-            let paused = stage.await_phase(Phase::Paused)?;
+            bench.cli_done(&["pause"])?;
+            let paused = bench.await_phase(Phase::Paused)?;
             ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
-            stage.cli_done(&["resume"])?;
+            bench.cli_done(&["resume"])?;
         }
-        let report = arrive_within(stage, motion, goals.rad(index)?, AT_GOAL_RAD)?;
+        let report = arrive_within(bench, motion, goals.rad(index)?, AT_GOAL_RAD)?;
         ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
     }
-    stage.cli_done(&["disable"])?;
-    stage.await_phase(Phase::Disabled)?;
+    bench.cli_done(&["disable"])?;
+    bench.await_phase(Phase::Disabled)?;
     Ok(())
 }
 
 /// A fault of one motor ends in `Fault` with the joint named; after the cause is gone the arm comes back by command only.
-fn fault_and_back(stage: &mut Stage, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
-    enable(stage)?;
-    stage.cli_done(&["speed", "20"])?;
-    set_off(stage, goals, 0, 0.1)?;
-    stage.simulator.tell(fault)?;
-    let report = stage.await_phase(Phase::Fault)?;
+fn fault_and_back(bench: &mut TestBench, goals: &Goals, fault: &str, reasons: &[FaultReason]) -> Result<()> {
+    enable(bench)?;
+    bench.cli_done(&["speed", "20"])?;
+    set_off(bench, goals, 0, 0.1)?;
+    bench.simulator.show(fault)?;
+    let report = bench.await_phase(Phase::Fault)?;
     ensure!(report.fault_joint == 2, "joint 3 is to blame, the report names index {}", report.fault_joint);
     let reason = report.fault().context("a fault without a reason")?;
     ensure!(reasons.contains(&reason), "reason {reason:?}, expected one of {reasons:?}");
-    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "fault")?;
-    stage.simulator.tell("clear")?;
-    stage.cli_done(&["disable"])?;
-    stage.await_report("all motors off", |report, _| report.energised == 0)?;
-    bring_back(stage)?;
-    enable(stage)?;
-    let motion = stage.replan(&goals.text(1)?)?;
-    arrive_within(stage, motion, goals.rad(1)?, AT_GOAL_RAD)?;
+    bench.cli_refused(&["replan", "--goal", &goals.text(1)?], "fault")?;
+    bench.simulator.show("clear")?;
+    bench.cli_done(&["disable"])?;
+    bench.await_report("all motors off", |report, _| report.energised == 0)?;
+    bring_back(bench)?;
+    enable(bench)?;
+    let motion = bench.replan(&goals.text(1)?)?;
+    arrive_within(bench, motion, goals.rad(1)?, AT_GOAL_RAD)?;
     Ok(())
 }
 
 /// Clears, again while motors come back with faults of their own, until the arm is ready and stays so.
-fn bring_back(stage: &mut Stage) -> Result<()> {
+fn bring_back(bench: &mut TestBench) -> Result<()> {
     let since = Instant::now();
     loop {
         let mut ready = 0;
-        while stage.report()?.1 == Phase::Disabled && ready < 10 {
+        while bench.report()?.1 == Phase::Disabled && ready < 10 {
             ready += 1;
             std::thread::sleep(Duration::from_millis(50));
         }
         if ready == 10 {
             return Ok(());
         }
-        ensure!(since.elapsed() < PATIENCE, "the fault cannot be cleared: {}", stage.streamer.said());
-        stage.cli(&["clear-fault"])?;
+        ensure!(since.elapsed() < TIMEOUT, "the fault cannot be cleared: {}", bench.streamer.said());
+        bench.cli(&["clear-fault"])?;
     }
 }
 
-fn motor_silent(stage: &mut Stage, goals: &Goals) -> Result<()> {
+fn motor_silent(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let reasons = [FaultReason::FeedbackLate, FaultReason::DriveFault];
-    fault_and_back(stage, goals, "fault joint=3,kind=silence", &reasons)
+    fault_and_back(bench, goals, "fault joint=3,kind=silence", &reasons)
 }
 
-fn motor_fault(stage: &mut Stage, goals: &Goals) -> Result<()> {
-    fault_and_back(stage, goals, "fault joint=3,kind=fault,value=0xA", &[FaultReason::DriveFault])
+fn motor_fault(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    fault_and_back(bench, goals, "fault joint=3,kind=fault,value=0xA", &[FaultReason::DriveFault])
 }
 
-fn streamer_killed(stage: &mut Stage, goals: &Goals) -> Result<()> {
-    enable(stage)?;
-    stage.cli_done(&["speed", "20"])?;
-    set_off(stage, goals, 0, 0.1)?;
-    stage.streamer.signal(Signal::KILL)?;
-    stage.streamer.await_end()?;
+fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    enable(bench)?;
+    bench.cli_done(&["speed", "20"])?;
+    set_off(bench, goals, 0, 0.1)?;
+    bench.streamer.signal(Signal::KILL)?;
+    bench.streamer.await_end()?;
     let since = Instant::now();
     // Every motor has its own watchdog; status 0xD says that it was what let go, and the brakes hold the arm.
-    while stage.simulator.said().matches("status=0xD").count() < 6 {
-        ensure!(since.elapsed() < PATIENCE, "motors do not let go: {}", stage.simulator.said());
-        stage.simulator.tell("status")?;
+    while bench.simulator.said().matches("status=0xD").count() < 6 {
+        ensure!(since.elapsed() < TIMEOUT, "motors do not let go: {}", bench.simulator.said());
+        bench.simulator.show("status")?;
         std::thread::sleep(Duration::from_millis(100));
     }
-    let at = |stage: &Stage| -> Vec<f64> {
-        let said = stage.simulator.said();
+    let at = |bench: &TestBench| -> Vec<f64> {
+        let said = bench.simulator.said();
         let angles = said.lines().filter_map(|line| line.split("position_rad=").nth(1));
         let mut angles: Vec<f64> = angles.filter_map(|rest| rest.split(' ').next()?.parse().ok()).collect();
         angles.split_off(angles.len().saturating_sub(6))
     };
-    stage.simulator.tell("status")?;
+    bench.simulator.show("status")?;
     std::thread::sleep(Duration::from_millis(200));
-    let rest_rad = at(stage);
+    let rest_rad = at(bench);
     std::thread::sleep(Duration::from_millis(500));
-    stage.simulator.tell("status")?;
+    bench.simulator.show("status")?;
     std::thread::sleep(Duration::from_millis(200));
-    let still = at(stage).iter().zip(&rest_rad).all(|(now, then)| (now - then).abs() < 1e-6);
-    ensure!(still && rest_rad.len() == 6, "brakes do not hold: {rest_rad:?}, then {:?}", at(stage));
+    let still = at(bench).iter().zip(&rest_rad).all(|(now, then)| (now - then).abs() < 1e-6);
+    ensure!(still && rest_rad.len() == 6, "brakes do not hold: {rest_rad:?}, then {:?}", at(bench));
     Ok(())
 }

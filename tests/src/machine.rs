@@ -194,10 +194,11 @@ impl Machine {
         let mut guest = Guest::start(
             self.launcher(scratch.path())?.args(words).stdin(out_writer).stdout(err_writer).stderr(log),
         )?;
-        let unheard = Arc::new(AtomicBool::new(false));
-        let copies = [copy(out_reader, stdout, &unheard), copy(err_reader, stderr, &unheard)];
+        let without_feedback = Arc::new(AtomicBool::new(false));
+        let copies =
+            [copy(out_reader, stdout, &without_feedback), copy(err_reader, stderr, &without_feedback)];
         let limit = BOOT_AND_HALT + Duration::from_secs(self.limit_s.into());
-        let in_time = guest.wait(limit, &[stop, &unheard]);
+        let in_time = guest.wait(limit, &[stop, &without_feedback]);
         // The consoles end when the last process of the guest has.
         let status = guest.end();
         for copy in copies {
@@ -438,15 +439,17 @@ impl Drop for Guest {
 fn copy(
     mut from: PipeReader,
     mut to: impl Write + Send + 'static,
-    unheard: &Arc<AtomicBool>,
+    without_feedback: &Arc<AtomicBool>,
 ) -> JoinHandle<()> {
-    let unheard = Arc::clone(unheard);
+    let without_feedback = Arc::clone(without_feedback);
     std::thread::spawn(move || {
         let mut buffer = [0; 1 << 14];
         while let Ok(count) = from.read(&mut buffer) {
             let Some(bytes) = buffer.get(..count).filter(|bytes| !bytes.is_empty()) else { break };
-            if !unheard.load(Ordering::Relaxed) && to.write_all(bytes).and_then(|()| to.flush()).is_err() {
-                unheard.store(true, Ordering::Relaxed);
+            if !without_feedback.load(Ordering::Relaxed)
+                && to.write_all(bytes).and_then(|()| to.flush()).is_err()
+            {
+                without_feedback.store(true, Ordering::Relaxed);
             }
         }
     })

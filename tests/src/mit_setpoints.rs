@@ -7,8 +7,8 @@
 //! For each cycle of the log: each motor has one frame; outside of enabling and faults that is a command with the whole
 //! gains, the logged angle, and the velocity that this angle has from cycle to cycle. That logged angles are those of the
 //! accepted trajectory is judged as for every other arm.
-use crate::cycle_log::{Cycle, Event};
-use crate::setpoints::{BusFrame, Flaw, Verdict, compare_trajectory, may_be_off, trajectory};
+use crate::cycle_log::{Event, LoggedCycle};
+use crate::setpoints::{BusFrame, CheckResult, Flaw, compare_trajectory, may_be_off, trajectory};
 use std::collections::BTreeMap;
 use taustream_arm::{DamiaoMode, Settings};
 use taustream_motion::Trajectory;
@@ -113,33 +113,33 @@ pub enum LogEnds {
 ///
 /// # Errors
 /// The first flaw.
-pub fn judge(
+pub fn check_setpoints(
     (frames, log): (&[BusFrame], &[Event]),
     bus: usize,
     (motors, period_s): (&[MotorEncoding], f64),
     ends: LogEnds,
-) -> Result<Verdict, Flaw> {
+) -> Result<CheckResult, Flaw> {
     let ours =
         |frame: &&BusFrame| frame.id == REGISTERS || motors.iter().any(|m| u32::from(m.node_id) == frame.id);
     let sent: Vec<&BusFrame> = frames.iter().filter(ours).collect();
-    let mut verdict = Verdict { frames: frames.len(), ..last_measured(frames, motors) };
+    let mut check_result = CheckResult { frames: frames.len(), ..last_measured(frames, motors) };
     let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
     let mut claimed = vec![false; sent.len()];
-    let mut last: Option<&Cycle> = None;
+    let mut last: Option<&LoggedCycle> = None;
     for event in log {
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
             Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
             Event::Trajectory { trajectory_id, file, .. } => {
                 trajectories.insert(*trajectory_id, trajectory(file)?);
-                verdict.trajectories += 1;
+                check_result.trajectories += 1;
             }
-            Event::Cycle(cycle) => {
+            Event::LoggedCycle(cycle) => {
                 let before = last.filter(|last| last.tick + 1 == cycle.tick);
-                verdict.setpoints +=
+                check_result.setpoints +=
                     compare_cycle(&sent, (before, cycle), bus, (motors, period_s), &mut claimed)?;
-                verdict.on_trajectory += compare_trajectory(&trajectories, cycle)?;
-                verdict.syncs += 1;
+                check_result.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                check_result.syncs += 1;
                 last = Some(cycle);
             }
         }
@@ -158,14 +158,14 @@ pub fn judge(
             frame.id
         )));
     }
-    verdict.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
-    Ok(verdict)
+    check_result.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
+    Ok(check_result)
 }
 
 /// Compares one cycle's frames with its line of the log; how many commands were compared.
 fn compare_cycle(
     sent: &[&BusFrame],
-    (before, cycle): (Option<&Cycle>, &Cycle),
+    (before, cycle): (Option<&LoggedCycle>, &LoggedCycle),
     bus: usize,
     (motors, period_s): (&[MotorEncoding], f64),
     claimed: &mut [bool],
@@ -211,12 +211,13 @@ fn is_to(frame: &BusFrame, node_id: u8) -> bool {
 fn compare_command(
     motor: &MotorEncoding,
     command: Command,
-    (before, cycle): (Option<&Cycle>, &Cycle),
+    (before, cycle): (Option<&LoggedCycle>, &LoggedCycle),
     period_s: f64,
 ) -> Result<(), String> {
     let node = motor.node_id;
-    let angle =
-        |cycle: &Cycle| cycle.position_rad.get(motor.joint).map(|rad| (rad - motor.zero_rad) * motor.sign);
+    let angle = |cycle: &LoggedCycle| {
+        cycle.position_rad.get(motor.joint).map(|rad| (rad - motor.zero_rad) * motor.sign)
+    };
     let wanted = angle(cycle).ok_or_else(|| format!("no setpoint of joint {}", motor.joint + 1))?;
     let [reach_rad, reach_rad_s] = motor.reach;
     if !packs(wanted, command.position, 16, [-reach_rad, reach_rad]) {
@@ -239,7 +240,7 @@ fn compare_command(
     Ok(())
 }
 
-fn last_measured(frames: &[BusFrame], motors: &[MotorEncoding]) -> Verdict {
+fn last_measured(frames: &[BusFrame], motors: &[MotorEncoding]) -> CheckResult {
     let newest = |m: &MotorEncoding| {
         let id = u32::from(m.feedback_id);
         let data: [u8; 8] = frames.iter().rev().find(|f| f.id == id)?.data.as_slice().try_into().ok()?;
@@ -247,5 +248,5 @@ fn last_measured(frames: &[BusFrame], motors: &[MotorEncoding]) -> Verdict {
         Some(value(bits(data, 8, 16), 16, [-reach_rad, reach_rad]) * m.sign + m.zero_rad)
     };
     let last_measured_rad = motors.iter().map(|m| newest(m).unwrap_or(f64::NAN)).collect();
-    Verdict { last_measured_rad, ..Verdict::default() }
+    CheckResult { last_measured_rad, ..CheckResult::default() }
 }

@@ -2,9 +2,9 @@
 //!
 //! The stage's recording goes on over the kill; the judge of setpoints does not, because a log ends with its streamer.
 use crate::candump;
-use crate::patience::Failed;
+use crate::retry::Failed;
 use crate::scenarios::{Goals, set_off};
-use crate::stage::{Place, Stage};
+use crate::test_bench::{Place, TestBench};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::fs;
@@ -48,31 +48,31 @@ fn holding_settings(place: &Place) -> Result<PathBuf> {
 pub fn perform(restart: &Restart, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let settings = holding_settings(place)?;
     let place = Place { settings: settings.clone(), ..place.clone() };
-    let mut stage = Stage::open(&place, &format!("{}-{attempt}", restart.name))?;
-    let outcome = kill_and_restart(restart, &mut stage, goals);
+    let mut bench = TestBench::open(&place, &format!("{}-{attempt}", restart.name))?;
+    let outcome = kill_and_restart(restart, &mut bench, goals);
     fs::remove_file(&settings).context("the settings of this scenario cannot be removed")?;
-    outcome.map_err(|error| stage.failed(error))
+    outcome.map_err(|error| bench.failed(error))
 }
 
-fn kill_and_restart(restart: &Restart, stage: &mut Stage, goals: &Goals) -> Result<String> {
-    stage.cli_done(&["enable"])?;
-    stage.await_phase(Phase::Holding)?;
+fn kill_and_restart(restart: &Restart, bench: &mut TestBench, goals: &Goals) -> Result<String> {
+    bench.cli_done(&["enable"])?;
+    bench.await_phase(Phase::Holding)?;
     if restart.mid_motion {
-        set_off(stage, goals, 0, 0.2)?;
+        set_off(bench, goals, 0, 0.2)?;
     }
-    stage.streamer.signal(Signal::KILL)?;
-    stage.streamer.await_end()?;
+    bench.streamer.signal(Signal::KILL)?;
+    bench.streamer.await_end()?;
     // Longer than the drives wait for the master's heartbeat: they have stopped quickly, and hold.
     std::thread::sleep(Duration::from_millis(1500));
     let restarted_us = SystemTime::now().duration_since(UNIX_EPOCH)?.as_micros();
-    stage.restart_streamer()?;
-    let locked = stage.await_report("the adopted hold", |report, phase| {
+    bench.restart_streamer()?;
+    let locked = bench.await_report("the adopted hold", |report, phase| {
         phase == Phase::Locked && report.adopted == 1 && report.measured_rad[0].is_finite()
     })?;
     ensure!(locked.energised == 1, "the drives are not energised");
-    stage.cli_refused(&["replan", "--goal", &goals.text(1)?], "locked")?;
+    bench.cli_refused(&["replan", "--goal", &goals.text(1)?], "locked")?;
     std::thread::sleep(Duration::from_millis(500));
-    let still = stage.report()?.0;
+    let still = bench.report()?.0;
     for joint in 0..still.joints() {
         let moved_rad = (still.measured_rad[joint] - locked.measured_rad[joint]).abs();
         ensure!(moved_rad < STILL_RAD, "joint {} moved by {moved_rad} rad before enable", joint + 1);
@@ -82,15 +82,15 @@ fn kill_and_restart(restart: &Restart, stage: &mut Stage, goals: &Goals) -> Resu
             joint + 1
         );
     }
-    let recording = stage.recorded()?;
+    let recording = bench.recorded()?;
     // The last line may be half written.
     let whole = recording.rfind('\n').map_or("", |end| recording.get(..=end).unwrap_or_default());
     let told = only_keeping(whole, restarted_us)?;
-    stage.cli_done(&["enable"])?;
-    stage.await_phase(Phase::Holding)?;
-    stage.cli_done(&["speed", "100"])?;
-    let motion = stage.replan(&goals.text(1)?)?;
-    stage.await_end_of(motion)?;
+    bench.cli_done(&["enable"])?;
+    bench.await_phase(Phase::Holding)?;
+    bench.cli_done(&["speed", "100"])?;
+    let motion = bench.replan(&goals.text(1)?)?;
+    bench.await_end_of(motion)?;
     Ok(format!("{told} setpoints before enable, all of them the hold"))
 }
 

@@ -5,7 +5,7 @@
 //! of the logged setpoint count by count, and the logged setpoint equals the accepted trajectory at the logged
 //! trajectory time: bit for bit by the product's sampler, and to 1e-11 rad by a second formula written here.
 use crate::carried::Carried;
-use crate::cycle_log::{Cycle, Event};
+use crate::cycle_log::{Event, LoggedCycle};
 use std::collections::BTreeMap;
 use std::fmt;
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
@@ -56,7 +56,7 @@ impl Encoding {
 
 /// What a recording showed.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Verdict {
+pub struct CheckResult {
     /// Frames of any kind on the bus.
     pub frames: usize,
     /// SYNCs on the bus.
@@ -73,7 +73,7 @@ pub struct Verdict {
     pub last_setpoint_rad: Vec<f64>,
 }
 
-impl Verdict {
+impl CheckResult {
     /// Takes in what another bus of the same recording showed.
     pub fn add(&mut self, other: Self) {
         self.frames += other.frames;
@@ -86,7 +86,7 @@ impl Verdict {
     }
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for CheckResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { frames, syncs, setpoints, on_trajectory, .. } = self;
         write!(
@@ -142,54 +142,57 @@ pub enum Losses {
 ///
 /// # Errors
 /// The first flaw.
-pub fn judge(
+pub fn check_setpoints(
     frames: &[BusFrame],
     log: &[Event],
     bus: usize,
     encodings: &[Encoding],
-) -> Result<Verdict, Flaw> {
-    judge_with(Losses::None, (frames, log), bus, encodings)
+) -> Result<CheckResult, Flaw> {
+    check_setpoints_with(Losses::None, (frames, log), bus, encodings)
 }
 
 /// Judges one bus of a recording in which cycles may have been lost.
 ///
 /// # Errors
 /// The first flaw.
-pub fn judge_with(
+pub fn check_setpoints_with(
     losses: Losses,
     (frames, log): (&[BusFrame], &[Event]),
     bus: usize,
     encodings: &[Encoding],
-) -> Result<Verdict, Flaw> {
-    let judge = |fates: &Fates| judge_assuming(fates, losses, (frames, log), bus, encodings);
-    let whole = judge(&Fates::new());
+) -> Result<CheckResult, Flaw> {
+    let check_setpoints =
+        |outcomes: &ProcessOutcomes| check_assuming(outcomes, losses, (frames, log), bus, encodings);
+    let whole = check_setpoints(&ProcessOutcomes::new());
     let doubtful = if losses == Losses::AsLogged { before_silences(log, bus) } else { Vec::new() };
-    let other = whole.is_err().then(|| fates_of(&doubtful).iter().find_map(|fates| judge(fates).ok()));
+    let other = whole
+        .is_err()
+        .then(|| outcomes_of(&doubtful).iter().find_map(|outcomes| check_setpoints(outcomes).ok()));
     other.flatten().map_or(whole, Ok)
 }
 
 /// Judges with cycles that did not fare as the log says.
-fn judge_assuming(
-    fates: &Fates,
+fn check_assuming(
+    outcomes: &ProcessOutcomes,
     losses: Losses,
     (frames, log): (&[BusFrame], &[Event]),
     bus: usize,
     encodings: &[Encoding],
-) -> Result<Verdict, Flaw> {
+) -> Result<CheckResult, Flaw> {
     let mut carried = Carried::new(frames, bus, encodings);
-    let mut verdict =
-        Verdict { frames: frames.len(), syncs: carried.syncs(), ..last_measured(frames, encodings) };
+    let mut check_result =
+        CheckResult { frames: frames.len(), syncs: carried.syncs(), ..last_measured(frames, encodings) };
     let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
-    let mut last: Option<&Cycle> = None;
+    let mut last: Option<&LoggedCycle> = None;
     for event in log {
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
             Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
             Event::Trajectory { trajectory_id, file, .. } => {
                 trajectories.insert(*trajectory_id, trajectory(file)?);
-                verdict.trajectories += 1;
+                check_result.trajectories += 1;
             }
-            Event::Cycle(cycle) => {
+            Event::LoggedCycle(cycle) => {
                 let whole = is_whole(cycle, bus);
                 if !whole && losses == Losses::None {
                     return Err(Flaw::Log(format!(
@@ -197,28 +200,28 @@ fn judge_assuming(
                         cycle.tick, cycle.lost
                     )));
                 }
-                verdict.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                check_result.on_trajectory += compare_trajectory(&trajectories, cycle)?;
                 if is_lost(cycle, bus) {
                     continue; // Nothing of it left: the next cycle takes its place.
                 }
                 follows(last, cycle, bus)?;
-                verdict.setpoints += match fates.get(&cycle.tick) {
+                check_result.setpoints += match outcomes.get(&cycle.tick) {
                     None if whole => carried.compare_whole(cycle)?,
-                    None | Some(Fate::InPart) => carried.compare_rest(cycle)?,
-                    Some(Fate::Gone) => carried.pass_over(),
+                    None | Some(ProcessOutcome::InPart) => carried.compare_rest(cycle)?,
+                    Some(ProcessOutcome::Gone) => carried.pass_over(),
                 };
                 last = Some(cycle);
             }
         }
     }
     carried.nothing_else()?;
-    verdict.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
-    Ok(verdict)
+    check_result.last_setpoint_rad = last.map(|c| c.position_rad.clone()).unwrap_or_default();
+    Ok(check_result)
 }
 
 /// How a cycle fared that the kernel had taken when its interface went: frames on the way go with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fate {
+enum ProcessOutcome {
     /// Only a part of it came through, its SYNC first.
     InPart,
     /// Nothing of it came through.
@@ -226,7 +229,7 @@ enum Fate {
 }
 
 /// By cycle number; who is not in it fared as the log says.
-type Fates = BTreeMap<u64, Fate>;
+type ProcessOutcomes = BTreeMap<u64, ProcessOutcome>;
 
 /// Cycles in a row without a frame that make a silence.
 const SILENCE_CYCLES: usize = 20;
@@ -236,7 +239,7 @@ const SILENCES_MAX: usize = 3;
 /// The last cycles that a bus took before it fell silent.
 fn before_silences(log: &[Event], bus: usize) -> Vec<u64> {
     let cycle = |event: &Event| match event {
-        Event::Cycle(cycle) => Some((cycle.tick, is_lost(cycle, bus))),
+        Event::LoggedCycle(cycle) => Some((cycle.tick, is_lost(cycle, bus))),
         Event::Start { .. } | Event::Phase { .. } | Event::Lost { .. } | Event::Trajectory { .. } => None,
     };
     let cycles: Vec<(u64, bool)> = log.iter().filter_map(cycle).collect();
@@ -245,14 +248,14 @@ fn before_silences(log: &[Event], bus: usize) -> Vec<u64> {
 }
 
 /// Every way in which these cycles may have fared.
-fn fates_of(ticks: &[u64]) -> Vec<Fates> {
-    let mut all = vec![Fates::new()];
+fn outcomes_of(ticks: &[u64]) -> Vec<ProcessOutcomes> {
+    let mut all = vec![ProcessOutcomes::new()];
     for tick in ticks {
         let before = all.clone();
-        for fate in [Fate::InPart, Fate::Gone] {
-            all.extend(before.iter().cloned().map(|mut fates| {
-                fates.insert(*tick, fate);
-                fates
+        for outcome in [ProcessOutcome::InPart, ProcessOutcome::Gone] {
+            all.extend(before.iter().cloned().map(|mut outcomes| {
+                outcomes.insert(*tick, outcome);
+                outcomes
             }));
         }
     }
@@ -264,14 +267,14 @@ pub(crate) fn may_be_off(phase: &str) -> bool {
     matches!(phase, "enabling" | "fast-stopping" | "braking" | "fault" | "locked" | "disabling")
 }
 
-fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> Verdict {
+fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> CheckResult {
     let newest = |e: &Encoding| {
         let id = TPDO1 + u32::from(e.node_id);
         let data = frames.iter().rev().find(|f| f.id == id).map(|f| f.data.as_slice())?;
         target(data).map(|counts| e.rad(counts))
     };
     let last_measured_rad = encodings.iter().map(|e| newest(e).unwrap_or(f64::NAN)).collect();
-    Verdict { last_measured_rad, ..Verdict::default() }
+    CheckResult { last_measured_rad, ..CheckResult::default() }
 }
 
 /// The i32 behind the control or status word of a PDO of 6 bytes.
@@ -280,7 +283,7 @@ pub(crate) fn target(data: &[u8]) -> Option<i32> {
     (data.len() == 6).then(|| i32::from_le_bytes(bytes))
 }
 
-fn follows(last: Option<&Cycle>, cycle: &Cycle, bus: usize) -> Result<(), Flaw> {
+fn follows(last: Option<&LoggedCycle>, cycle: &LoggedCycle, bus: usize) -> Result<(), Flaw> {
     let flaw = |what: String| Err(Flaw::Log(format!("tick {}: {what}", cycle.tick)));
     let Some(last) = last else { return Ok(()) };
     if cycle.tick <= last.tick || cycle.time_ns <= last.time_ns {
@@ -296,12 +299,12 @@ fn follows(last: Option<&Cycle>, cycle: &Cycle, bus: usize) -> Result<(), Flaw> 
 }
 
 /// All frames of the cycle were taken, and there were some.
-fn is_whole(cycle: &Cycle, bus: usize) -> bool {
+fn is_whole(cycle: &LoggedCycle, bus: usize) -> bool {
     cycle.lost.get(bus) == Some(&0) && !is_lost(cycle, bus)
 }
 
 /// No frame of the cycle was taken.
-fn is_lost(cycle: &Cycle, bus: usize) -> bool {
+fn is_lost(cycle: &LoggedCycle, bus: usize) -> bool {
     cycle.sent.get(bus).is_none_or(|sent| *sent == 0)
 }
 
@@ -312,7 +315,7 @@ fn is_on_path(phase: &str) -> bool {
 
 pub(crate) fn compare_trajectory(
     trajectories: &BTreeMap<u64, Trajectory>,
-    cycle: &Cycle,
+    cycle: &LoggedCycle,
 ) -> Result<usize, Flaw> {
     if !is_on_path(&cycle.phase) {
         return Ok(0);

@@ -47,10 +47,10 @@ pub fn as_plain(
             }
             // A controlword alone: what a shared frame's target belongs to.
             (Some(node), None) if frame.data.len() == 2 => {
-                tell(&mut nodes, node, |it| it.control = frame.data);
+                show(&mut nodes, node, |it| it.control = frame.data);
             }
             (Some(node), None) => {
-                tell(&mut nodes, node, |it| {
+                show(&mut nodes, node, |it| {
                     it.control = frame.data.iter().take(2).copied().collect();
                     it.told = true;
                 });
@@ -63,7 +63,7 @@ pub fn as_plain(
                 }
                 for (encoding, target) in pair.iter().zip(frame.data.chunks_exact(4)) {
                     let node = u32::from(encoding.node_id);
-                    tell(&mut nodes, node, |it| it.told = true);
+                    show(&mut nodes, node, |it| it.told = true);
                     let control = nodes.get(&node).map(|it| it.control.clone()).unwrap_or_default();
                     plain.push(BusFrame { id: RPDO1 + node, data: [&control, target].concat() });
                 }
@@ -89,7 +89,7 @@ struct Node {
     waited: u32,
 }
 
-fn tell(nodes: &mut BTreeMap<u32, Node>, node: u32, change: impl FnOnce(&mut Node)) {
+fn show(nodes: &mut BTreeMap<u32, Node>, node: u32, change: impl FnOnce(&mut Node)) {
     if let Some(node) = nodes.get_mut(&node) {
         change(node);
     }
@@ -98,7 +98,7 @@ fn tell(nodes: &mut BTreeMap<u32, Node>, node: u32, change: impl FnOnce(&mut Nod
 fn wanted_by_sync(log: &[Event], bus: usize) -> Wanted {
     let mut wanted = BTreeMap::new();
     for event in log {
-        if let Event::Cycle(cycle) = event
+        if let Event::LoggedCycle(cycle) = event
             && let Some(sync) = cycle.sync.get(bus)
         {
             wanted.insert(*sync, (cycle.tick, cycle.position_rad.clone()));

@@ -2,8 +2,8 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 use std::f64::consts::TAU;
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
-use taustream_tests::cycle_log::{Cycle, Event, parse};
-use taustream_tests::setpoints::{BusFrame, Encoding, Flaw, Losses, judge, judge_with};
+use taustream_tests::cycle_log::{Event, LoggedCycle, parse};
+use taustream_tests::setpoints::{BusFrame, Encoding, Flaw, Losses, check_setpoints, check_setpoints_with};
 
 const JOINTS: usize = 6;
 const CYCLES: u32 = 400;
@@ -72,7 +72,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
             frames.push(BusFrame { id: 0x180 + u32::from(e.node_id), data });
         }
-        log.push(Event::Cycle(Cycle {
+        log.push(Event::LoggedCycle(LoggedCycle {
             tick: u64::from(tick),
             time_ns: u64::from(tick) * 1_000_000,
             sync: vec![u64::from(tick)],
@@ -101,22 +101,23 @@ fn place(frames: &[BusFrame], sync: usize, node: u8) -> usize {
     panic!("no setpoint of node {node} after SYNC {sync}");
 }
 
-fn nth_cycle(log: &mut [Event], n: usize) -> &mut Cycle {
-    let mut cycles = log.iter_mut().filter_map(|e| if let Event::Cycle(c) = e { Some(c) } else { None });
+fn nth_cycle(log: &mut [Event], n: usize) -> &mut LoggedCycle {
+    let mut cycles =
+        log.iter_mut().filter_map(|e| if let Event::LoggedCycle(c) = e { Some(c) } else { None });
     cycles.nth(n).expect("the cycle")
 }
 
 #[test]
 fn faithful_recording_passes_and_everything_was_compared() {
     let (frames, log) = recording();
-    let verdict = judge(&frames, &log, 0, &encodings()).expect("nothing is wrong with it");
-    assert_eq!(verdict.syncs, 400);
-    assert_eq!(verdict.frames, 400 * 13);
-    assert_eq!(verdict.setpoints, 400 * JOINTS);
-    assert!(verdict.on_trajectory >= 349 * JOINTS);
-    assert_eq!(verdict.trajectories, 1);
+    let check_result = check_setpoints(&frames, &log, 0, &encodings()).expect("nothing is wrong with it");
+    assert_eq!(check_result.syncs, 400);
+    assert_eq!(check_result.frames, 400 * 13);
+    assert_eq!(check_result.setpoints, 400 * JOINTS);
+    assert!(check_result.on_trajectory >= 349 * JOINTS);
+    assert_eq!(check_result.trajectories, 1);
     let end = moves().end_rad();
-    for (joint, measured) in verdict.last_measured_rad.iter().enumerate() {
+    for (joint, measured) in check_result.last_measured_rad.iter().enumerate() {
         assert!((measured - end[joint]).abs() < 2.0 * TAU / 409_600.0, "joint {joint}: {measured}");
     }
 }
@@ -128,7 +129,7 @@ fn frame_off_by_two_counts_fails() {
         let at = place(&frames, sync, node);
         let counts = i32::from_le_bytes(frames[at].data[2..6].try_into().expect("4 bytes")) + 2;
         frames[at].data[2..6].copy_from_slice(&counts.to_le_bytes());
-        let flaw = judge(&frames, &log, 0, &encodings()).expect_err("two counts off");
+        let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("two counts off");
         assert!(matches!(flaw, Flaw::Bus { sync: s, .. } if s == sync as u64), "{flaw}");
     }
 }
@@ -137,7 +138,7 @@ fn frame_off_by_two_counts_fails() {
 fn frame_missing_fails() {
     let (mut frames, log) = recording();
     frames.remove(place(&frames, 250, 3));
-    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a frame is missing");
+    let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("a frame is missing");
     assert!(flaw.to_string().contains("5 setpoint frames for 6 servos"), "{flaw}");
 }
 
@@ -147,23 +148,24 @@ fn frame_missing_passes_only_in_a_fault_and_only_as_a_gap() {
     nth_cycle(&mut log, 389).phase = "fault".into();
     let at = place(&frames, 390, 3);
     frames.remove(at);
-    let verdict = judge(&frames, &log, 0, &encodings()).expect("a drive that dropped out gets no setpoint");
-    assert_eq!(verdict.setpoints, 400 * JOINTS - 1);
+    let check_result =
+        check_setpoints(&frames, &log, 0, &encodings()).expect("a drive that dropped out gets no setpoint");
+    assert_eq!(check_result.setpoints, 400 * JOINTS - 1);
     let other = place(&frames, 390, 4);
     frames.insert(at, frames[other].clone());
-    judge(&frames, &log, 0, &encodings())
+    check_setpoints(&frames, &log, 0, &encodings())
         .expect_err("one frame too few for one node, one too many for another");
 }
 
 #[test]
-fn drive_not_told_to_follow_fails_in_motion_and_passes_in_a_fault() {
+fn drive_not_commanded_to_follow_fails_in_motion_and_passes_in_a_fault() {
     let (mut frames, mut log) = recording();
     let at = place(&frames, 200, 3);
     frames[at].data = vec![0x06, 0, 1, 2, 3, 0];
-    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a drive that does not follow");
+    let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("a drive that does not follow");
     assert!(flaw.to_string().contains("not told to follow while moving"), "{flaw}");
     nth_cycle(&mut log, 199).phase = "fault".into();
-    judge(&frames, &log, 0, &encodings()).expect("a drive that is off in a fault");
+    check_setpoints(&frames, &log, 0, &encodings()).expect("a drive that is off in a fault");
 }
 
 #[test]
@@ -172,7 +174,7 @@ fn sync_missing_fails() {
     let at = place(&frames, 120, 1) - 1;
     assert_eq!(frames[at].id, 0x080);
     frames.remove(at);
-    judge(&frames, &log, 0, &encodings()).expect_err("a SYNC is missing");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("a SYNC is missing");
 }
 
 #[test]
@@ -182,7 +184,7 @@ fn frame_late_by_one_cycle_fails() {
     let late = frames.remove(at);
     let after = place(&frames, 100, 2);
     frames.insert(after, late);
-    judge(&frames, &log, 0, &encodings()).expect_err("a frame came one cycle late");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("a frame came one cycle late");
 }
 
 #[test]
@@ -192,7 +194,7 @@ fn joints_swapped_fails() {
     let data = frames[a].data.clone();
     frames[a].data = frames[b].data.clone();
     frames[b].data = data;
-    judge(&frames, &log, 0, &encodings()).expect_err("two joints are swapped");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("two joints are swapped");
 }
 
 #[test]
@@ -200,12 +202,12 @@ fn frame_twice_or_short_fails() {
     let (mut frames, log) = recording();
     let at = place(&frames, 17, 6);
     frames.insert(at, frames[at].clone());
-    judge(&frames, &log, 0, &encodings()).expect_err("a frame came twice");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("a frame came twice");
 
     let (mut frames, log) = recording();
     let at = place(&frames, 18, 6);
     frames[at].data.pop();
-    judge(&frames, &log, 0, &encodings()).expect_err("a frame is short");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("a frame is short");
 }
 
 #[test]
@@ -213,40 +215,41 @@ fn setpoint_off_the_trajectory_by_one_bit_fails() {
     let (mut frames, mut log) = recording();
     let cycle = nth_cycle(&mut log, 150);
     cycle.position_rad[1] = f64::from_bits(cycle.position_rad[1].to_bits() + 1);
-    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("one bit off");
+    let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("one bit off");
     assert!(matches!(flaw, Flaw::OffTrajectory { joint: 2, .. }), "{flaw}");
 
     let (_, mut log) = recording();
     nth_cycle(&mut log, 150).s += 1e-4;
-    judge(&frames, &log, 0, &encodings()).expect_err("another trajectory time");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("another trajectory time");
     frames.clear();
-    judge(&frames, &log, 0, &encodings()).expect_err("an empty bus");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("an empty bus");
 }
 
 #[test]
 fn log_that_hides_something_fails() {
     let (frames, mut log) = recording();
     log.push(Event::Lost { records: 1 });
-    judge(&frames, &log, 0, &encodings()).expect_err("records are missing");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("records are missing");
 
     let (frames, mut log) = recording();
     let unknown = log.len() - 20;
     log.remove(unknown);
-    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("the bus carried more than the log says");
+    let flaw =
+        check_setpoints(&frames, &log, 0, &encodings()).expect_err("the bus carried more than the log says");
     assert!(flaw.to_string().contains("the log does not know"), "{flaw}");
 
     let (frames, mut log) = recording();
     nth_cycle(&mut log, 9).lost = vec![1];
-    judge(&frames, &log, 0, &encodings()).expect_err("a lost frame");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("a lost frame");
 
     let (frames, mut log) = recording();
     log.remove(1);
-    let flaw = judge(&frames, &log, 0, &encodings()).expect_err("a motion that was never accepted");
+    let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("a motion that was never accepted");
     assert!(flaw.to_string().contains("never accepted"), "{flaw}");
 
     let (frames, mut log) = recording();
     nth_cycle(&mut log, 30).s = 0.0;
-    judge(&frames, &log, 0, &encodings()).expect_err("trajectory time went back");
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("trajectory time went back");
 }
 
 /// A recording of a bus that took nothing of cycle 101, three frames of cycle 201, and nothing from cycle 301 on.
@@ -287,9 +290,10 @@ fn sync_place(frames: &[BusFrame], sync: usize) -> usize {
 #[test]
 fn recording_with_losses_passes_only_where_they_are_allowed() {
     let (frames, log) = lossy_recording();
-    judge(&frames, &log, 0, &encodings()).expect_err("cycles are missing");
-    let verdict = judge_with(Losses::AsLogged, (&frames, &log), 0, &encodings()).expect("the log says so");
-    assert_eq!((verdict.syncs, verdict.setpoints), (299, 298 * JOINTS + 2));
+    check_setpoints(&frames, &log, 0, &encodings()).expect_err("cycles are missing");
+    let check_result =
+        check_setpoints_with(Losses::AsLogged, (&frames, &log), 0, &encodings()).expect("the log says so");
+    assert_eq!((check_result.syncs, check_result.setpoints), (299, 298 * JOINTS + 2));
 }
 
 /// Goal: what the losses excuse is only what the log claims: a frame after the bus failed, a frame that nobody claims, a
@@ -297,7 +301,9 @@ fn recording_with_losses_passes_only_where_they_are_allowed() {
 #[test]
 fn recording_with_losses_that_carries_what_the_log_does_not_claim_fails() {
     let lossy = |frames: &[BusFrame], log: &[Event]| {
-        judge_with(Losses::AsLogged, (frames, log), 0, &encodings()).expect_err("a flaw").to_string()
+        check_setpoints_with(Losses::AsLogged, (frames, log), 0, &encodings())
+            .expect_err("a flaw")
+            .to_string()
     };
     let (mut frames, log) = lossy_recording();
     let stale = sync_place(&frames, 299);
@@ -322,22 +328,23 @@ fn recording_with_losses_that_carries_what_the_log_does_not_claim_fails() {
 /// Goal: frames that the kernel took and that went with their interface are excused for the last cycle before a silence,
 /// and for no other; what came through of it must still be right.
 #[test]
-fn last_cycle_before_a_silence_may_go_with_its_interface_and_no_other() {
+fn last_cycle_before_a_gap_may_go_with_its_interface_and_no_other() {
     let (frames, log) = lossy_recording();
-    let judged = |frames: &[BusFrame]| judge_with(Losses::AsLogged, (frames, &log), 0, &encodings());
+    let check_mode =
+        |frames: &[BusFrame]| check_setpoints_with(Losses::AsLogged, (frames, &log), 0, &encodings());
     let without = |from: usize, to: usize| {
         let (first, last) = (sync_place(&frames, from), sync_place(&frames, to));
         [&frames[..first], &frames[last..]].concat()
     };
-    assert_eq!(judged(&without(299, 300)).unwrap().setpoints, 297 * JOINTS + 2, "the last one is gone");
-    judged(&without(150, 151)).expect_err("one in mid-motion is gone");
-    judged(&without(298, 300)).expect_err("two are gone");
+    assert_eq!(check_mode(&without(299, 300)).unwrap().setpoints, 297 * JOINTS + 2, "the last one is gone");
+    check_mode(&without(150, 151)).expect_err("one in mid-motion is gone");
+    check_mode(&without(298, 300)).expect_err("two are gone");
 
     let mut part = frames.clone();
     part.truncate(place(&frames, 299, 4));
-    assert_eq!(judged(&part).unwrap().setpoints, 297 * JOINTS + 2 + 3, "a part came through");
+    assert_eq!(check_mode(&part).unwrap().setpoints, 297 * JOINTS + 2 + 3, "a part came through");
     part[place(&frames, 299, 2)].data[2] ^= 4;
-    judged(&part).expect_err("a wrong target in what came through");
+    check_mode(&part).expect_err("a wrong target in what came through");
 }
 
 #[test]

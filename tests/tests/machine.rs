@@ -10,11 +10,11 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 /// A machine with its scratch directories in a folder of this test, so that what stays behind is seen.
-struct Lab {
+struct MachineDirs {
     folder: PathBuf,
 }
 
-impl Lab {
+impl MachineDirs {
     fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("tau-lab-{}-{name}", std::process::id()));
         std::fs::create_dir(&folder).unwrap();
@@ -41,7 +41,7 @@ impl Lab {
     }
 }
 
-impl Drop for Lab {
+impl Drop for MachineDirs {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
     }
@@ -54,7 +54,7 @@ fn text(bytes: &[u8]) -> String {
 /// Goal: status, both outputs, words and environment arrive unchanged; the kernel is named first; CAN is there and up.
 #[test]
 fn machine_hands_everything_through() {
-    let lab = Lab::new("through");
+    let dirs = MachineDirs::new("through");
     let words = ["a b", "", "it's", "$HOME *", "line\nbreak", "back\\slash", "\u{fc}"];
     let script = r#"printf '<%s>' "$@"; printf '[%s]' "$STRANGE"; head -c 300000 /dev/zero | tr '\0' '\377'
         [ "$TAUSTREAM_VCAN" = 1 ] || exit 2; candump -n1 -T2000 vcan1 >&2 & sleep 0.3; cansend vcan1 123##1AABB; wait
@@ -62,8 +62,8 @@ fn machine_hands_everything_through() {
     let mut all: Vec<&OsStr> = vec!["bash".as_ref(), "-c".as_ref(), script.as_ref(), "name".as_ref()];
     all.extend(words.iter().map(OsStr::new));
     let strange = OsStr::from_bytes(b"quote ' and \xFF and \n end");
-    let output = lab.command(&["--limit-s", "30"], &all).env("STRANGE", strange).output().unwrap();
-    lab.assert_clean();
+    let output = dirs.command(&["--limit-s", "30"], &all).env("STRANGE", strange).output().unwrap();
+    dirs.assert_clean();
     assert_eq!(output.status.code(), Some(37), "{}", text(&output.stderr));
     let mut expected: Vec<u8> = words.iter().flat_map(|word| format!("<{word}>").into_bytes()).collect();
     expected.push(b'[');
@@ -79,24 +79,24 @@ fn machine_hands_everything_through() {
 /// Goal: the guest sees the host's files; only a directory named writable takes its changes.
 #[test]
 fn machine_writes_only_where_it_may() {
-    let lab = Lab::new("writes");
-    let (open, shut) = (lab.folder.join("open, or not"), lab.folder.join("shut"));
+    let dirs = MachineDirs::new("writes");
+    let (open, shut) = (dirs.folder.join("open, or not"), dirs.folder.join("shut"));
     for folder in [&open, &shut] {
         std::fs::create_dir(folder).unwrap();
         std::fs::write(folder.join("old"), "host").unwrap();
     }
     // A comma cannot be told in a mount option: refused before anything boots.
-    let refused = lab.run(&["--writable", open.to_str().unwrap()], "true");
+    let refused = dirs.run(&["--writable", open.to_str().unwrap()], "true");
     assert_eq!(refused.status.code(), Some(125));
     assert!(text(&refused.stderr).contains("comma"), "{}", text(&refused.stderr));
-    let renamed = lab.folder.join("open to all");
+    let renamed = dirs.folder.join("open to all");
     std::fs::rename(&open, &renamed).unwrap();
     let script = format!(
         "for d in '{}' '{}'; do grep -q host \"$d/old\" || exit 2; echo guest > \"$d/new\" && rm \"$d/old\" || exit 3; done",
         renamed.display(),
         shut.display()
     );
-    let output = lab.run(&["--writable", renamed.to_str().unwrap(), "--interfaces", "0"], &script);
+    let output = dirs.run(&["--writable", renamed.to_str().unwrap(), "--interfaces", "0"], &script);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let names = |folder: &PathBuf| -> BTreeSet<OsString> {
         std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect()
@@ -108,46 +108,46 @@ fn machine_writes_only_where_it_may() {
 /// Goal: a command that does not end is ended, and says so by its status.
 #[test]
 fn machine_command_out_of_time_ends_with_124() {
-    let lab = Lab::new("time");
-    let output = lab.run(&["--limit-s", "2"], "echo begun; sleep 1000");
+    let dirs = MachineDirs::new("time");
+    let output = dirs.run(&["--limit-s", "2"], "echo begun; sleep 1000");
     assert_eq!((output.status.code(), text(&output.stdout)), (Some(124), "begun\n".into()));
 }
 
 /// Goal: a machine whose output nobody reads any more ends early, by itself.
 #[test]
 fn machine_whose_reader_has_gone_ends() {
-    let lab = Lab::new("unread");
+    let dirs = MachineDirs::new("unread");
     let words = ["bash".as_ref(), "-c".as_ref(), "while echo more; do sleep 0.1; done".as_ref()];
-    let mut machine = lab.command(&["--limit-s", "100"], &words).stdout(Stdio::piped()).spawn().unwrap();
+    let mut machine = dirs.command(&["--limit-s", "100"], &words).stdout(Stdio::piped()).spawn().unwrap();
     drop(machine.stdout.take());
     assert_eq!(machine.wait().unwrap().code(), Some(125));
-    lab.assert_clean();
+    dirs.assert_clean();
 }
 
 /// Goal: a process left behind by the command does not keep the machine, and the command's status stands.
 #[test]
 fn machine_daemon_left_behind_does_not_hold_it() {
-    let lab = Lab::new("daemon");
-    let output = lab.run(&["--limit-s", "30"], "setsid sleep 1000 & exit 5");
+    let dirs = MachineDirs::new("daemon");
+    let output = dirs.run(&["--limit-s", "30"], "setsid sleep 1000 & exit 5");
     assert_eq!(output.status.code(), Some(5), "{}", text(&output.stderr));
 }
 
 /// Goal: SIGTERM ends the machine with all its processes, and removes what it made.
 #[test]
-fn machine_told_to_end_leaves_nothing() {
-    let lab = Lab::new("term");
+fn machine_ended_on_request_leaves_nothing() {
+    let dirs = MachineDirs::new("term");
     let words = ["bash".as_ref(), "-c".as_ref(), "sleep 1000".as_ref()];
-    let mut machine = lab.command(&["--limit-s", "100"], &words).spawn().unwrap();
+    let mut machine = dirs.command(&["--limit-s", "100"], &words).spawn().unwrap();
     std::thread::sleep(Duration::from_millis(2500));
     assert!(
-        !processes_naming(&lab.folder).is_empty(),
+        !processes_naming(&dirs.folder).is_empty(),
         "no linux.uml was seen: this test would prove nothing"
     );
     let pid = Pid::from_raw(i32::try_from(machine.id()).unwrap()).unwrap();
     kill_process(pid, Signal::TERM).unwrap();
     assert_eq!(machine.wait().unwrap().code(), Some(143));
-    lab.assert_clean();
-    assert_eq!(processes_naming(&lab.folder), Vec::<u32>::new(), "still running");
+    dirs.assert_clean();
+    assert_eq!(processes_naming(&dirs.folder), Vec::<u32>::new(), "still running");
 }
 
 /// Processes whose command line holds a path (linux.uml is told its directories there).

@@ -2,8 +2,8 @@
 //! The frames are packed here by shifting, apart from the product and from the judge.
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
-use taustream_tests::cycle_log::{Cycle, Event};
-use taustream_tests::mit_setpoints::{LogEnds, MotorEncoding, judge};
+use taustream_tests::cycle_log::{Event, LoggedCycle};
+use taustream_tests::mit_setpoints::{LogEnds, MotorEncoding, check_setpoints};
 use taustream_tests::setpoints::{BusFrame, Flaw};
 
 const MOTORS: usize = 3;
@@ -75,7 +75,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             frames.push(BusFrame { id: u32::from(m.node_id), data });
             frames.push(BusFrame { id: u32::from(m.feedback_id), data: answer });
         }
-        log.push(Event::Cycle(Cycle {
+        log.push(Event::LoggedCycle(LoggedCycle {
             tick: u64::from(tick),
             time_ns: u64::from(tick) * 1_000_000,
             sync: vec![0],
@@ -92,8 +92,8 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
     (frames, log)
 }
 
-fn judged(frames: &[BusFrame], log: &[Event]) -> Result<taustream_tests::setpoints::Verdict, Flaw> {
-    judge((frames, log), 0, (&motors(), PERIOD_S), LogEnds::WithTheStreamer)
+fn check_mode(frames: &[BusFrame], log: &[Event]) -> Result<taustream_tests::setpoints::CheckResult, Flaw> {
+    check_setpoints((frames, log), 0, (&motors(), PERIOD_S), LogEnds::WithTheStreamer)
 }
 
 /// The place of the command to a motor in a cycle.
@@ -105,19 +105,19 @@ fn place(frames: &[BusFrame], cycle: usize, node: u32) -> usize {
 #[test]
 fn faithful_recording_passes_and_everything_was_compared() {
     let (frames, log) = recording();
-    let verdict = judged(&frames, &log).expect("nothing is wrong with it");
-    assert_eq!((verdict.syncs, verdict.setpoints), (400, 1200));
-    assert!(verdict.on_trajectory >= 340 * MOTORS && verdict.trajectories == 1);
-    for (measured, end) in verdict.last_measured_rad.iter().zip(moves().end_rad()) {
+    let check_result = check_mode(&frames, &log).expect("nothing is wrong with it");
+    assert_eq!((check_result.syncs, check_result.setpoints), (400, 1200));
+    assert!(check_result.on_trajectory >= 340 * MOTORS && check_result.trajectories == 1);
+    for (measured, end) in check_result.last_measured_rad.iter().zip(moves().end_rad()) {
         assert!((measured - end).abs() < 4e-4, "{measured} and {end}");
     }
 }
 
 /// Each: what is doctored in the frame of motor 2 in cycle 200, and words of the flaw.
 #[test]
-fn command_with_any_field_doctored_fails() {
+fn command_with_any_field_corrupted_fails() {
     type Doctor = fn(&mut Vec<u8>);
-    let doctored: [(Doctor, &str); 6] = [
+    let corrupted: [(Doctor, &str); 6] = [
         (|data| data[1] = data[1].wrapping_add(1), "was sent to"),
         (|data| data[0] ^= 0x01, "was sent to"),
         (|data| data[2] ^= 0x08, "rad/s"),
@@ -125,11 +125,11 @@ fn command_with_any_field_doctored_fails() {
         (|data| data[5] ^= 0x10, "has the gains"),
         (|data| data.truncate(7), "is not commanded while moving"),
     ];
-    for (doctor, words) in doctored {
+    for (doctor, words) in corrupted {
         let (mut frames, log) = recording();
         let at = place(&frames, 200, 2);
         doctor(&mut frames[at].data);
-        let flaw = judged(&frames, &log).expect_err(words).to_string();
+        let flaw = check_mode(&frames, &log).expect_err(words).to_string();
         assert!(flaw.contains(words) && flaw.contains("tick 200"), "{words}: {flaw}");
     }
 }
@@ -138,21 +138,22 @@ fn command_with_any_field_doctored_fails() {
 fn frames_too_few_too_many_or_of_nobody_fail() {
     let (mut frames, log) = recording();
     frames.remove(place(&frames, 250, 3));
-    judged(&frames, &log).expect_err("a frame is missing");
+    check_mode(&frames, &log).expect_err("a frame is missing");
 
     let (mut frames, log) = recording();
     let twice = frames[place(&frames, 100, 1)].clone();
     frames.insert(place(&frames, 100, 1), twice);
-    judged(&frames, &log).expect_err("a frame came twice");
+    check_mode(&frames, &log).expect_err("a frame came twice");
 
     let (mut frames, log) = recording();
     let stray = frames[place(&frames, 100, 1)].clone();
     frames.push(stray.clone());
-    let flaw = judged(&frames, &log).expect_err("a command after the end").to_string();
+    let flaw = check_mode(&frames, &log).expect_err("a command after the end").to_string();
     assert!(flaw.contains("the log does not know"), "{flaw}");
     // A streamer that was killed has sent what it did not write down; what it did write is judged all the same.
-    judge((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early).expect("the tail is not judged");
+    check_setpoints((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early)
+        .expect("the tail is not judged");
     let at = place(&frames, 300, 1);
     frames[at].data[1] ^= 0x10;
-    judge((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early).expect_err("the rest is");
+    check_setpoints((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early).expect_err("the rest is");
 }

@@ -104,7 +104,7 @@ fn socketcan_takes_the_largest_batch_in_one_call() {
 }
 
 #[test]
-fn socketcan_hears_neither_silence_nor_itself() {
+fn socketcan_receives_nothing_from_silence_nor_from_itself() {
     link_suite::silence_and_own_frames_are_not_received(&Vcan::new("silence"));
 }
 
@@ -130,7 +130,7 @@ fn socketcan_does_not_allocate() {
 
 /// Goal: while the interface is down both calls say so each time; up again, the same link goes on by itself.
 #[test]
-fn socketcan_interface_down_is_told_and_up_again_goes_on() {
+fn socketcan_interface_down_is_reported_and_up_again_goes_on() {
     let vcan = Vcan::new("down");
     let (mut master, mut servos) = vcan.pair();
     let mut batch = FrameBatch::new();
@@ -241,8 +241,8 @@ fn socketcan_is_not_reopened_while_old_frames_wait_and_down_drops_them() {
     run("tc", "qdisc add dev stale root tbf rate 100bit burst 32 limit 3200");
     assert_eq!(master.send(&[1, 2, 3, 4, 5, 6].map(numbered)).count, 6);
     let Err(refusal) = master.reopen() else { panic!("reopened over frames that wait") };
-    let cure = "ip link set stale down && ip link set stale up";
-    assert!(refusal.to_string().contains(cure), "{refusal}");
+    let remedy = "ip link set stale down && ip link set stale up";
+    assert!(refusal.to_string().contains(remedy), "{refusal}");
     ip("link set stale down");
     assert!(master.reopen().is_err(), "reopened on an interface that is down");
     ip("link set stale up");
@@ -254,7 +254,7 @@ fn socketcan_is_not_reopened_while_old_frames_wait_and_down_drops_them() {
     let mut seen = Vec::new();
     for _ in 0..100 {
         // The first call may tell of the time when the interface was down.
-        let _told = servos.receive(&mut batch);
+        let _set = servos.receive(&mut batch);
         seen.extend_from_slice(batch.frames());
         std::thread::sleep(Duration::from_millis(1));
     }

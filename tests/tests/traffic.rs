@@ -1,8 +1,8 @@
 //! Recordings with turns and shared frames: faithful ones become plain ones, doctored ones fail for their fault.
 #![expect(clippy::unwrap_used, reason = "a test ends by panicking")]
 use taustream_arm::Traffic;
-use taustream_tests::cycle_log::{Cycle, Event};
-use taustream_tests::setpoints::{BusFrame, Encoding, judge};
+use taustream_tests::cycle_log::{Event, LoggedCycle};
+use taustream_tests::setpoints::{BusFrame, Encoding, check_setpoints};
 use taustream_tests::traffic::as_plain;
 
 const CYCLES: u32 = 40;
@@ -39,7 +39,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
                 frames.push(BusFrame { id, data: [counts(first), counts(first + 1)].concat() });
             }
         }
-        log.push(Event::Cycle(Cycle {
+        log.push(Event::LoggedCycle(LoggedCycle {
             tick: u64::from(cycle),
             time_ns: u64::from(cycle) * 1_000_000,
             frames: vec![2 * u64::from(cycle) + 5],
@@ -64,19 +64,19 @@ fn flaw_of(frames: Vec<BusFrame>, log: &[Event]) -> Option<String> {
         Ok(plain) => plain,
         Err(flaw) => return Some(flaw.to_string()),
     };
-    judge(&plain, log, 0, &encodings()).err().map(|flaw| flaw.to_string())
+    check_setpoints(&plain, log, 0, &encodings()).err().map(|flaw| flaw.to_string())
 }
 
 #[test]
-fn faithful_recording_of_pairs_in_turns_passes() {
+fn faithful_recording_of_alternating_pairs_passes() {
     let (frames, log) = recording();
     let plain = as_plain(frames, &log, 0, &encodings(), TRAFFIC).unwrap();
-    let verdict = judge(&plain, &log, 0, &encodings()).unwrap();
-    assert_eq!(verdict.setpoints, 4 * CYCLES as usize);
+    let check_result = check_setpoints(&plain, &log, 0, &encodings()).unwrap();
+    assert_eq!(check_result.setpoints, 4 * CYCLES as usize);
 }
 
 #[test]
-fn doctored_recordings_fail_for_their_fault() {
+fn corrupted_recordings_fail_for_their_fault() {
     let shared = |frames: &[BusFrame], id: u32, nth: usize| {
         frames.iter().enumerate().filter(|(_, frame)| frame.id == id).nth(nth).unwrap().0
     };

@@ -8,7 +8,7 @@ use super::xml::{self, Context, Element};
 use super::{package, srdf};
 use crate::document::{self, Value, shown};
 use crate::mass::{LinkMass, Weight};
-use crate::reader::{Book, Table};
+use crate::reader::{FaultList, Table};
 use crate::robot::LinkShape;
 use crate::scene::{self, Shape};
 use crate::{hull, mesh};
@@ -23,7 +23,7 @@ pub(crate) const KEYS: [&str; 5] = ["urdf", "srdf", "tip_link", "base_link", "pa
 
 /// What a URDF says about a joint of the arm.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct JointFacts {
+pub(crate) struct JointInfo {
     pub(crate) name: String,
     /// Range; none for continuous joints, and where the file states none.
     pub(crate) position_rad: Option<[f64; 2]>,
@@ -43,7 +43,7 @@ pub(crate) struct SolidPart {
 
 /// A joint that is held still.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Held {
+pub(crate) struct FixedJoint {
     pub(crate) joint: usize,
     /// rad or m.
     pub(crate) position: f64,
@@ -62,7 +62,7 @@ pub(crate) struct UrdfArm {
     pub(crate) path: Vec<usize>,
     /// Those of them that move.
     pub(crate) moving: Vec<usize>,
-    pub(crate) held: Vec<Held>,
+    pub(crate) fixed_joints: Vec<FixedJoint>,
     pub(crate) parts: Vec<SolidPart>,
     /// Pairs that may touch by the SRDF, lower index first, in rising order.
     pub(crate) allowed: Vec<(usize, usize)>,
@@ -83,21 +83,22 @@ impl UrdfArm {
     /// Takes its keys from a robot file and reads what they name; faults go into the table's book.
     pub(crate) fn read(top: &mut Table<'_>) -> Option<Self> {
         let keys = read_keys(top)?;
-        let own = Book::new(&keys.urdf);
+        let own = FaultList::new(&keys.urdf);
         let model = read_model(&own);
         let tree = model.as_ref().and_then(|model| Tree::of(&own, model));
         let (model, tree) = match own.close(model.zip(tree)) {
             Ok(both) => both,
             Err(faults) => {
-                top.book().take_over(faults);
+                top.fault_list().merge(faults);
                 return None;
             }
         };
-        let own = Book::new(&keys.urdf);
+        let own = FaultList::new(&keys.urdf);
         let parts = read_parts(&own, &model, &keys);
         let faults = own.close(Some(())).err();
-        faults.into_iter().for_each(|faults| top.book().take_over(faults));
-        let allowed = keys.srdf.as_ref().map(|file| srdf::load(top.book(), file, &model)).unwrap_or_default();
+        faults.into_iter().for_each(|faults| top.fault_list().merge(faults));
+        let allowed =
+            keys.srdf.as_ref().map(|file| srdf::load(top.fault_list(), file, &model)).unwrap_or_default();
         let tip = named_link(top, &model, &tree, "tip_link", keys.tip_link.as_deref());
         let base = match &keys.base_link {
             Some(name) => named_link(top, &model, &tree, "base_link", Some(name)),
@@ -107,20 +108,20 @@ impl UrdfArm {
         let path = path(top, &model, &tree, (base, tip))?;
         let moving = moving(top, &model, &path)?;
         let (parts, mut notices) = parts?;
-        let held = held(&model, &moving, &mut notices);
+        let fixed_joints = fixed_joints(&model, &moving, &mut notices);
         say_bare_links(&model, &mut notices);
         say_odd_moments(&model, &mut notices);
-        let arm = Self { model, tree, base, tip, path, moving, held, parts, allowed, notices };
-        top.book().is_clean().then_some(arm)
+        let arm = Self { model, tree, base, tip, path, moving, fixed_joints, parts, allowed, notices };
+        top.fault_list().is_clean().then_some(arm)
     }
     /// What the file says about the arm's joints, base to tip.
-    pub(crate) fn joints(&self) -> Vec<JointFacts> {
-        let facts = |joint: &Joint| JointFacts {
+    pub(crate) fn joints(&self) -> Vec<JointInfo> {
+        let joint_info = |joint: &Joint| JointInfo {
             name: joint.name.clone(),
             position_rad: if joint.kind == Kind::Continuous { None } else { joint.position },
             velocity_rad_s: joint.velocity,
         };
-        self.moving.iter().filter_map(|joint| self.model.joints.get(*joint)).map(facts).collect()
+        self.moving.iter().filter_map(|joint| self.model.joints.get(*joint)).map(joint_info).collect()
     }
     /// The links' names, in the order of the file.
     pub(crate) fn links(&self) -> Vec<String> {
@@ -185,16 +186,20 @@ impl UrdfArm {
     }
     /// The motion of a joint that is held; none for the others.
     fn motion(&self, index: usize, joint: &Joint) -> Pose {
-        let Some(held) = self.held.iter().find(|held| held.joint == index) else { return Pose::identity() };
+        let Some(fixed_joints) = self.fixed_joints.iter().find(|fixed_joints| fixed_joints.joint == index)
+        else {
+            return Pose::identity();
+        };
         let axis = Unit::new_normalize(Vector3::from(joint.axis));
         match joint.kind {
             Kind::Revolute | Kind::Continuous => Pose::from_parts(
                 Translation3::identity(),
-                UnitQuaternion::from_axis_angle(&axis, held.position),
+                UnitQuaternion::from_axis_angle(&axis, fixed_joints.position),
             ),
-            Kind::Prismatic => {
-                Pose::from_parts((axis.into_inner() * held.position).into(), UnitQuaternion::identity())
-            }
+            Kind::Prismatic => Pose::from_parts(
+                (axis.into_inner() * fixed_joints.position).into(),
+                UnitQuaternion::identity(),
+            ),
             // At 0 these two change nothing.
             Kind::Fixed | Kind::Planar | Kind::Floating => Pose::identity(),
         }
@@ -267,7 +272,7 @@ fn pose(origin: &Origin) -> Pose {
 }
 
 fn read_keys(top: &mut Table<'_>) -> Option<Keys> {
-    let robot_file = top.book().file().to_owned();
+    let robot_file = top.fault_list().file().to_owned();
     let beside = |named: &str| document::beside(&robot_file, named);
     let urdf = top.text("urdf", "the path of a URDF file, relative to this file");
     let srdf = top.text_if_there("srdf", "the path of an SRDF file, relative to this file");
@@ -305,22 +310,22 @@ fn read_package_dirs(top: &mut Table<'_>) -> Vec<String> {
     texts.unwrap_or_default()
 }
 
-fn read_model(book: &Book) -> Option<Model> {
-    let text = xml::read(book.file(), "a URDF file").map_err(|faults| book.take_over(faults)).ok()?;
-    let document = xml::parse(book.file(), &text).map_err(|faults| book.take_over(faults)).ok()?;
-    let context = Context::new(book, &text);
+fn read_model(fault_list: &FaultList) -> Option<Model> {
+    let text = xml::read(fault_list.file(), "a URDF file").map_err(|faults| fault_list.merge(faults)).ok()?;
+    let document = xml::parse(fault_list.file(), &text).map_err(|faults| fault_list.merge(faults)).ok()?;
+    let context = Context::new(fault_list, &text);
     Model::read(&context, &Element::robot(&context, &document)?)
 }
 
 /// The parts with their meshes, and what is to be said about them.
-fn read_parts(book: &Book, model: &Model, keys: &Keys) -> Option<(Vec<SolidPart>, Vec<String>)> {
+fn read_parts(fault_list: &FaultList, model: &Model, keys: &Keys) -> Option<(Vec<SolidPart>, Vec<String>)> {
     let mut read: BTreeMap<(PathBuf, [u64; 3]), Option<MeshPart>> = BTreeMap::new();
     let (mut parts, mut notices) = (Vec::new(), Vec::new());
     for (link, part) in
         model.links.iter().enumerate().flat_map(|(i, link)| link.parts.iter().map(move |p| (i, p)))
     {
         let refuse = |value: &str, expected: &str| {
-            book.add(part.line, &format!("{}.geometry.mesh.filename", part.path), value, expected);
+            fault_list.add(part.line, &format!("{}.geometry.mesh.filename", part.path), value, expected);
         };
         let (shape, mesh) = match &part.solid {
             Solid::Primitive(shape) => (shape.clone(), None),
@@ -343,7 +348,7 @@ fn read_parts(book: &Book, model: &Model, keys: &Keys) -> Option<(Vec<SolidPart>
         };
         parts.push(SolidPart { link, origin: part.origin, shape, mesh });
     }
-    book.is_clean().then_some((parts, notices))
+    fault_list.is_clean().then_some((parts, notices))
 }
 
 /// A mesh as a hull.
@@ -443,8 +448,8 @@ fn moving(top: &Table<'_>, model: &Model, path: &[usize]) -> Option<Vec<usize>> 
 }
 
 /// Joints off the chain stay where they are; at 0, or as near to it as their range goes.
-fn held(model: &Model, moving: &[usize], notices: &mut Vec<String>) -> Vec<Held> {
-    let mut held = Vec::new();
+fn fixed_joints(model: &Model, moving: &[usize], notices: &mut Vec<String>) -> Vec<FixedJoint> {
+    let mut fixed_joints = Vec::new();
     for (index, joint) in model.joints.iter().enumerate() {
         if joint.kind == Kind::Fixed || moving.contains(&index) {
             continue;
@@ -465,9 +470,9 @@ fn held(model: &Model, moving: &[usize], notices: &mut Vec<String>) -> Vec<Held>
             shown(&joint.name),
             joint.kind.word()
         ));
-        held.push(Held { joint: index, position });
+        fixed_joints.push(FixedJoint { joint: index, position });
     }
-    held
+    fixed_joints
 }
 
 /// A link that can be seen but not touched is most often an oversight.

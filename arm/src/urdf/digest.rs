@@ -1,5 +1,5 @@
 //! The part of the robot digest that comes from a URDF; the table is in [`crate::digest`].
-use super::arm::{Held, SolidPart, UrdfArm};
+use super::arm::{FixedJoint, SolidPart, UrdfArm};
 use super::model::{Inertial, Joint, Kind, Link, Model, Origin};
 use crate::digest::{put_count, put_number, put_text};
 use crate::scene::Shape;
@@ -12,7 +12,8 @@ impl UrdfArm {
     pub(crate) fn put(&self, out: &mut Vec<u8>) {
         // Taken apart, so that a new field cannot be forgotten here without the compiler saying so. Path and moving
         // joints follow from the rest, notices mean nothing.
-        let Self { model, tree: _, base, tip, path: _, moving: _, held, parts, allowed, notices: _ } = self;
+        let Self { model, tree: _, base, tip, path: _, moving: _, fixed_joints, parts, allowed, notices: _ } =
+            self;
         let Model { name: _, links, joints } = model;
         put_count(out, *base);
         put_count(out, *tip);
@@ -24,8 +25,8 @@ impl UrdfArm {
         for joint in joints {
             put_joint(out, joint);
         }
-        put_count(out, held.len());
-        for Held { joint, position } in held {
+        put_count(out, fixed_joints.len());
+        for FixedJoint { joint, position } in fixed_joints {
             put_count(out, *joint);
             put_number(out, *position);
         }

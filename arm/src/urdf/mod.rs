@@ -18,4 +18,4 @@ mod srdf;
 mod tree;
 mod xml;
 
-pub(crate) use arm::{JointFacts, KEYS, UrdfArm};
+pub(crate) use arm::{JointInfo, KEYS, UrdfArm};

@@ -152,7 +152,7 @@ impl Model {
         let mut names = BTreeSet::new();
         // Held against all names, so that a faulty link is not also called missing.
         let joints = joint_elements.iter().filter_map(|e| read_joint(e, &link_names, &mut names)).collect();
-        context.book.is_clean().then_some(Self { name: name?, links, joints })
+        context.fault_list.is_clean().then_some(Self { name: name?, links, joints })
     }
     pub(crate) fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)

@@ -2,16 +2,17 @@
 use super::model::Model;
 use super::xml::{self, Context, Element};
 use crate::document::shown;
-use crate::reader::Book;
+use crate::reader::FaultList;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Pairs of links that may touch, lower index first, in rising order; faults go into the book.
-pub(crate) fn read(book: &Book, model: &Model) -> Vec<(usize, usize)> {
+pub(crate) fn read(fault_list: &FaultList, model: &Model) -> Vec<(usize, usize)> {
     let pairs = (|| {
-        let text = xml::read(book.file(), WHAT).map_err(|faults| book.take_over(faults)).ok()?;
-        let document = xml::parse(book.file(), &text).map_err(|faults| book.take_over(faults)).ok()?;
-        let context = Context::new(book, &text);
+        let text = xml::read(fault_list.file(), WHAT).map_err(|faults| fault_list.merge(faults)).ok()?;
+        let document =
+            xml::parse(fault_list.file(), &text).map_err(|faults| fault_list.merge(faults)).ok()?;
+        let context = Context::new(fault_list, &text);
         let robot = Element::robot(&context, &document)?;
         Some(pairs(&robot, model))
     })();
@@ -62,13 +63,13 @@ fn link_of(element: &Element<'_, '_, '_>, attribute: &str, model: &Model) -> Opt
 }
 
 /// Reads the pairs of a file into the faults of the one that names it.
-pub(crate) fn load(book: &Book, file: &Path, model: &Model) -> Vec<(usize, usize)> {
-    let own = Book::new(file);
+pub(crate) fn load(fault_list: &FaultList, file: &Path, model: &Model) -> Vec<(usize, usize)> {
+    let own = FaultList::new(file);
     let pairs = read(&own, model);
     match own.close(Some(pairs)) {
         Ok(pairs) => pairs,
         Err(faults) => {
-            book.take_over(faults);
+            fault_list.merge(faults);
             Vec::new()
         }
     }

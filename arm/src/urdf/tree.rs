@@ -1,7 +1,7 @@
 //! How the links of a URDF hang together: one tree with one root.
 use super::model::Model;
 use crate::document::shown;
-use crate::reader::Book;
+use crate::reader::FaultList;
 
 /// The tree.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// Checks that every link hangs on the root by exactly one way.
-    pub(crate) fn of(book: &Book, model: &Model) -> Option<Self> {
+    pub(crate) fn of(fault_list: &FaultList, model: &Model) -> Option<Self> {
         let name = |link: usize| model.links.get(link).map_or(String::new(), |l| shown(&l.name));
         let mut joint_before: Vec<Option<usize>> = vec![None; model.links.len()];
         for (index, joint) in model.joints.iter().enumerate() {
@@ -23,7 +23,7 @@ impl Tree {
                 *slot = Some(index);
             } else {
                 let expected = "a link that no other joint has as its child: links form a tree";
-                book.add(joint.line, &key, &name(joint.child), expected);
+                fault_list.add(joint.line, &key, &name(joint.child), expected);
             }
         }
         let roots: Vec<usize> = joint_before
@@ -44,7 +44,7 @@ impl Tree {
                     "one link that is no joint's child",
                 ),
             };
-            book.add(None, "link", &value, expected);
+            fault_list.add(None, "link", &value, expected);
             return None;
         };
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); model.links.len()];
@@ -56,16 +56,17 @@ impl Tree {
         let mut order = vec![root];
         let mut next = 0;
         // A link twice in the order would have two joints before it, which was noted.
-        while let Some(link) = order.get(next).copied().filter(|_| book.is_clean()) {
+        while let Some(link) = order.get(next).copied().filter(|_| fault_list.is_clean()) {
             order.extend(children.get(link).into_iter().flatten());
             next += 1;
         }
         // What cannot be reached has a joint before it, so it hangs in a circle.
-        if let Some(lost) = (0..model.links.len()).find(|link| book.is_clean() && !order.contains(link)) {
+        if let Some(lost) = (0..model.links.len()).find(|link| fault_list.is_clean() && !order.contains(link))
+        {
             let expected = format!("links that hang on the root {}: this one hangs in a circle", name(root));
-            book.add(None, "link", &name(lost), &expected);
+            fault_list.add(None, "link", &name(lost), &expected);
         }
-        book.is_clean().then_some(Self { order, joint_before })
+        fault_list.is_clean().then_some(Self { order, joint_before })
     }
     /// The joints from one link to one further out; `None` when the first does not carry the second.
     pub(crate) fn path(&self, model: &Model, from: usize, to: usize) -> Option<Vec<usize>> {

@@ -1,6 +1,6 @@
 //! Elements of an XML file, handed out one by one; what is wrong with them goes into a book.
 use crate::document::{self, Lines, Node, Value, key_shown, shown};
-use crate::reader::{Book, Bounds, number_of, numbers_of};
+use crate::reader::{Bounds, FaultList, number_of, numbers_of};
 use crate::{Fault, Faults};
 use roxmltree::{Document, ParsingOptions};
 use std::path::Path;
@@ -103,13 +103,13 @@ fn markup(rest: &[u8]) -> (usize, bool) {
 
 /// What elements need besides themselves.
 pub(crate) struct Context<'b> {
-    pub(crate) book: &'b Book,
+    pub(crate) fault_list: &'b FaultList,
     lines: Lines,
 }
 
 impl<'b> Context<'b> {
-    pub(crate) fn new(book: &'b Book, text: &str) -> Self {
-        Self { book, lines: Lines::of(text) }
+    pub(crate) fn new(fault_list: &'b FaultList, text: &str) -> Self {
+        Self { fault_list, lines: Lines::of(text) }
     }
 }
 
@@ -129,7 +129,12 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
         if tag == "robot" {
             return Some(element);
         }
-        context.book.add(element.line(), "", &format!("the element {}", shown(tag)), "an element <robot>");
+        context.fault_list.add(
+            element.line(),
+            "",
+            &format!("the element {}", shown(tag)),
+            "an element <robot>",
+        );
         None
     }
     /// Its children of a kind. `path` makes the name of each from its own `name` or its number.
@@ -152,7 +157,12 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
         let first = found.next()?;
         if let Some(second) = found.next() {
             let line = self.context.lines.at(second.range().start);
-            self.context.book.add(Some(line), &format!("{}.{tag}", self.path), "given twice", "it once");
+            self.context.fault_list.add(
+                Some(line),
+                &format!("{}.{tag}", self.path),
+                "given twice",
+                "it once",
+            );
         }
         Some(Self { context: self.context, node: first, path: format!("{}.{tag}", self.path) })
     }
@@ -160,7 +170,7 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
     pub(crate) fn need(&self, tag: &'static str, expected: &str) -> Option<Self> {
         let child = self.child(tag);
         if child.is_none() {
-            self.context.book.add(self.line(), &format!("{}.{tag}", self.path), "missing", expected);
+            self.context.fault_list.add(self.line(), &format!("{}.{tag}", self.path), "missing", expected);
         }
         child
     }
@@ -181,7 +191,7 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
     pub(crate) fn fault(&self, attribute: &str, value: &str, expected: &str) {
         let path =
             if attribute.is_empty() { self.path.clone() } else { format!("{}.{attribute}", self.path) };
-        self.context.book.add(self.line(), &path, value, expected);
+        self.context.fault_list.add(self.line(), &path, value, expected);
     }
     /// A text that is not empty; its absence is a fault.
     pub(crate) fn text(&self, attribute: &str, expected: &str) -> Option<String> {
@@ -214,7 +224,7 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
             return None;
         };
         let path = format!("{}.{attribute}", self.path);
-        number_of(self.context.book, &path, &self.number_node(text), bounds)
+        number_of(self.context.fault_list, &path, &self.number_node(text), bounds)
     }
     /// A number or the default; `None` only after a fault.
     pub(crate) fn number_or(&self, attribute: &str, default: f64, bounds: &Bounds) -> Option<f64> {
@@ -229,7 +239,7 @@ impl<'c, 'd, 't> Element<'c, 'd, 't> {
         let items: Vec<Node> = text.split_whitespace().map(|word| self.number_node(word)).collect();
         let node = Node { value: Value::List(items), line: self.line() };
         let path = format!("{}.{attribute}", self.path);
-        numbers_of(self.context.book, &path, &node, 3, bounds)?.try_into().ok()
+        numbers_of(self.context.fault_list, &path, &node, 3, bounds)?.try_into().ok()
     }
     /// Three numbers or the default; `None` only after a fault.
     pub(crate) fn vector_or(&self, attribute: &str, default: [f64; 3], bounds: &Bounds) -> Option<[f64; 3]> {

@@ -5,9 +5,9 @@ use super::{Unit, case, ours, refused, ur5};
 use crate::chart::Panel;
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Moments, Paired, Summary, welch, wilcoxon};
 use crate::table::{Cell, Table};
 use taustream_planner::optimize::{Parameters, Reading};
@@ -61,29 +61,29 @@ struct Field {
 }
 
 /// Case 1 in both units, as printed and corrected.
-pub(crate) fn case_1(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn case_1(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
     outcome.claims.extend(own_table());
-    let runs = lab.runs(CASE_1.runs, 3);
+    let runs = run_context.runs(CASE_1.runs, 3);
     let printed = &CASE_1;
     let parameters = Parameters::CASE_1;
     for unit in Unit::BOTH {
         let (contenders, reading) = (&ALL[..], Reading::Corrected);
         let trials = Trials { name: "Case 1", printed, parameters, unit, reading, contenders, runs };
-        trials.judge(lab, &mut outcome)?;
+        trials.evaluate(run_context, &mut outcome)?;
     }
     let (contenders, reading) = (&PAPERS_OWN[..], Reading::Printed);
     let parameters = Parameters { disperses_last: true, ..parameters };
     let unit = Unit::Millimetres;
     let trials = Trials { name: "Case 1 as printed", printed, parameters, unit, reading, contenders, runs };
-    let field = trials.run(lab)?;
+    let field = trials.run(run_context)?;
     outcome.tables.push(trials.table(&field));
     outcome.claims.push(as_printed(&field, runs));
     Ok(outcome)
 }
 
 /// Case 2, in the unit whose values are near the paper's.
-pub(crate) fn case_2(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn case_2(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
     let trials = Trials {
         name: "Case 2",
@@ -93,20 +93,20 @@ pub(crate) fn case_2(lab: &Lab) -> Result<Outcome, Stop> {
         reading: Reading::Corrected,
         contenders: &LONG,
         // As many for each of case 1 as in the paper: its twenty take hours of its computer, and minutes of ours.
-        runs: (lab.runs(CASE_1.runs, 1) * CASE_2.runs / CASE_1.runs).clamp(1, CASE_2.runs),
+        runs: (run_context.runs(CASE_1.runs, 1) * CASE_2.runs / CASE_1.runs).clamp(1, CASE_2.runs),
     };
-    trials.judge(lab, &mut outcome)?;
+    trials.evaluate(run_context, &mut outcome)?;
     Ok(outcome)
 }
 
 impl Trials<'_> {
-    fn run(&self, lab: &Lab) -> Result<Field, Stop> {
+    fn run(&self, run_context: &RunContext) -> Result<Field, Stop> {
         let robot = ur5()?;
-        let budget = lab.choose(ENOUGH, QUICK);
+        let budget = run_context.choose(ENOUGH, QUICK);
         let model = self.unit.model(self.reading);
         let mut field = Field { courses: Vec::new(), straight: Vec::new(), colliding: Vec::new() };
         for contender in self.contenders {
-            lab.say(&format!(
+            run_context.say(&format!(
                 "  {}, {}: {}, {} runs ..",
                 self.name,
                 self.unit.name(),
@@ -114,16 +114,24 @@ impl Trials<'_> {
                 self.runs
             ));
             let one = |run: usize| -> Result<Course, Stop> {
-                let problem =
-                    case(lab, &robot, run)?.problem(&robot, CONTROL_POINTS, model).map_err(refused)?;
-                follow(lab, (contender.make)(self.parameters).as_ref(), &problem, lab.seed(run), budget)
+                let problem = case(run_context, &robot, run)?
+                    .problem(&robot, CONTROL_POINTS, model)
+                    .map_err(refused)?;
+                follow(
+                    run_context,
+                    (contender.make)(self.parameters).as_ref(),
+                    &problem,
+                    run_context.seed(run),
+                    budget,
+                )
             };
-            field.courses.push(lab.each(self.runs, one)?);
+            field.courses.push(run_context.each(self.runs, one)?);
         }
         // What is free is decided by the least distance, whatever was optimised.
         let fair = self.unit.model(Reading::Corrected);
         for run in 0..self.runs {
-            let problem = case(lab, &robot, run)?.problem(&robot, CONTROL_POINTS, fair).map_err(refused)?;
+            let problem =
+                case(run_context, &robot, run)?.problem(&robot, CONTROL_POINTS, fair).map_err(refused)?;
             let straight = problem.straight();
             let rated = problem.rate_exactly(&straight);
             field.straight.push(rated.map_or((f64::NAN, false), |c| (c.cost, !c.collision)));
@@ -136,8 +144,8 @@ impl Trials<'_> {
         Ok(field)
     }
 
-    fn judge(&self, lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
-        let field = self.run(lab)?;
+    fn evaluate(&self, run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+        let field = self.run(run_context)?;
         outcome.tables.push(self.table(&field));
         outcome.figures.push(self.figure(&field));
         outcome.claims.extend(self.claims(&field));
@@ -240,7 +248,7 @@ impl Trials<'_> {
         claims.push(self.steps_up(field));
         let evaluations =
             |i: usize| field.courses.get(i).map_or(f64::NAN, |c| mean(c.iter().map(Course::evaluations)));
-        claims.push(Claim::judged(
+        claims.push(Claim::decided(
             &format!("IBFOA needs nearly no extra computation ({title})"),
             "its evaluations are at most 1 % more than BFOA's",
             evaluations(1) <= 1.01 * evaluations(0),
@@ -256,7 +264,7 @@ impl Trials<'_> {
             return Claim::unchecked(says, "with so few runs no difference can be told from chance", numbers);
         }
         let rule = "the population's best at the end is less than the other's by the signed-rank test at 5 %";
-        Claim::judged(says, rule, end.is_less(), numbers)
+        Claim::decided(says, rule, end.is_less(), numbers)
     }
 
     /// The paper reads stability off the deviation over scenes, which is mostly that of the scenes. What is left of it
@@ -280,7 +288,7 @@ impl Trials<'_> {
                 format!("{} runs", self.runs),
             );
         }
-        Claim::judged(
+        Claim::decided(
             &says,
             "deviations, of the population's best at the end and of its ratio to its scene's mean, are both less",
             raw[1] < raw[0] && ibfoa.sd < bfoa.sd,
@@ -301,7 +309,7 @@ impl Trials<'_> {
         };
         let rises = field.courses.get(1).map_or(0, |c| c.iter().map(Course::rises).sum());
         let ([a, b], of) = ([share(1), share(0)], |(up, all): (usize, usize)| format!("{up} of {all}"));
-        Claim::judged(
+        Claim::decided(
             &format!("The elite keeps IBFOA's fitness from rising ({})", self.title()),
             "the population's best of IBFOA rises in no iteration of any run",
             rises == 0,
@@ -377,7 +385,7 @@ fn own_table() -> Vec<Claim> {
             both.and_then(|(a, b)| welch(a, b)).unwrap_or(f64::NAN)
         };
         let [bfoa, bso] = [p(0), p(2)];
-        Claim::judged(
+        Claim::decided(
             &format!("Table 2 shows IBFOA to be better than BFOA and BSO ({name})"),
             "Welch's test on the printed means, deviations and numbers of runs, at 5 %, against both",
             bfoa < crate::statistics::SIGNIFICANT && bso < crate::statistics::SIGNIFICANT,
@@ -391,7 +399,7 @@ fn own_table() -> Vec<Claim> {
 fn as_printed(field: &Field, runs: usize) -> Claim {
     let colliding: Vec<String> =
         PAPERS_OWN.iter().zip(&field.colliding).map(|(c, n)| format!("{} {n} of {runs}", c.name)).collect();
-    Claim::judged(
+    Claim::decided(
         "The optimised trajectories are free of collisions, with the penalty of eq. 3.8 and 3.9 as printed",
         "no best trajectory of the three methods comes nearer to a sphere than its radius and expansion",
         field.colliding.iter().all(|n| *n == 0),

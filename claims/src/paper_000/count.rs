@@ -2,9 +2,9 @@
 use super::contenders::GREEDY;
 use super::{Unit, case, ours, refused, ur5};
 use crate::claim::Claim;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, wilcoxon};
 use crate::table::{Cell, Table};
 use taustream_planner::optimize::{End, Parameters, Progress, Reading, Run};
@@ -18,18 +18,18 @@ const FIXED: std::ops::RangeInclusive<usize> = 1..=6;
 /// What one way of choosing brought: cost and whether it collides.
 type Brought = (f64, bool);
 
-struct Scene {
+struct CountScene {
     chosen: Chosen,
     fixed: Vec<Brought>,
 }
 
 /// Runs them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
-    let runs = lab.runs(RUNS, 2).min(RUNS);
-    lab.say(&format!("  the number of control points, {runs} scenes .."));
-    let scenes = lab.each(runs, |run| one(lab, run))?;
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
+    let runs = run_context.runs(RUNS, 2).min(RUNS);
+    run_context.say(&format!("  the number of control points, {runs} scenes .."));
+    let scenes = run_context.each(runs, |run| one(run_context, run))?;
     let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
-    let Growth { control_points_max, evaluations_each, saves } = growth(lab);
+    let Growth { control_points_max, evaluations_each, saves } = growth(run_context);
     outcome.ours.push(format!(
         "greedy BFOA, case 1's numbers; from one control point upwards, {evaluations_each} evaluations each, until another \
          saves less than {} % of the cost of a free path, {control_points_max} at most; fixed numbers get as many evaluations \
@@ -67,23 +67,23 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
         "no fixed number from 1 to 6 is better by the signed-rank test at 5 %, at the same evaluations";
     let says =
         "Wish of section 6: a criterion finds the best number of control points (ours: grow while it pays)";
-    outcome.claims.push(Claim::judged(says, rule, never_worse, words.join("; ")));
+    outcome.claims.push(Claim::decided(says, rule, never_worse, words.join("; ")));
     Ok(outcome)
 }
 
-fn growth(lab: &Lab) -> Growth {
+fn growth(run_context: &RunContext) -> Growth {
     let ours = Growth::OURS;
-    Growth { evaluations_each: lab.choose(ours.evaluations_each, QUICK_EVALUATIONS), ..ours }
+    Growth { evaluations_each: run_context.choose(ours.evaluations_each, QUICK_EVALUATIONS), ..ours }
 }
 
-fn one(lab: &Lab, run: usize) -> Result<Scene, Stop> {
+fn one(run_context: &RunContext, run: usize) -> Result<CountScene, Stop> {
     let robot = ur5()?;
-    let case = case(lab, &robot, run)?;
+    let case = case(run_context, &robot, run)?;
     let model = Unit::Metres.model(Reading::Corrected);
     let problem = |count: usize| case.problem(&robot, count, model);
     let optimizer = (GREEDY.make)(Parameters::CASE_1);
-    let is_over = || lab.is_over();
-    let chosen = growth(lab).choose(&problem, optimizer.as_ref(), lab.seed(run), &is_over);
+    let is_over = || run_context.is_over();
+    let chosen = growth(run_context).choose(&problem, optimizer.as_ref(), run_context.seed(run), &is_over);
     let chosen = chosen.map_err(|e| Stop::Refused(e.to_string()))?;
     let mut fixed = Vec::new();
     for count in FIXED {
@@ -92,7 +92,7 @@ fn one(lab: &Lab, run: usize) -> Result<Scene, Stop> {
         let mut watch = |_: &Progress| ();
         let evaluations_max = chosen.evaluations;
         let run = Run {
-            seed: lab.seed(run),
+            seed: run_context.seed(run),
             evaluations_max,
             guesses: &guesses,
             is_over: &is_over,
@@ -105,7 +105,7 @@ fn one(lab: &Lab, run: usize) -> Result<Scene, Stop> {
         let collides = problem.rate_exactly(&found.x).is_none_or(|c| c.collision);
         fixed.push((found.cost, collides));
     }
-    Ok(Scene { chosen, fixed })
+    Ok(CountScene { chosen, fixed })
 }
 
 fn costs(brought: &[Brought]) -> Vec<f64> {

@@ -1,11 +1,11 @@
 //! One run of a method with the whole course of its population.
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::quantile;
-use taustream_planner::optimize::{End, Found, Optimizer, Problem, Progress, Run};
+use taustream_planner::optimize::{End, Optimizer, Problem, Progress, Run, Solution};
 
 /// What a run found, and its state after every iteration.
 pub(super) struct Course {
-    pub(super) found: Found,
+    pub(super) found: Solution,
     states: Vec<Progress>,
 }
 
@@ -14,7 +14,7 @@ pub(super) struct Course {
 /// # Errors
 /// When the method refuses, or the user ended it.
 pub(super) fn follow(
-    lab: &Lab,
+    run_context: &RunContext,
     optimizer: &dyn Optimizer,
     problem: &dyn Problem,
     seed: u64,
@@ -22,7 +22,7 @@ pub(super) fn follow(
 ) -> Result<Course, Stop> {
     let mut states = Vec::new();
     let mut watch = |p: &Progress| states.push(*p);
-    let is_over = || lab.is_over();
+    let is_over = || run_context.is_over();
     let run = Run { seed, evaluations_max, guesses: &[], is_over: &is_over, watch: &mut watch };
     let found = optimizer.minimise(problem, run)?;
     if found.end == End::Cut {

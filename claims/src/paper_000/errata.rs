@@ -4,14 +4,14 @@ use super::course::{Course, equal_evaluations, follow};
 use super::paper_field::{random_pose, touches};
 use super::{Unit, case, ours, refused, ur5};
 use crate::claim::Claim;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, wilcoxon};
 use crate::table::{Cell, Table};
-use taustream_planner::draw::Draw;
 use taustream_planner::optimize::{Parameters, Reading, Swarming};
 use taustream_planner::papers::control_points::CONTROL_POINTS;
+use taustream_planner::rng::SeededRng;
 
 const RUNS: usize = 100;
 const QUICK: usize = 260;
@@ -21,36 +21,36 @@ const POSES: usize = 4_000;
 const SQUARES: u32 = 100_000;
 
 /// Computes them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
-    outcome.claims.push(summed_distance(lab)?);
-    let (table, claim) = swarming(lab)?;
+    outcome.claims.push(summed_distance(run_context)?);
+    let (table, claim) = swarming(run_context)?;
     outcome.tables.push(table);
     outcome.claims.push(claim);
     Ok(outcome)
 }
 
 /// Eq. 3.9: the sum over the links, of poses that touch something by the least distance.
-fn summed_distance(lab: &Lab) -> Result<Claim, Stop> {
+fn summed_distance(run_context: &RunContext) -> Result<Claim, Stop> {
     let robot = ur5()?;
-    let wanted = lab.choose(POSES, POSES / 10);
+    let wanted = run_context.choose(POSES, POSES / 10);
     let (mut touching, mut seen, mut drawn) = (0, 0, 0);
     while touching < wanted && drawn < 1_000 * wanted {
-        let case = case(lab, &robot, drawn)?;
-        let mut draw = Draw::new(lab.seed(drawn), 9);
+        let case = case(run_context, &robot, drawn)?;
+        let mut rng = SeededRng::new(run_context.seed(drawn), 9);
         for _ in 0..20 {
             drawn += 1;
-            let pose = random_pose(&robot, &mut draw);
+            let pose = random_pose(&robot, &mut rng);
             if touching < wanted && touches(&robot, &case.scene, &pose, Reading::Corrected) {
                 touching += 1;
                 seen += usize::from(touches(&robot, &case.scene, &pose, Reading::Printed));
             }
         }
-        if lab.is_over() {
+        if run_context.is_over() {
             return Err(Stop::Interrupted);
         }
     }
-    Ok(Claim::judged(
+    Ok(Claim::decided(
         "The penalty of eq. 3.8 and 3.9, with the distances to all links added up, sees collisions",
         "more than half of random poses with a link nearer than radius and expansion have a penalty",
         2 * seen > touching,
@@ -59,17 +59,18 @@ fn summed_distance(lab: &Lab) -> Result<Claim, Stop> {
 }
 
 /// Eq. 3.3 against the cost it is added to, and what switching it off changes.
-fn swarming(lab: &Lab) -> Result<(Table, Claim), Stop> {
+fn swarming(run_context: &RunContext) -> Result<(Table, Claim), Stop> {
     let robot = ur5()?;
-    let runs = lab.runs(RUNS, 3);
-    lab.say(&format!("  BFOA with and without swarming, {runs} runs .."));
-    let budget = lab.choose(usize::MAX, QUICK);
+    let runs = run_context.runs(RUNS, 3);
+    run_context.say(&format!("  BFOA with and without swarming, {runs} runs .."));
+    let budget = run_context.choose(usize::MAX, QUICK);
     let go = |swarming: Option<Swarming>| {
-        lab.each(runs, |run| {
+        run_context.each(runs, |run| {
             let model = Unit::Metres.model(Reading::Corrected);
-            let problem = case(lab, &robot, run)?.problem(&robot, CONTROL_POINTS, model).map_err(refused)?;
+            let problem =
+                case(run_context, &robot, run)?.problem(&robot, CONTROL_POINTS, model).map_err(refused)?;
             let parameters = Parameters { swarming, ..Parameters::CASE_1 };
-            follow(lab, (BFOA.make)(parameters).as_ref(), &problem, lab.seed(run), budget)
+            follow(run_context, (BFOA.make)(parameters).as_ref(), &problem, run_context.seed(run), budget)
         })
     };
     let (with, without) = (go(Some(Swarming::PAPER))?, go(None)?);
@@ -83,7 +84,7 @@ fn swarming(lab: &Lab) -> Result<(Table, Claim), Stop> {
     let mut table = Table::new("Swarming", "cost J_c", &note, &columns);
     table.row("with J_ar", vec![Cell::Mean(Summary::of(&best_with)), Cell::Test(test)]);
     table.row("without", vec![Cell::Mean(Summary::of(&best_without)), Cell::None]);
-    let claim = Claim::judged(
+    let claim = Claim::decided(
         "Swarming (eq. 3.3) guides the bacteria",
         "with it BFOA finds less than without, by the signed-rank test at 5 %",
         test.is_less(),

@@ -5,12 +5,12 @@ pub(crate) mod count;
 mod course;
 pub(crate) mod errata;
 mod paper_field;
+mod path;
 mod pictures;
 pub(crate) mod planners;
 pub(crate) mod profiles;
-mod way;
 
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use std::fmt::Display;
 use std::path::Path;
 use taustream_arm::Robot;
@@ -30,8 +30,8 @@ fn ur5() -> Result<Robot, Stop> {
 }
 
 /// The scene of a run, which is the same for all methods and readings.
-fn case(lab: &Lab, robot: &Robot, run: usize) -> Result<Case, Stop> {
-    let case = Case::draw(robot, &CostModel::default(), lab.seed(run));
+fn case(run_context: &RunContext, robot: &Robot, run: usize) -> Result<Case, Stop> {
+    let case = Case::random(robot, &CostModel::default(), run_context.seed(run));
     case.ok_or_else(|| Stop::Refused(format!("{} has no room among the paper's spheres", robot.name)))
 }
 

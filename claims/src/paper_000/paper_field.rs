@@ -1,13 +1,13 @@
 //! Joint space as the paper's collision test sees it, for a tree to grow in.
-use crate::lab::Lab;
+use crate::run_context::RunContext;
 use std::cell::Cell;
 use std::f64::consts::PI;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::CostModel;
 use taustream_planner::cost::ControlPointCost;
-use taustream_planner::draw::Draw;
 use taustream_planner::optimize::Reading;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Field;
 
 /// Length of an edge of the tree, and between two poses of it that are checked (rad).
@@ -19,7 +19,7 @@ pub(super) struct PaperField<'a> {
     pub(super) robot: &'a Robot,
     pub(super) scene: &'a Scene,
     pub(super) checks: Cell<usize>,
-    pub(super) lab: &'a Lab<'a>,
+    pub(super) run_context: &'a RunContext<'a>,
 }
 
 impl Field for PaperField<'_> {
@@ -46,18 +46,18 @@ impl Field for PaperField<'_> {
     }
 
     fn is_over(&self) -> bool {
-        self.lab.is_over()
+        self.run_context.is_over()
     }
 
-    fn draw_pose(&self, draw: &mut Draw) -> JointArray {
-        random_pose(self.robot, draw)
+    fn random_pose(&self, rng: &mut SeededRng) -> JointArray {
+        random_pose(self.robot, rng)
     }
 }
 
 /// Uniform in ±π.
-pub(super) fn random_pose(robot: &Robot, draw: &mut Draw) -> JointArray {
+pub(super) fn random_pose(robot: &Robot, rng: &mut SeededRng) -> JointArray {
     let mut pose = [0.0; MAX_JOINTS];
-    pose.iter_mut().take(robot.joints.len()).for_each(|q| *q = draw.within(-PI, PI));
+    pose.iter_mut().take(robot.joints.len()).for_each(|q| *q = rng.within(-PI, PI));
     pose
 }
 

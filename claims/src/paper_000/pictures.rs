@@ -1,5 +1,5 @@
 //! Paths of the tip among the spheres, seen from above and from the side, and a motion's joints over time.
-use crate::chart::{Filled, Panel, Point, palette};
+use crate::chart::{FilledArea, Panel, Point, palette};
 use std::f64::consts::TAU;
 use taustream_arm::scene::Shape;
 use taustream_arm::{Robot, Scene};
@@ -19,7 +19,7 @@ pub(super) fn views(robot: &Robot, scene: &Scene, paths: &[(&str, Vec<JointArray
             if let Shape::Sphere { radius_m } = obstacle.shape {
                 let centre = obstacle.pose.translation.vector;
                 let points = circle([centre[i], centre[j]], radius_m);
-                panel.filled.push(Filled { points, colour: palette(7), opacity: 0.3 });
+                panel.filled_areas.push(FilledArea { points, colour: palette(7), opacity: 0.3 });
             }
         }
         for (name, corners) in paths {

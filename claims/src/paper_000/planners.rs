@@ -2,14 +2,14 @@
 use super::contenders::{BFOA, Contender, IBFOA};
 use super::course::follow;
 use super::paper_field::{CHECKED_RAD, PaperField, STEP_RAD};
+use super::path::{PathCost, TipPath};
 use super::pictures::views;
-use super::way::{Way, Worth};
 use super::{K, SEGMENT_S, Unit, case, ours, refused, ur5};
 use crate::chart::Panel;
 use crate::claim::{Claim, better};
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::Summary;
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
@@ -18,9 +18,9 @@ use taustream_arm::Robot;
 use taustream_motion::profile::{Profile, TauJ, TauJStar};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::CostModel;
-use taustream_planner::draw::Draw;
 use taustream_planner::optimize::{Parameters, Reading};
 use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::rrt;
 
 const RUNS: usize = 100;
@@ -34,15 +34,15 @@ const WAYS: [&str; 3] = ["IBFOA-Tau-J*", "BFOA-Tau-J", "RRT"];
 /// What the three found in one scene; a tree may find nothing.
 struct Run {
     case: Case,
-    found: [Option<(Way, Worth)>; 3],
+    found: [Option<(TipPath, PathCost)>; 3],
 }
 
 /// Runs them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let robot = ur5()?;
-    let runs = lab.runs(RUNS, 2);
-    lab.say(&format!("  IBFOA-Tau-J*, BFOA-Tau-J, RRT, {runs} scenes .."));
-    let all = lab.each(runs, |run| one(lab, &robot, run))?;
+    let runs = run_context.runs(RUNS, 2);
+    run_context.say(&format!("  IBFOA-Tau-J*, BFOA-Tau-J, RRT, {runs} scenes .."));
+    let all = run_context.each(runs, |run| one(run_context, &robot, run))?;
     let mut outcome = Outcome { ours: ours(), ..Outcome::default() };
     outcome.ours.push(format!(
         "RRT: steps of {STEP_RAD} rad, poses checked every {CHECKED_RAD} rad, 5 % of the poses are the goal, as many poses \
@@ -54,29 +54,29 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
     Ok(outcome)
 }
 
-fn one(lab: &Lab, robot: &Robot, run: usize) -> Result<Run, Stop> {
-    let case = case(lab, robot, run)?;
+fn one(run_context: &RunContext, robot: &Robot, run: usize) -> Result<Run, Stop> {
+    let case = case(run_context, robot, run)?;
     let profiles: [Box<dyn Profile + Send>; 3] = [
         Box::new(TauJStar::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
         Box::new(TauJ::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
         Box::new(TauJStar::new(K).map_err(|e| Stop::Refused(e.to_string()))?),
     ];
-    let (ibfoa, evaluations) = bacteria(lab, robot, &case, &IBFOA, run)?;
-    let (bfoa, _) = bacteria(lab, robot, &case, &BFOA, run)?;
-    let field = PaperField { robot, scene: &case.scene, checks: Count::new(0), lab };
+    let (ibfoa, evaluations) = bacteria(run_context, robot, &case, &IBFOA, run)?;
+    let (bfoa, _) = bacteria(run_context, robot, &case, &BFOA, run)?;
+    let field = PaperField { robot, scene: &case.scene, checks: Count::new(0), run_context };
     let checks_max = evaluations * poses();
     let [start, goal] = &case.ends_rad;
-    let tree = rrt(&field, start, goal, checks_max, &mut Draw::new(lab.seed(run), 7)).path;
-    if lab.is_over() {
+    let tree = rrt(&field, start, goal, checks_max, &mut SeededRng::new(run_context.seed(run), 7)).path;
+    if run_context.is_over() {
         return Err(Stop::Interrupted);
     }
-    let ways = [Some(ibfoa), Some(bfoa), tree.filter(|p| p.len() <= WAY_POINTS_MAX)];
+    let distances = [Some(ibfoa), Some(bfoa), tree.filter(|p| p.len() <= WAY_POINTS_MAX)];
     let mut found = [None, None, None];
-    for ((found, corners), profile) in found.iter_mut().zip(ways).zip(profiles) {
+    for ((found, corners), profile) in found.iter_mut().zip(distances).zip(profiles) {
         if let Some(corners) = corners {
-            let way = Way { corners, profile };
-            let worth = way.worth(robot, &case.scene)?;
-            *found = Some((way, worth));
+            let tip_path = TipPath { corners, profile };
+            let worth = tip_path.worth(robot, &case.scene)?;
+            *found = Some((tip_path, worth));
         }
     }
     Ok(Run { case, found })
@@ -88,7 +88,7 @@ fn poses() -> usize {
 }
 
 fn bacteria(
-    lab: &Lab,
+    run_context: &RunContext,
     robot: &Robot,
     case: &Case,
     contender: &Contender,
@@ -96,8 +96,14 @@ fn bacteria(
 ) -> Result<(Vec<JointArray>, usize), Stop> {
     let model = Unit::Metres.model(Reading::Corrected);
     let problem = case.problem(robot, CONTROL_POINTS, model).map_err(refused)?;
-    let budget = lab.choose(usize::MAX, QUICK_EVALUATIONS);
-    let course = follow(lab, (contender.make)(Parameters::CASE_1).as_ref(), &problem, lab.seed(run), budget)?;
+    let budget = run_context.choose(usize::MAX, QUICK_EVALUATIONS);
+    let course = follow(
+        run_context,
+        (contender.make)(Parameters::CASE_1).as_ref(),
+        &problem,
+        run_context.seed(run),
+        budget,
+    )?;
     let corner = |x: &[f64]| {
         let mut corner = [0.0; MAX_JOINTS];
         corner.iter_mut().zip(x).for_each(|(c, x)| *c = *x);
@@ -109,8 +115,8 @@ fn bacteria(
     Ok((corners, course.found.progress.evaluations))
 }
 
-fn worths(all: &[Run], way: usize) -> Vec<Worth> {
-    all.iter().filter_map(|r| r.found.get(way)?.as_ref().map(|(_, w)| *w)).collect()
+fn worths(all: &[Run], tip_path: usize) -> Vec<PathCost> {
+    all.iter().filter_map(|r| r.found.get(tip_path)?.as_ref().map(|(_, w)| *w)).collect()
 }
 
 fn table(all: &[Run]) -> Table {
@@ -132,11 +138,11 @@ fn table(all: &[Run]) -> Table {
         all.len()
     );
     let mut table = Table::new("Three planners", "", &note, &columns);
-    for (way, name) in WAYS.into_iter().enumerate() {
-        let worths = worths(all, way);
+    for (tip_path, name) in WAYS.into_iter().enumerate() {
+        let worths = worths(all, tip_path);
         let free = worths.iter().filter(|w| !w.cost.collision).count();
         let mut cells = vec![Cell::Share { count: free, of: all.len() }];
-        let mut median = |figure: &dyn Fn(&Worth) -> f64| {
+        let mut median = |figure: &dyn Fn(&PathCost) -> f64| {
             let values: Vec<f64> = worths.iter().map(figure).collect();
             cells.push(if values.is_empty() { Cell::None } else { Cell::Median(Summary::of(&values)) });
         };
@@ -152,11 +158,13 @@ fn table(all: &[Run]) -> Table {
 }
 
 fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
-    let free = |way: usize| worths(all, way).iter().filter(|w| !w.cost.collision).count();
+    let free = |tip_path: usize| worths(all, tip_path).iter().filter(|w| !w.cost.collision).count();
     // Pairs: scenes in which both found something free.
-    let compare = |other: usize, figure: fn(&Worth) -> f64| -> (bool, String) {
+    let compare = |other: usize, figure: fn(&PathCost) -> f64| -> (bool, String) {
         let pairs = all.iter().filter_map(|run| {
-            let of = |way: usize| run.found.get(way)?.as_ref().map(|(_, w)| w).filter(|w| !w.cost.collision);
+            let of = |tip_path: usize| {
+                run.found.get(tip_path)?.as_ref().map(|(_, w)| w).filter(|w| !w.cost.collision)
+            };
             Some((figure(of(0)?), figure(of(other)?)))
         });
         let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs.unzip();
@@ -165,18 +173,18 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
         }
         better(WAYS[0], &Sample::of(ours), WAYS[other], &Sample::of(theirs))
     };
-    let against_both = |says: &str, rule: &str, figure: fn(&Worth) -> f64| {
+    let against_both = |says: &str, rule: &str, figure: fn(&PathCost) -> f64| {
         let results = [1, 2].map(|other| compare(other, figure));
         let text = results.iter().map(|(_, text)| text.clone()).collect::<Vec<_>>().join("; ");
-        Claim::judged(says, rule, results.iter().all(|(holds, _)| *holds), text)
+        Claim::decided(says, rule, results.iter().all(|(holds, _)| *holds), text)
     };
     vec![
-        Claim::judged(
+        Claim::decided(
             "All three find collision-free trajectories",
             "in every scene, by the least distance of the links to the spheres",
-            (0..3).all(|way| free(way) == all.len()),
+            (0..3).all(|tip_path| free(tip_path) == all.len()),
             (0..3)
-                .map(|way| format!("{} {} of {}", WAYS[way], free(way), all.len()))
+                .map(|tip_path| format!("{} {} of {}", WAYS[tip_path], free(tip_path), all.len()))
                 .collect::<Vec<_>>()
                 .join(", "),
         ),
@@ -200,9 +208,9 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
 }
 
 /// Whether anything keeps the motions inside an arm's limits.
-fn unbounded(robot: &Robot, worths: &[Worth]) -> Claim {
+fn unbounded(robot: &Robot, worths: &[PathCost]) -> Claim {
     let limits = robot.limits();
-    let exceeds = |w: &Worth| {
+    let exceeds = |w: &PathCost| {
         let of = |j: usize| &limits[j].motion;
         (0..robot.joints.len()).any(|j| {
             w.peaks[0] > of(j).velocity_rad_s
@@ -215,7 +223,7 @@ fn unbounded(robot: &Robot, worths: &[Worth]) -> Claim {
         let (peaks, widest) = (star.peaks(), 2.0 * std::f64::consts::PI);
         [widest * peaks.c_v / SEGMENT_S, widest * peaks.c_j / SEGMENT_S.powi(3)]
     });
-    Claim::judged(
+    Claim::decided(
         "Velocity, acceleration and jerk are reasonable by design: no constraints need to be evaluated",
         "no motion of IBFOA-Tau-J* exceeds the arm's limits, and the largest step within ±π could not either",
         beyond == 0
@@ -237,10 +245,10 @@ fn figures(robot: &Robot, all: &[Run]) -> Vec<Figure> {
     // A scene in which all three found something says most.
     let shown = all.iter().find(|r| r.found.iter().all(Option::is_some)).or(all.first());
     let Some(run) = shown else { return Vec::new() };
-    let ways =
+    let distances =
         WAYS.iter().zip(&run.found).filter_map(|(name, f)| f.as_ref().map(|(found, _)| (*name, found)));
     let paths: Vec<(&str, Vec<JointArray>)> =
-        ways.clone().map(|(name, f)| (name, f.corners.clone())).collect();
+        distances.clone().map(|(name, f)| (name, f.corners.clone())).collect();
     let scene = Figure::of(
         "000-paths.svg",
         "Paper 000: the tip's paths among the spheres",
@@ -248,7 +256,7 @@ fn figures(robot: &Robot, all: &[Run]) -> Vec<Figure> {
         &views(robot, &run.case.scene, &paths),
     );
     let names = ["angle (rad)", "velocity (rad/s)", "acceleration (rad/s²)", "jerk (rad/s³)"];
-    let panels = ways.take(2).flat_map(|(name, found)| {
+    let panels = distances.take(2).flat_map(|(name, found)| {
         names.iter().enumerate().map(move |(order, quantity)| {
             let mut panel = Panel::new("t (s)", &format!("{name}: {quantity}"));
             for joint in 0..robot.joints.len() {

@@ -3,9 +3,9 @@ use super::{K, refused};
 use crate::chart::Panel;
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
 use taustream_motion::profile::{Profile, Quintic, Septic, TauJ, TauJStar};
 use taustream_motion::spline::{CubicSpline, Ends};
@@ -20,7 +20,7 @@ const BEFORE: [f64; 3] = [1e-3, 1e-6, 1e-9];
 const NOTHING: f64 = 1e-9;
 
 /// An interpolator between knots.
-enum Way {
+enum Construction {
     /// The same profile between each two knots, at rest at all of them.
     Stops(&'static str, Box<dyn Profile>),
     /// One spline through all knots.
@@ -30,7 +30,7 @@ enum Way {
 /// Velocity, acceleration and jerk.
 type Rates = [f64; 3];
 
-impl Way {
+impl Construction {
     fn name(&self) -> &'static str {
         match self {
             Self::Stops(name, _) | Self::Through(name, _) => name,
@@ -100,32 +100,32 @@ fn step(knots: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// Tau-J*, Tau-J, quintic, spline: the first four are the paper's figure.
-fn ways() -> Result<[Way; 6], Stop> {
+fn distances() -> Result<[Construction; 6], Stop> {
     let spline = |ends| CubicSpline::new(&KNOTS, ends).map(Box::new).map_err(refused);
     Ok([
-        Way::Stops("Tau-J*", Box::new(TauJStar::new(K).map_err(refused)?)),
-        Way::Stops("Tau-J", Box::new(TauJ::new(K).map_err(refused)?)),
-        Way::Stops("quintic", Box::new(Quintic)),
-        Way::Through("cubic spline, clamped", spline(Ends::Clamped)?),
-        Way::Through("cubic spline, not-a-knot", spline(Ends::NotAKnot)?),
-        Way::Stops("septic (not in the paper)", Box::new(Septic)),
+        Construction::Stops("Tau-J*", Box::new(TauJStar::new(K).map_err(refused)?)),
+        Construction::Stops("Tau-J", Box::new(TauJ::new(K).map_err(refused)?)),
+        Construction::Stops("quintic", Box::new(Quintic)),
+        Construction::Through("cubic spline, clamped", spline(Ends::Clamped)?),
+        Construction::Through("cubic spline, not-a-knot", spline(Ends::NotAKnot)?),
+        Construction::Stops("septic (not in the paper)", Box::new(Septic)),
     ])
 }
 
 /// Computes them; nothing is random.
-pub(crate) fn run(_lab: &Lab) -> Result<Outcome, Stop> {
-    let ways = ways()?;
+pub(crate) fn run(_run_context: &RunContext) -> Result<Outcome, Stop> {
+    let distances = distances()?;
     Ok(Outcome {
         ours: vec![format!(
             "the cubic spline's end conditions: both usual ones are shown; k = {K} where it is not said"
         )],
-        tables: vec![figure_1(&ways), peaks()?, jerk_at_the_end()],
-        figures: vec![picture(&ways)],
-        claims: claims(&ways)?,
+        tables: vec![figure_1(&distances), peaks()?, jerk_at_the_end()],
+        figures: vec![picture(&distances)],
+        claims: claims(&distances)?,
     })
 }
 
-fn figure_1(ways: &[Way]) -> Table {
+fn figure_1(distances: &[Construction]) -> Table {
     let columns = [
         "",
         "peak velocity (m/s)",
@@ -138,10 +138,10 @@ fn figure_1(ways: &[Way]) -> Table {
     ];
     let note = "Knots 0, 300, 200, -300, -700 m every 100 s, k = 0.1; the paper prints curves only.";
     let mut table = Table::new("Figure 1", "", note, &columns);
-    for way in ways {
-        let ([v, a, j], [start, end]) = (way.peaks(), way.ends());
+    for construction in distances {
+        let ([v, a, j], [start, end]) = (construction.peaks(), construction.ends());
         let cells = [v, a, j, start[1], end[1], start[2], end[2]];
-        table.row(way.name(), cells.map(Cell::number).to_vec());
+        table.row(construction.name(), cells.map(Cell::number).to_vec());
     }
     table
 }
@@ -185,16 +185,16 @@ fn jerk_at_the_end() -> Table {
     table
 }
 
-fn picture(ways: &[Way]) -> Figure {
+fn picture(distances: &[Construction]) -> Figure {
     let names = ["position (m)", "velocity (m/s)", "acceleration (m/s²)", "jerk (m/s³)"];
     let panels = names.iter().enumerate().map(|(order, name)| {
         let mut panel = Panel::new("t (s)", name);
-        for way in ways.iter().take(4) {
+        for construction in distances.iter().take(4) {
             let at = |i: u32| {
                 let t_s = KNOTS[KNOTS.len() - 1].0 * f64::from(i) / f64::from(POINTS);
-                (t_s, way.at(t_s)[order])
+                (t_s, construction.at(t_s)[order])
             };
-            panel.line(way.name(), (0..=POINTS).map(at).collect());
+            panel.line(construction.name(), (0..=POINTS).map(at).collect());
         }
         panel
     });
@@ -202,27 +202,29 @@ fn picture(ways: &[Way]) -> Figure {
     Figure::of("000-profiles.svg", "Paper 000, figure 1: four interpolators", 2, &panels)
 }
 
-fn claims(ways: &[Way]) -> Result<Vec<Claim>, Stop> {
-    let [star, tau_j, quintic, spline, not_a_knot, _] = ways else {
+fn claims(distances: &[Construction]) -> Result<Vec<Claim>, Stop> {
+    let [star, tau_j, quintic, spline, not_a_knot, _] = distances else {
         return Err(Stop::Refused("six interpolators are needed".to_owned()));
     };
-    let is_zero = |way: &Way, value: f64| value.abs() <= NOTHING * way.peaks()[2];
-    let jerks = |way: &Way| way.ends().map(|e| e[2]);
-    let shown = |way: &Way| {
-        let [start, end] = jerks(way);
-        format!("{} {} and {} m/s³", way.name(), figures(start), figures(end))
+    let is_zero = |construction: &Construction, value: f64| value.abs() <= NOTHING * construction.peaks()[2];
+    let jerks = |construction: &Construction| construction.ends().map(|e| e[2]);
+    let shown = |construction: &Construction| {
+        let [start, end] = jerks(construction);
+        format!("{} {} and {} m/s³", construction.name(), figures(start), figures(end))
     };
-    let both = |way: &Way, zero: bool| jerks(way).iter().all(|j| is_zero(way, *j) == zero);
+    let both = |construction: &Construction, zero: bool| {
+        jerks(construction).iter().all(|j| is_zero(construction, *j) == zero)
+    };
     let limit = (1.0 - 1e-6) / 3.0;
     let up_to = TauJStar::new(limit).is_ok() && TauJStar::new(1.0 / 3.0).is_err();
     let ends = [spline, not_a_knot].map(|w| w.ends().map(|e| e[1]));
-    let peak = |way: &Way| way.peaks()[2];
-    let rests = |way: &Way| match way {
-        Way::Stops(_, profile) => profile.rest_order() >= 2,
-        Way::Through(..) => false,
+    let peak = |construction: &Construction| construction.peaks()[2];
+    let rests = |construction: &Construction| match construction {
+        Construction::Stops(_, profile) => profile.rest_order() >= 2,
+        Construction::Through(..) => false,
     };
     Ok(vec![
-        Claim::judged(
+        Claim::decided(
             "Tau-J* has zero jerk at the start and at the end",
             "both are less than 1e-9 of its peak, at the paper's k = 0.1",
             both(star, true),
@@ -232,31 +234,31 @@ fn claims(ways: &[Way]) -> Result<Vec<Claim>, Stop> {
                 if up_to { "requires" } else { "does not require" }
             ),
         ),
-        Claim::judged(
+        Claim::decided(
             "Tau-J has non-zero jerk at the start and at the end",
             "neither is less than 1e-9 of its peak",
             both(tau_j, false),
             shown(tau_j),
         ),
-        Claim::judged(
+        Claim::decided(
             "The quintic's jerk is not zero at start and end",
             "neither is less than 1e-9 of its peak",
             both(quintic, false),
             shown(quintic),
         ),
-        Claim::judged(
+        Claim::decided(
             "The cubic spline's acceleration is not zero at start and end",
             "neither is zero with either end condition",
             ends.iter().flatten().all(|a| a.abs() > 1e-6),
             format!("clamped {:?}, not-a-knot {:?} m/s²", ends[0].map(figures), ends[1].map(figures)),
         ),
-        Claim::judged(
+        Claim::decided(
             "Tau-J*, Tau-J and the quintic stop at every knot, the spline does not",
             "velocity and acceleration are zero at both ends of their segments; the spline's velocity at an inner knot is not",
             [star, tau_j, quintic].into_iter().all(rests) && spline.at(KNOTS[1].0)[1].abs() > 1e-6,
             format!("the clamped spline passes the second knot at {} m/s", figures(spline.at(KNOTS[1].0)[1])),
         ),
-        Claim::judged(
+        Claim::decided(
             "Tau-J* guides the more compliant motion",
             "its peak jerk on figure 1 is less than Tau-J's and the quintic's (at its ends it is: see above)",
             peak(star) < peak(tau_j) && peak(star) < peak(quintic),

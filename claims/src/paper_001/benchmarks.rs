@@ -2,9 +2,9 @@
 use crate::chart::Panel;
 use crate::claim::{Claim, agrees};
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Moments, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, convergence, minimise};
@@ -55,38 +55,38 @@ struct Case {
 }
 
 impl Case {
-    fn trials(self, lab: &Lab, runs: usize) -> Result<Vec<Trial>, Stop> {
+    fn trials(self, run_context: &RunContext, runs: usize) -> Result<Vec<Trial>, Stop> {
         let setup = Setup { reading: self.reading, evaluations: self.evaluations };
         let optimizer = |_| by_name(self.method, setup).map_err(|e| Stop::Refused(e.to_string()));
-        lab.each(runs, |run| {
-            let problem = problem(lab, self.function, self.is_moved);
+        run_context.each(runs, |run| {
+            let problem = problem(run_context, self.function, self.is_moved);
             let budget = self.evaluations.unwrap_or(ENOUGH);
-            minimise(lab, optimizer(run)?.as_ref(), &problem, lab.seed(run), budget)
+            minimise(run_context, optimizer(run)?.as_ref(), &problem, run_context.seed(run), budget)
         })
     }
 }
 
 /// The function as printed, or moved by the same random vector in every run.
-pub(super) fn problem(lab: &Lab, function: Function, is_moved: bool) -> Benchmark {
+pub(super) fn problem(run_context: &RunContext, function: Function, is_moved: bool) -> Benchmark {
     if is_moved {
-        Benchmark::shifted(function, DIMENSIONS, lab.seed(0))
+        Benchmark::shifted(function, DIMENSIONS, run_context.seed(0))
     } else {
         Benchmark::new(function, DIMENSIONS)
     }
 }
 
 /// Runs them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome::default();
     outcome.ours.push(
         "ISMA: crossover with probability 0.5, Laplace centre 0 and width 0.5, the three searches one after another, \
          a child taken only if better; SMA: logarithm to base 10"
             .to_owned(),
     );
-    own_schedules(lab, &mut outcome)?;
-    let on = |is_moved, lab: &Lab| equal_evaluations(lab, is_moved);
-    let printed = on(false, lab)?;
-    let moved = on(true, lab)?;
+    own_schedules(run_context, &mut outcome)?;
+    let on = |is_moved, run_context: &RunContext| equal_evaluations(run_context, is_moved);
+    let printed = on(false, run_context)?;
+    let moved = on(true, run_context)?;
     for (table, figure, claims) in [printed, moved] {
         outcome.tables.push(table);
         outcome.figures.push(figure);
@@ -96,12 +96,12 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
 }
 
 /// The paper's tables: every method with its own schedule of 5000 iterations.
-fn own_schedules(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
-    let runs = lab.runs(RUNS, 3);
-    let evaluations = lab.choose(None, Some(QUICK));
+fn own_schedules(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+    let runs = run_context.runs(RUNS, 3);
+    let evaluations = run_context.choose(None, Some(QUICK));
     let columns =
         ["", "paper, mean", "paper, sd", "ours, printed", "ours, corrected", "evaluations", "reproduced"];
-    let schedule = lab.choose("5000 iterations of 50", "a quick run's few evaluations");
+    let schedule = run_context.choose("5000 iterations of 50", "a quick run's few evaluations");
     let note = format!(
         "D = 30, {schedule}, {runs} runs of ours, 30 of the paper; best so far. Only SMA and ISMA have two readings."
     );
@@ -110,12 +110,12 @@ fn own_schedules(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
     for (f, function) in Function::ALL.into_iter().enumerate() {
         let mut means = Vec::new();
         for (m, method) in METHODS.into_iter().enumerate() {
-            lab.say(&format!("  {} {method}, {runs} runs ..", function.name()));
+            run_context.say(&format!("  {} {method}, {runs} runs ..", function.name()));
             let case = Case { method, reading: Reading::Corrected, function, is_moved: false, evaluations };
-            let corrected = Sample::best(&case.trials(lab, runs)?);
+            let corrected = Sample::best(&case.trials(run_context, runs)?);
             let is_read_twice = READ_TWICE.contains(&method);
             let printed = if is_read_twice {
-                Sample::best(&Case { reading: Reading::Printed, ..case }.trials(lab, runs)?)
+                Sample::best(&Case { reading: Reading::Printed, ..case }.trials(run_context, runs)?)
             } else {
                 corrected.clone()
             };
@@ -144,7 +144,7 @@ fn own_schedules(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
         best += usize::from(means.last().is_some_and(|isma| *isma - least <= ROUNDING));
     }
     let cells = METHODS.len() * Function::ALL.len();
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "Tables 2 and 3 are what the five methods reach in 5000 iterations of 50, 30 runs",
         "every mean is reproduced by one of the readings: within a tenth, within 1e-13, or not told apart by Welch's \
          test at 5 %",
@@ -152,7 +152,7 @@ fn own_schedules(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
         format!("{} of {cells} cells as printed, {} corrected", same[0], same[1]),
     ));
     outcome.claims.push(in_the_papers_own_table());
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "ISMA has the best mean of the five on F1 to F6, each with the same number of iterations",
         "ours, corrected: ISMA's mean is the least, or the least within 1e-13, on all six (it uses four times the \
          evaluations of the others there)",
@@ -170,7 +170,7 @@ fn in_the_papers_own_table() -> Claim {
         column.iter().all(|mean| column[METHODS.len() - 1] <= *mean)
     };
     let worse: Vec<&str> = (0..6).filter(|f| !is_best(*f)).map(|f| Function::ALL[f].name()).collect();
-    Claim::judged(
+    Claim::decided(
         "ISMA's accuracy is higher than that of the other four (text of section 4.2)",
         "no mean in the paper's own table 2 is below ISMA's",
         worse.is_empty(),
@@ -179,9 +179,9 @@ fn in_the_papers_own_table() -> Claim {
 }
 
 /// All methods at the same number of evaluations, pair by pair against ISMA.
-fn equal_evaluations(lab: &Lab, is_moved: bool) -> Result<(Table, Figure, [Claim; 2]), Stop> {
-    let runs = lab.runs(RUNS, 5);
-    let budget = lab.choose(if is_moved { MOVED } else { EQUAL }, QUICK);
+fn equal_evaluations(run_context: &RunContext, is_moved: bool) -> Result<(Table, Figure, [Claim; 2]), Stop> {
+    let runs = run_context.runs(RUNS, 5);
+    let budget = run_context.choose(if is_moved { MOVED } else { EQUAL }, QUICK);
     let place = if is_moved { "optimum moved" } else { "optimum as printed" };
     let mut columns = vec!["".to_owned()];
     columns.extend(METHODS.iter().map(|m| (*m).to_owned()));
@@ -193,12 +193,12 @@ fn equal_evaluations(lab: &Lab, is_moved: bool) -> Result<(Table, Figure, [Claim
     let mut panels = Vec::new();
     let (mut best, mut fast) = (Vec::new(), Vec::new());
     for function in Function::ALL {
-        lab.say(&format!("  {} at equal evaluations, {place} ..", function.name()));
+        run_context.say(&format!("  {} at equal evaluations, {place} ..", function.name()));
         let least = function.least(DIMENSIONS);
         let mut all = Vec::new();
         for method in METHODS {
             let (reading, evaluations) = (Reading::Corrected, Some(budget));
-            all.push(Case { method, reading, function, is_moved, evaluations }.trials(lab, runs)?);
+            all.push(Case { method, reading, function, is_moved, evaluations }.trials(run_context, runs)?);
         }
         let samples: Vec<Sample> = all.iter().map(|t| Sample::best(t)).collect();
         let early: Vec<Sample> = all.iter().map(|t| Sample::from_trials(t, |t| quarter(t, budget))).collect();
@@ -225,7 +225,7 @@ fn equal_evaluations(lab: &Lab, is_moved: bool) -> Result<(Table, Figure, [Claim
                 (1e-13)";
     let list = |names: &[&str]| format!("on {} of 6: {}", names.len(), names.join(", "));
     let claims = [
-        Claim::judged(
+        Claim::decided(
             &format!(
                 "ISMA is the most accurate of the five: at {} evaluations each, {place}",
                 figures(budget as f64)
@@ -234,7 +234,7 @@ fn equal_evaluations(lab: &Lab, is_moved: bool) -> Result<(Table, Figure, [Claim
             best.len() == 6,
             list(&best),
         ),
-        Claim::judged(
+        Claim::decided(
             &format!("ISMA converges fastest: after a quarter of those evaluations, {place}"),
             rule,
             fast.len() == 6,

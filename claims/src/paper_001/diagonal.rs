@@ -1,9 +1,9 @@
 //! What the printed new start on the box's diagonal does: all six optima lie there.
 use super::benchmarks::{DIMENSIONS, problem};
 use crate::claim::Claim;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::mann_whitney;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
@@ -32,8 +32,8 @@ fn optimizer(method: &str, reading: Reading, restart: Option<f64>, budget: usize
 }
 
 /// Runs them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
-    let (runs, budget) = (lab.runs(RUNS, 3), lab.choose(BUDGET, QUICK));
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
+    let (runs, budget) = (run_context.runs(RUNS, 3), run_context.choose(BUDGET, QUICK));
     let columns = ["", "paper, mean (isma)", "optimum as printed", "optimum moved", "evaluations"];
     let note = format!(
         "{runs} runs of {budget} evaluations, D = {DIMENSIONS}; median [quartiles] above the least value; the paper's \
@@ -44,13 +44,13 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
     for (function, paper) in [(Function::Rosenbrock, 0.0584), (Function::Schwefel, -7496.7903)] {
         let least = function.least(DIMENSIONS);
         for method in ["sma", "isma"] {
-            lab.say(&format!("  diagonal: {method} on {} ..", function.name()));
+            run_context.say(&format!("  diagonal: {method} on {} ..", function.name()));
             for (label, reading, restart) in VARIANTS {
                 let ran = |is_moved| -> Result<Sample, Stop> {
-                    let problem = problem(lab, function, is_moved);
+                    let problem = problem(run_context, function, is_moved);
                     let method = |_| optimizer(method, reading, restart, budget);
-                    let trials: Vec<Trial> = lab.each(runs, |run| {
-                        minimise(lab, method(run).as_ref(), &problem, lab.seed(run), budget)
+                    let trials: Vec<Trial> = run_context.each(runs, |run| {
+                        minimise(run_context, method(run).as_ref(), &problem, run_context.seed(run), budget)
                     })?;
                     Ok(Sample::from_trials(&trials, |t| t.found.cost - least))
                 };
@@ -77,7 +77,7 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
 fn carries_over(function: Function, here: &Sample, moved: &Sample) -> Claim {
     let p = mann_whitney(&here.values, &moved.values).unwrap_or(1.0);
     let [a, b] = [here, moved].map(|s| s.summary().median);
-    Claim::judged(
+    Claim::decided(
         &format!("{} shows ISMA's ability, not where the optimum lies", function.name()),
         "as printed, the median above the least value is at most twice as large once the optimum is moved",
         b <= 2.0 * a,

@@ -2,9 +2,9 @@
 use crate::chart::Panel;
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::wilcoxon;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
@@ -32,7 +32,7 @@ const EVALUATIONS: usize = 2_000;
 const RANK_SHARE: f64 = 1e-12;
 
 /// Looks at it.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome::default();
     outcome.ours.push(format!(
         "limits of every joint {} rad/s, {} rad/s², {} rad/s³; pieces of {} to {} s; time and impact divided by those \
@@ -45,7 +45,7 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
         0.5 * (PIECE_S[0] + PIECE_S[1])
     ));
     rank_of_conditions(&mut outcome)?;
-    times(lab, &mut outcome)?;
+    times(run_context, &mut outcome)?;
     Ok(outcome)
 }
 
@@ -92,7 +92,7 @@ fn rank_of_conditions(outcome: &mut Outcome) -> Result<(), Stop> {
     }
     outcome.tables.push(table);
     if let [(papers, numbers), (_, ours)] = is_enough.as_slice() {
-        outcome.claims.push(Claim::judged(
+        outcome.claims.push(Claim::decided(
             "Interpolation with velocity and acceleration at both ends determines the spline of degree seven",
             "as many independent equations as unknowns",
             *papers,
@@ -106,8 +106,8 @@ fn nodes_rad() -> Vec<Vec<f64>> {
     NODES_DEGREES.iter().map(|node| node.iter().map(|q| q.to_radians()).collect()).collect()
 }
 
-fn times(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
-    let (runs, budget) = (lab.runs(RUNS, 2), lab.choose(EVALUATIONS, 300));
+fn times(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+    let (runs, budget) = (run_context.runs(RUNS, 2), run_context.choose(EVALUATIONS, 300));
     let limits = [LIMIT; 6];
     let nodes = nodes_rad();
     let columns = [
@@ -128,21 +128,22 @@ fn times(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
     for (word, reading) in [("printed", Reading::Printed), ("corrected", Reading::Corrected)] {
         let problem = SplineTime::new(&nodes, &limits, PIECE_S, reading)?;
         let middle = vec![0.5 * (PIECE_S[0] + PIECE_S[1]); nodes.len() - 1];
-        let even = problem.judge(&middle)?;
+        let even = problem.evaluate(&middle)?;
         let even_cells = [even.time_s, even.jerk_rad_s3, even.broken as f64, even.cost].map(Cell::number);
         let none = [Cell::None, Cell::None];
         table.row(format!("even times, objective {word}"), even_cells.into_iter().chain(none).collect());
         let mut first: Option<Sample> = None;
         for method in ["isma", "sma"] {
-            lab.say(&format!("  times by {method}, objective {word} .."));
+            run_context.say(&format!("  times by {method}, objective {word} .."));
             let setup = Setup { reading: Reading::Corrected, evaluations: Some(budget) };
-            let trials: Vec<Trial> = lab.each(runs, |run| {
+            let trials: Vec<Trial> = run_context.each(runs, |run| {
                 let optimizer = by_name(method, setup).map_err(|e| Stop::Refused(e.to_string()))?;
-                minimise(lab, optimizer.as_ref(), &problem, lab.seed(run), budget)
+                minimise(run_context, optimizer.as_ref(), &problem, run_context.seed(run), budget)
             })?;
-            let judged = trials.iter().map(|t| problem.judge(&t.found.x)).collect::<Result<Vec<_>, _>>()?;
+            let decided =
+                trials.iter().map(|t| problem.evaluate(&t.found.x)).collect::<Result<Vec<_>, _>>()?;
             let sample = |figure: fn(&taustream_planner::papers::spline_time::SplineCost) -> f64| {
-                Sample::of(judged.iter().map(figure).collect()).summary()
+                Sample::of(decided.iter().map(figure).collect()).summary()
             };
             let parts = [sample(|j| j.time_s), sample(|j| j.jerk_rad_s3), sample(|j| j.broken as f64)];
             let cost = Sample::best(&trials);
@@ -207,7 +208,7 @@ fn smooth(nodes: &[Vec<f64>], shown: &[(&str, Vec<f64>)]) -> Result<Claim, Stop>
             }
         }
     }
-    Ok(Claim::judged(
+    Ok(Claim::decided(
         "Velocity, acceleration and jerk have no sudden change",
         "at the joins of the spline with ISMA's times none of them jumps by more than 1e-6",
         largest <= 1e-6,

@@ -3,9 +3,9 @@ pub(crate) mod journeys;
 mod pictures;
 pub(crate) mod robots;
 
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use taustream_planner::optimize::Reading;
-use taustream_planner::papers::planar::{Drive, Journey, Numbers, Obstacle, Rule, Scene, drive};
+use taustream_planner::papers::planar::{Journey, Numbers, Obstacle, PlanarDrive, PlanarScene, Rule, drive};
 
 /// Runs of everything; the paper shows one of each.
 const RUNS: usize = 30;
@@ -16,14 +16,14 @@ const STEPS_QUICK: usize = 1_500;
 
 /// What a robot goes by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+enum Method {
     Field,
     Plain,
     Robust,
     RobustPrinted,
 }
 
-impl Way {
+impl Method {
     const ALL: [Self; 4] = [Self::Field, Self::Plain, Self::Robust, Self::RobustPrinted];
 
     fn name(self) -> &'static str {
@@ -48,12 +48,17 @@ impl Way {
     }
 
     /// The journeys of all runs. A field has nothing random: one run says it all.
-    fn journeys(self, lab: &Lab, scene: &Scene, shared: bool) -> Result<Vec<Journey>, Stop> {
-        let runs = if self == Self::Field { 1 } else { lab.runs(RUNS, QUICK) };
-        let steps_max = lab.choose(STEPS_MAX, STEPS_QUICK);
+    fn journeys(
+        self,
+        run_context: &RunContext,
+        scene: &PlanarScene,
+        shared: bool,
+    ) -> Result<Vec<Journey>, Stop> {
+        let runs = if self == Self::Field { 1 } else { run_context.runs(RUNS, QUICK) };
+        let steps_max = run_context.choose(STEPS_MAX, STEPS_QUICK);
         let numbers = Numbers { steps_max, reading: self.reading(), ..Numbers::OURS };
-        let go = |seed| Ok(drive(scene, &Drive { rule: self.rule(), numbers, shared, seed })?);
-        lab.each(runs, |run| go(lab.seed(run)))
+        let go = |seed| Ok(drive(scene, &PlanarDrive { rule: self.rule(), numbers, shared, seed })?);
+        run_context.each(runs, |run| go(run_context.seed(run)))
     }
 }
 
@@ -69,15 +74,15 @@ fn ours() -> String {
 }
 
 /// The paper's scenes, and the two that it calls hopeless.
-fn scenes() -> Vec<Scene> {
+fn scenes() -> Vec<PlanarScene> {
     let room = [[-20.0, -20.0], [20.0, -20.0], [20.0, 20.0], [-20.0, 20.0], [-20.0, -20.0]];
     let cup = [[-15.0, -4.0], [-15.0, 5.0], [15.0, 5.0], [15.0, -4.0]];
-    let alone = |name, start, corners: &[[f64; 2]]| Scene {
+    let alone = |name, start, corners: &[[f64; 2]]| PlanarScene {
         name,
         robots: vec![[start, [0.0, 90.0]]],
         obstacles: vec![Obstacle::walls(corners)],
     };
-    let mut scenes = Scene::paper_002();
+    let mut scenes = PlanarScene::paper_002();
     scenes.push(alone("start in a trap", [0.0, 0.0], &cup));
     scenes.push(alone("closed room", [0.0, 0.0], &room));
     scenes

@@ -1,10 +1,10 @@
 //! The scenes with paths and virtual obstacles.
-use super::Way;
+use super::Method;
 use super::journeys::Visit;
-use crate::chart::{Curve, Filled, Panel, Point, palette};
+use crate::chart::{Curve, FilledArea, Panel, Point, palette};
 use crate::figure::Figure;
 use std::f64::consts::TAU;
-use taustream_planner::papers::planar::{Journey, Obstacle, Shape};
+use taustream_planner::papers::planar::{Journey, Obstacle, PlanarShape};
 
 /// Corners of a circle.
 const CORNERS: u32 = 48;
@@ -24,9 +24,9 @@ fn panel(visit: &Visit) -> Panel {
     for obstacle in &visit.scene.obstacles {
         outline(&mut panel, obstacle);
     }
-    for (way, journeys) in Way::ALL.iter().zip(&visit.journeys) {
+    for (method, journeys) in Method::ALL.iter().zip(&visit.journeys) {
         if let Some(journey) = journeys.first() {
-            paths(&mut panel, *way, journey);
+            paths(&mut panel, *method, journey);
         }
     }
     panel
@@ -34,27 +34,27 @@ fn panel(visit: &Visit) -> Panel {
 
 fn outline(panel: &mut Panel, obstacle: &Obstacle) {
     match &obstacle.shape {
-        Shape::Disc { centre_cm, radius_cm } => {
+        PlanarShape::Disc { centre_cm, radius_cm } => {
             let points = circle(*centre_cm, *radius_cm);
-            panel.filled.push(Filled { points, colour: palette(7), opacity: 0.3 });
+            panel.filled_areas.push(FilledArea { points, colour: palette(7), opacity: 0.3 });
         }
-        Shape::Walls { corners_cm } => {
+        PlanarShape::Walls { corners_cm } => {
             let points = corners_cm.iter().map(|c| (c[0], c[1])).collect();
             panel.curves.push(curve(String::new(), 7, 3, points));
         }
     }
 }
 
-fn paths(panel: &mut Panel, way: Way, journey: &Journey) {
-    let colour = Way::ALL.iter().position(|w| *w == way).unwrap_or(0);
+fn paths(panel: &mut Panel, method: Method, journey: &Journey) {
+    let colour = Method::ALL.iter().position(|w| *w == method).unwrap_or(0);
     for (i, path) in journey.paths_cm.iter().enumerate() {
-        let label = if i == 0 { way.name().to_owned() } else { String::new() };
+        let label = if i == 0 { method.name().to_owned() } else { String::new() };
         panel.curves.push(curve(label, colour, 1, path.iter().map(|p| (p[0], p[1])).collect()));
     }
-    if way == Way::Robust {
+    if method == Method::Robust {
         for made in &journey.virtuals {
             let points = circle(made.centre_cm, VIRTUAL_CM);
-            panel.filled.push(Filled { points, colour: palette(4), opacity: 0.8 });
+            panel.filled_areas.push(FilledArea { points, colour: palette(4), opacity: 0.8 });
         }
     }
 }

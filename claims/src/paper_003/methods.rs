@@ -4,9 +4,9 @@ use super::watched::{Contender, Objective, Reaching, reach};
 use crate::chart::Panel;
 use crate::claim::{Claim, better};
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
@@ -95,8 +95,8 @@ impl Ran {
 }
 
 /// Runs them.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
-    let (runs, budget) = (lab.runs(RUNS, 4), lab.choose(BUDGET, QUICK));
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
+    let (runs, budget) = (run_context.runs(RUNS, 4), run_context.choose(BUDGET, QUICK));
     let mut ran = Vec::new();
     for (name, _, reading) in ROWS {
         let word = match (name, reading) {
@@ -104,11 +104,12 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
             ("iepso", Reading::Corrected) => ", corrected",
             (_, Reading::Printed | Reading::Corrected) => "",
         };
-        lab.say(&format!("  {name}{word}, {runs} runs .."));
+        run_context.say(&format!("  {name}{word}, {runs} runs .."));
         let task = FiveJointArm::task(reading);
-        let one =
-            |run| reach(lab, &contender(name, reading, budget)?, (task, Objective::Reward), run, budget);
-        ran.push(Ran { label: format!("{name}{word}"), runs: lab.each(runs, one)? });
+        let one = |run| {
+            reach(run_context, &contender(name, reading, budget)?, (task, Objective::Reward), run, budget)
+        };
+        ran.push(Ran { label: format!("{name}{word}"), runs: run_context.each(runs, one)? });
     }
     let mut outcome = Outcome::default();
     outcome.ours.push(
@@ -202,9 +203,9 @@ fn claims(ran: &[Ran]) -> Vec<Claim> {
     let generation = against(|r| r.generation);
     let cost = against(|r| r.trial.found.cost);
     let mut claims = vec![
-        Claim::judged("IEPSO's error is the least of the five", rule, error.0, error.1),
-        Claim::judged("IEPSO converges fastest: first within 0.005 mm", rule, generation.0, generation.1),
-        Claim::judged("IEPSO plans the most efficient motion (least F)", rule, cost.0, cost.1),
+        Claim::decided("IEPSO's error is the least of the five", rule, error.0, error.1),
+        Claim::decided("IEPSO converges fastest: first within 0.005 mm", rule, generation.0, generation.1),
+        Claim::decided("IEPSO plans the most efficient motion (least F)", rule, cost.0, cost.1),
     ];
     claims.push(poor_swarms(ran));
     claims.push(optimum(ran));
@@ -219,7 +220,7 @@ fn poor_swarms(ran: &[Ran]) -> Claim {
     let errors: Vec<(&str, f64)> =
         swarms.map(|(r, _)| (r.label.as_str(), r.sample(|r| r.error_mm).summary().median)).collect();
     let text: Vec<String> = errors.iter().map(|(name, e)| format!("{name} {} mm", figures(*e))).collect();
-    Claim::judged(
+    Claim::decided(
         "PSO and SPSO are caught in local optima and cannot meet the precision",
         "the median error of both is above 0.005 mm",
         errors.iter().all(|(_, e)| *e > precision_mm),
@@ -232,7 +233,7 @@ fn optimum(ran: &[Ran]) -> Claim {
     let best = ran.iter().min_by(|a, b| a.cost().summary().least.total_cmp(&b.cost().summary().least));
     let found = best.map_or(f64::NAN, |b| b.cost().summary().least);
     let paper = TABLE_5.iter().map(|row| row.cost).fold(f64::INFINITY, f64::min);
-    Claim::judged(
+    Claim::decided(
         "F = -16.56 is the global optimum",
         "the printed F is within 0.05 of the least F that can be: |bearing of the target|/ω - 24",
         (paper - least).abs() <= 0.05,
@@ -256,7 +257,7 @@ fn exchange(ran: &[Ran]) -> Claim {
     };
     let (by_sign, signed) = better("with sign", &with, "without φ3", &without);
     let (by_print, as_printed) = better("as printed", &printed, "without φ3", &without);
-    Claim::judged(
+    Claim::decided(
         "The exchange φ3 helps the global search",
         "on the corrected objective, F is less than with c3 = 0 by the signed-rank test at 5 %, with or without its sign",
         by_sign || by_print,
@@ -274,13 +275,13 @@ fn rest(iepso: &Ran) -> [Claim; 2] {
     let (then, end) = (median(0, cost_at), median(0, usize::MAX));
     let error = median(1, error_at);
     [
-        Claim::judged(
+        Claim::decided(
             "F has converged at about generation 45 (figure 3)",
             "the median F is then within 1 % of its end",
             (then - end).abs() <= 0.01 * end.abs(),
             format!("{} at generation {cost_at}, {} at the end", figures(then), figures(end)),
         ),
-        Claim::judged(
+        Claim::decided(
             "The error is zero at about generation 180 (figure 4)",
             "the median error is then within the precision of 0.005 mm",
             error <= 0.005,

@@ -1,8 +1,8 @@
 //! Table 5 by itself: do the printed angles reach the target, and do they cost what is printed?
 use crate::claim::Claim;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
 use taustream_planner::optimize::Reading;
 use taustream_planner::papers::reach::{FiveJointArm, Reach};
@@ -56,7 +56,7 @@ fn raw([a, b, c, d]: [f64; 4]) -> [f64; 4] {
 }
 
 /// Checks them.
-pub(crate) fn run(_lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(_run_context: &RunContext) -> Result<Outcome, Stop> {
     let task = FiveJointArm::task(Reading::Corrected);
     let mut outcome = Outcome::default();
     outcome.ours.push(format!(
@@ -87,20 +87,20 @@ pub(crate) fn run(_lab: &Lab) -> Result<Outcome, Stop> {
         table.row(row.name, cells(&task, row, &checked, cost));
         if row.name == "iepso" {
             let [a, b, c, d] = row.angles_rad;
-            let mended = Printed { angles_rad: [a, b, c, -d], ..*row };
+            let corrected = Printed { angles_rad: [a, b, c, -d], ..*row };
             table.row(
                 "iepso, sign of joint 4 turned",
-                cells(&task, &mended, &check(&task, mended.angles_rad), cost),
+                cells(&task, &corrected, &check(&task, corrected.angles_rad), cost),
             );
         }
     }
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "Table 5's angles bring the tip to the target, within the printed errors",
         "forward kinematics: no row misses by more than its printed error and the rounding of its angles",
         missing.is_empty(),
         format!("missing: {}", missing.join(", ")),
     ));
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "Table 5's costs F belong to its angles and errors",
         "within the threshold F is R + S to 0.05; beyond it F lies between R + K/e^5 and R + K, whatever e_max is",
         impossible.is_empty(),
@@ -140,7 +140,7 @@ fn errors_in_the_text() -> Claim {
         away.then(|| format!("{name}: {} in table 5, {} in the text", figures(row.error_mm), figures(*text)))
     };
     let differing: Vec<String> = IN_THE_TEXT_MM.iter().filter_map(differs).collect();
-    Claim::judged(
+    Claim::decided(
         "The errors of GA and DE are those of table 5",
         "table and text print the same numbers",
         differing.is_empty(),
@@ -152,7 +152,7 @@ fn distances(task: &Reach) -> Claim {
     let from_base = |p: [f64; 3]| 1e3 * p.iter().map(|x| x * x).sum::<f64>().sqrt();
     let ours = [from_base(task.target_m), from_base((task.position_m)(&[0.0; 4]))];
     let is_same = ours.iter().zip(DISTANCES_MM).all(|(a, b)| (a - b).abs() <= 0.5);
-    Claim::judged(
+    Claim::decided(
         "Target and start are 301 and 337 mm from the base (table 4, for the constraint of eq. 14)",
         "the distances of the printed coordinates and of the upright pose agree to half a millimetre",
         is_same,

@@ -2,9 +2,9 @@
 use super::methods::{BUDGET, QUICK, RUNS, contender};
 use super::watched::{Objective, Reaching, reach};
 use crate::claim::{Claim, better};
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
@@ -19,10 +19,10 @@ const PRINTED_GENERATION: f64 = 19.0;
 const SCAN: u32 = 20_000;
 
 /// Looks at it.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome::default();
     ranges(&mut outcome);
-    does_it_help(lab, &mut outcome)?;
+    does_it_help(run_context, &mut outcome)?;
     Ok(outcome)
 }
 
@@ -60,7 +60,7 @@ fn ranges(outcome: &mut Outcome) {
     outcome.tables.push(table);
     let kept = |r: Reading| is_kept.iter().filter(|(reading, ..)| *reading == r).all(|(_, kept, _)| *kept);
     let highest = is_kept.iter().map(|(.., highest)| *highest).fold(f64::NEG_INFINITY, f64::max);
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "The rewards run from -12 to 0 and from -24 to -12 (table 4)",
         "eq. 17 as printed stays within these ranges over all errors of its two pieces",
         kept(Reading::Printed),
@@ -72,7 +72,7 @@ fn ranges(outcome: &mut Outcome) {
     ));
     let (reward, eps) = (Reward::PAPER_003, Reward::PAPER_003.threshold_m);
     let jump = reward.of(eps * (1.0 + 1e-9)) - reward.of(eps);
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "The objective is softened where punishment and reward meet",
         "the cost jumps at the threshold by less than the whole range of the rewards",
         jump < RANGES[0][1] - RANGES[1][0],
@@ -87,10 +87,16 @@ struct Ran {
     evaluations: Option<f64>,
 }
 
-fn ran(lab: &Lab, name: &str, objective: Objective, runs: usize, budget: usize) -> Result<Ran, Stop> {
+fn ran(
+    run_context: &RunContext,
+    name: &str,
+    objective: Objective,
+    runs: usize,
+    budget: usize,
+) -> Result<Ran, Stop> {
     let task = FiveJointArm::task(Reading::Corrected);
-    let all: Vec<Reaching> = lab.each(runs, |run| {
-        reach(lab, &contender(name, Reading::Corrected, budget)?, (task, objective), run, budget)
+    let all: Vec<Reaching> = run_context.each(runs, |run| {
+        reach(run_context, &contender(name, Reading::Corrected, budget)?, (task, objective), run, budget)
     })?;
     let generation = Sample::of(all.iter().map(|r| r.generation).collect());
     let error = Sample::of(all.iter().map(|r| r.error_mm).collect());
@@ -98,8 +104,8 @@ fn ran(lab: &Lab, name: &str, objective: Objective, runs: usize, budget: usize) 
     Ok(Ran { generation, error, evaluations: Sample::best(&trials).evaluations })
 }
 
-fn does_it_help(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
-    let (runs, budget) = (lab.runs(RUNS, 3), lab.choose(BUDGET, QUICK));
+fn does_it_help(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+    let (runs, budget) = (run_context.runs(RUNS, 3), run_context.choose(BUDGET, QUICK));
     let columns = [
         "",
         "paper, generation",
@@ -114,10 +120,10 @@ fn does_it_help(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
     );
     let mut table = Table::new("Figure 10: with and without reward", "", &note, &columns);
     for name in ["iepso", "de"] {
-        lab.say(&format!("  {name} with and without reward .."));
-        let with = ran(lab, name, Objective::Reward, runs, budget)?;
-        let without = ran(lab, name, Objective::TimeAndError, runs, budget)?;
-        let alone = ran(lab, name, Objective::Error, runs, budget)?;
+        run_context.say(&format!("  {name} with and without reward .."));
+        let with = ran(run_context, name, Objective::Reward, runs, budget)?;
+        let without = ran(run_context, name, Objective::TimeAndError, runs, budget)?;
+        let alone = ran(run_context, name, Objective::Error, runs, budget)?;
         let is_paper = name == "iepso";
         let printed = if is_paper { Cell::Paper(PRINTED_GENERATION) } else { Cell::None };
         table.row(format!("{name}, reward and punishment"), cells(&with, printed, None));
@@ -151,9 +157,9 @@ fn claims(with: &Ran, without: &Ran) -> [Claim; 3] {
     let median = quantile(&with.generation.values, 0.5);
     let rule = "IEPSO, corrected: median less by the signed-rank test at 5 %";
     [
-        Claim::judged("The reward makes IEPSO converge faster", rule, is_faster, faster),
-        Claim::judged("The reward makes IEPSO more accurate", rule, is_nearer, nearer),
-        Claim::judged(
+        Claim::decided("The reward makes IEPSO converge faster", rule, is_faster, faster),
+        Claim::decided("The reward makes IEPSO more accurate", rule, is_nearer, nearer),
+        Claim::decided(
             "With the reward the precision of 0.005 mm is met at generation 19",
             "IEPSO, corrected: the median run meets it by then",
             median <= PRINTED_GENERATION,

@@ -1,5 +1,5 @@
 //! The paper's task with an eye on the tip: when it comes within the threshold, and where it is after a generation.
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::trial::{Trial, minimise};
 use std::cell::{Cell, RefCell};
 use taustream_planner::optimize::{Optimizer, Problem};
@@ -74,7 +74,7 @@ impl Problem for Watched<'_> {
 
 /// Runs a method on a task.
 pub(super) fn reach(
-    lab: &Lab,
+    run_context: &RunContext,
     contender: &Contender,
     (task, objective): (Reach, Objective),
     run: usize,
@@ -89,7 +89,7 @@ pub(super) fn reach(
         least: Cell::new([f64::INFINITY; 2]),
         best: RefCell::default(),
     };
-    let trial = minimise(lab, contender.optimizer.as_ref(), &problem, lab.seed(run), budget)?;
+    let trial = minimise(run_context, contender.optimizer.as_ref(), &problem, run_context.seed(run), budget)?;
     let generation =
         problem.first.get().map_or(f64::INFINITY, |first| (first / problem.per_generation) as f64);
     let error_mm = 1e3 * task.error_m(&trial.found.x);

@@ -3,9 +3,9 @@ use super::via::PIECE_S;
 use crate::chart::Panel;
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
 use taustream_planner::optimize::{Iwo, Problem, Reading};
@@ -22,12 +22,12 @@ const NOTHING: f64 = 1e-6;
 const BOX: f64 = 2.0;
 
 /// Looks at all three.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut outcome = Outcome::default();
     outcome.ours.push(format!("gravity {} lengths/s²", figures(TwoLink::PAPER_004.gravity)));
     potential(&mut outcome);
-    motions(lab, &mut outcome)?;
-    needs_iwo(lab, &mut outcome)?;
+    motions(run_context, &mut outcome)?;
+    needs_iwo(run_context, &mut outcome)?;
     Ok(outcome)
 }
 
@@ -55,7 +55,7 @@ fn potential(outcome: &mut Outcome) {
         table.row(figures(degrees), [heights, printed, corrected].map(Cell::number).to_vec());
     }
     outcome.tables.push(table);
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "Eq. 12 is the arm's mechanical energy, θ from the upward axis",
         "its potential part is m g h at four angles",
         off <= NOTHING,
@@ -64,13 +64,13 @@ fn potential(outcome: &mut Outcome) {
 }
 
 /// What a motion does at its joins and at its end.
-struct Judged {
+struct EvaluatedCurve {
     end_speed_rad_s: f64,
     speed_jump_rad_s: f64,
     acceleration_jump_rad_s2: f64,
 }
 
-fn judge(cubics: &Cubics) -> Judged {
+fn evaluate(cubics: &Cubics) -> EvaluatedCurve {
     let at_end = cubics.pieces.last().map_or(Moving::default(), |p| moving(p, cubics.piece_s));
     let largest = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
@@ -80,7 +80,7 @@ fn judge(cubics: &Cubics) -> Judged {
         speed = speed.max(largest(before.speed_rad_s, after.speed_rad_s));
         acceleration = acceleration.max(largest(before.acceleration_rad_s2, after.acceleration_rad_s2));
     }
-    Judged {
+    EvaluatedCurve {
         end_speed_rad_s: largest(at_end.speed_rad_s, [0.0; 2]),
         speed_jump_rad_s: speed,
         acceleration_jump_rad_s2: acceleration,
@@ -105,7 +105,7 @@ fn via_rad() -> Vec<[f64; 2]> {
     VIA_DEGREES.iter().map(|d| [d.to_radians(); 2]).collect()
 }
 
-fn motions(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
+fn motions(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
     let via = via_rad();
     let truth = arm(Reading::Corrected);
     let cases = [
@@ -132,30 +132,30 @@ fn motions(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
             piece_s: PIECE_S,
             optimizer: &Iwo::PAPER_004,
             evaluations_max: EVALUATIONS,
-            seed: lab.seed(0),
+            seed: run_context.seed(0),
             reading: end,
         };
         all.push((label, search.through(&via)?));
     }
     all.push(("at rest at every via point", resting(truth, &via)));
-    let mut judged = Vec::new();
+    let mut decided = Vec::new();
     for (label, cubics) in &all {
-        let facts = judge(cubics);
+        let curve = evaluate(cubics);
         let numbers = [
             cubics.action(&truth),
             cubics.work(&truth),
-            facts.end_speed_rad_s,
-            facts.speed_jump_rad_s,
-            facts.acceleration_jump_rad_s2,
+            curve.end_speed_rad_s,
+            curve.speed_jump_rad_s,
+            curve.acceleration_jump_rad_s2,
         ];
         table.row(*label, numbers.map(Cell::number).to_vec());
         panel.line(label, speeds(cubics));
-        judged.push((numbers, facts));
+        decided.push((numbers, curve));
     }
     outcome.tables.push(table);
     let title = "Paper 004, stage 2: speed of the upper arm";
     outcome.figures.push(Figure::of("004-cubics.svg", title, 1, &[panel]));
-    outcome.claims.extend(claims_of_motions(&judged));
+    outcome.claims.extend(claims_of_motions(&decided));
     Ok(())
 }
 
@@ -165,30 +165,30 @@ fn speeds(cubics: &Cubics) -> Vec<(f64, f64)> {
     times.filter_map(|t| cubics.at(t).map(|m| (t, m.speed_rad_s[0]))).collect()
 }
 
-fn claims_of_motions(judged: &[([f64; 5], Judged)]) -> Vec<Claim> {
-    let [(printed, facts), (upward, free), _, (resting, _)] = judged else { return Vec::new() };
+fn claims_of_motions(decided: &[([f64; 5], EvaluatedCurve)]) -> Vec<Claim> {
+    let [(printed, curve), (upward, free), _, (resting, _)] = decided else { return Vec::new() };
     vec![
-        Claim::judged(
+        Claim::decided(
             "The angular velocities are continuous at the via points",
             "no speed jumps by more than 1e-6 rad/s",
-            facts.speed_jump_rad_s <= NOTHING,
+            curve.speed_jump_rad_s <= NOTHING,
             format!(
                 "largest jump of speed {}, of acceleration {} rad/s²",
-                figures(facts.speed_jump_rad_s),
-                figures(facts.acceleration_jump_rad_s2)
+                figures(curve.speed_jump_rad_s),
+                figures(curve.acceleration_jump_rad_s2)
             ),
         ),
-        Claim::judged(
+        Claim::decided(
             "The arm moves from its start to its goal (and stops there)",
             "the speed at the goal is below 1e-6 rad/s",
-            facts.end_speed_rad_s <= NOTHING,
+            curve.end_speed_rad_s <= NOTHING,
             format!(
                 "{} rad/s with the printed sign, {} with z upward",
-                figures(facts.end_speed_rad_s),
+                figures(curve.end_speed_rad_s),
                 figures(free.end_speed_rad_s)
             ),
         ),
-        Claim::judged(
+        Claim::decided(
             "The integral of E measures the energy consumed: making it least spends little",
             "the joints' work is less than that of cubics which rest at every via point, with either sign",
             printed[1] < resting[1] || upward[1] < resting[1],
@@ -223,8 +223,8 @@ fn newton(problem: &PieceEnergy) -> (f64, usize) {
     (f(x), evaluations + 1)
 }
 
-fn needs_iwo(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
-    let runs = lab.runs(RUNS, 3);
+fn needs_iwo(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+    let runs = run_context.runs(RUNS, 3);
     let columns = ["", "least, Newton", "evaluations", "IWO above it, relative", "evaluations"];
     let note =
         format!("∫E dt of single pieces from 20 to 40 degrees, {runs} runs of IWO; median [quartiles]");
@@ -234,8 +234,9 @@ fn needs_iwo(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
         let angles = [[20.0_f64.to_radians(); 2], [40.0_f64.to_radians(); 2]];
         let problem = piece(arm(Reading::Corrected), angles, [speed; 2]);
         let (exact, evaluations) = newton(&problem);
-        let trials: Vec<Trial> =
-            lab.each(runs, |run| minimise(lab, &Iwo::PAPER_004, &problem, lab.seed(run), EVALUATIONS))?;
+        let trials: Vec<Trial> = run_context.each(runs, |run| {
+            minimise(run_context, &Iwo::PAPER_004, &problem, run_context.seed(run), EVALUATIONS)
+        })?;
         let above = Sample::from_trials(&trials, |t| (t.found.cost - exact) / exact.abs());
         newtons = newtons.max(evaluations);
         worst = worst.max(above.summary().median);
@@ -250,7 +251,7 @@ fn needs_iwo(lab: &Lab, outcome: &mut Outcome) -> Result<(), Stop> {
         );
     }
     outcome.tables.push(table);
-    outcome.claims.push(Claim::judged(
+    outcome.claims.push(Claim::decided(
         "IWO finds the coefficients of least energy",
         "the median run is within 1e-6 of the exact least value, relatively, on every piece",
         worst <= 1e-6,

@@ -2,9 +2,9 @@
 use crate::chart::{LimitLine, Panel, palette};
 use crate::claim::Claim;
 use crate::figure::Figure;
-use crate::lab::{Lab, Stop};
 use crate::number::figures;
 use crate::registry::Outcome;
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::quantile;
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
@@ -88,8 +88,8 @@ fn walk(task: &ViaTask, seed: u64) -> Result<Walk, Stop> {
 }
 
 /// Walks.
-pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
-    let runs = lab.runs(RUNS, 4);
+pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
+    let runs = run_context.runs(RUNS, 4);
     let contact: f64 = ViaTask::paper_004(Reading::Corrected).radii.iter().sum();
     let columns = [
         "",
@@ -110,8 +110,8 @@ pub(crate) fn run(lab: &Lab) -> Result<Outcome, Stop> {
     let mut table = Table::new("Figures 4 to 6: via points by IWO", "relative units", &note, &columns);
     let mut all = Vec::new();
     for reading in READINGS {
-        lab.say(&format!("  {}, {runs} runs ..", reading.0));
-        let walks = lab.each(runs, |run| walk(&task(reading), lab.seed(run)))?;
+        run_context.say(&format!("  {}, {runs} runs ..", reading.0));
+        let walks = run_context.each(runs, |run| walk(&task(reading), run_context.seed(run)))?;
         let touching = |which: usize| walks.iter().filter(|w| w.least[which] < contact - 1e-6).count();
         let share = |count| Cell::Share { count, of: runs };
         let sample = |figure: &dyn Fn(&Walk) -> f64| Sample::of(walks.iter().map(figure).collect()).summary();
@@ -150,19 +150,19 @@ fn claims(all: &[Vec<Walk>], contact: f64) -> Vec<Claim> {
     let near = |walks: &[Walk]| (median(walks) - PRINTED_LIMIT).abs() <= 0.1 * PRINTED_LIMIT;
     let bends = bends(radians);
     vec![
-        Claim::judged(
+        Claim::decided(
             "With K = 10, 10, 100 the via points avoid the obstacles (angles in degrees, as table I has them)",
             rule,
             touching(degrees, 0) == 0,
             format!("touching: {}", of(degrees, 0)),
         ),
-        Claim::judged(
+        Claim::decided(
             "With K = 10, 10, 100 the via points avoid the obstacles (angles in radians)",
             rule,
             touching(radians, 0) == 0,
             format!("touching: {}", of(radians, 0)),
         ),
-        Claim::judged(
+        Claim::decided(
             "The fitted trajectory avoids the obstacles",
             "no run's cubics touch, in the reading whose via points do not",
             touching(radians, 2) == 0,
@@ -174,19 +174,19 @@ fn claims(all: &[Vec<Walk>], contact: f64) -> Vec<Claim> {
                 of(margin, 1)
             ),
         ),
-        Claim::judged(
+        Claim::decided(
             "The least distance stays near 1.29 (figure 5)",
             "the median least distance at the via points is within a tenth of it, in either reading",
             near(degrees) || near(radians),
             format!("{} in degrees, {} in radians", figures(median(degrees)), figures(median(radians))),
         ),
-        Claim::judged(
+        Claim::decided(
             "Without the penalty the distance falls below 1.29 (figure 6)",
             "in every run",
             free.iter().all(|w| w.least[0] < PRINTED_LIMIT),
             format!("median least distance {}", figures(median(free))),
         ),
-        Claim::judged(
+        Claim::decided(
             "θ goes on as without obstacles, φ bends away (figure 4)",
             "radians: φ is farther from the way without obstacles than θ, in more than half of the runs",
             2 * bends > radians.len(),

@@ -1,6 +1,6 @@
 //! Every entrant on every problem.
 use super::{Entrant, Problem, ProblemSet};
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 use taustream_arm::Robot;
@@ -47,20 +47,20 @@ pub(super) struct Outcome {
 
 impl Contest {
     /// Runs everybody on everything.
-    pub(super) fn run(&self, lab: &Lab) -> Result<Vec<Outcome>, Stop> {
+    pub(super) fn run(&self, run_context: &RunContext) -> Result<Vec<Outcome>, Stop> {
         let all = self.problems();
-        lab.say(&format!("{} planners on {} problems ..", self.entrants.len(), all.len()));
-        lab.each(all.len(), |i| {
+        run_context.say(&format!("{} planners on {} problems ..", self.entrants.len(), all.len()));
+        run_context.each(all.len(), |i| {
             let Some((set, robot, problem)) = all.get(i) else { return Err(Stop::Interrupted) };
             if i % 10 == 0 {
-                lab.say(&format!("problem {} of {}", i + 1, all.len()));
+                run_context.say(&format!("problem {} of {}", i + 1, all.len()));
             }
             let mut runs = Vec::with_capacity(self.entrants.len());
             for entrant in &self.entrants {
-                if lab.is_over() {
+                if run_context.is_over() {
                     return Err(Stop::Interrupted);
                 }
-                runs.push(self.attempt(robot, problem, entrant, lab.seed(problem.id))?);
+                runs.push(self.attempt(robot, problem, entrant, run_context.seed(problem.id))?);
             }
             Ok(Outcome { set: *set, runs })
         })
@@ -92,7 +92,7 @@ impl Contest {
         let planning_s = processor_s() - began_s;
         match planned {
             Ok(found) => {
-                let [tip_m, travel_rad] = ways(robot, &found.trajectory);
+                let [tip_m, travel_rad] = distances(robot, &found.trajectory);
                 let (duration_s, checks) = (found.proof.duration_s, found.checks);
                 Ok(Some(Run { planning_s, duration_s, tip_m, travel_rad, checks }))
             }
@@ -123,7 +123,7 @@ impl Contest {
 }
 
 /// Way of the tip (m) and of all joints (rad) of a motion.
-fn ways(robot: &Robot, trajectory: &Trajectory) -> [f64; 2] {
+fn distances(robot: &Robot, trajectory: &Trajectory) -> [f64; 2] {
     let duration_s = trajectory.duration_s();
     let pose = |i: u32| trajectory.sample(duration_s * f64::from(i) / f64::from(INSTANTS)).position_rad;
     let tip = |i: u32| robot.chain.frames(&pose(i))[robot.joints.len()].translation.vector;

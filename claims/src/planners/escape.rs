@@ -1,14 +1,14 @@
 //! Foraging with and without virtual obstacles, and RRT-Connect, each once on the same budget of poses.
 use super::{Contest, Problem};
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, wilcoxon};
 use crate::table::{Cell, Table};
 use taustream_arm::Robot;
-use taustream_planner::draw::Draw;
+use taustream_planner::budget::Budget;
 use taustream_planner::foraging::{Numbers, forage};
 use taustream_planner::pipeline::search_checks;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::{Space, rrt_connect};
-use taustream_planner::work::Work;
 use taustream_planner::world::World;
 
 /// What one search came to.
@@ -28,12 +28,12 @@ struct Three {
 }
 
 /// The table.
-pub(super) fn table(lab: &Lab, contest: &Contest) -> Result<Table, Stop> {
+pub(super) fn table(run_context: &RunContext, contest: &Contest) -> Result<Table, Stop> {
     let checks_max = search_checks(contest.deadline);
     let all = contest.problems();
-    let three = lab.each(all.len(), |i| {
+    let three = run_context.each(all.len(), |i| {
         let Some((set, robot, problem)) = all.get(i) else { return Err(Stop::Interrupted) };
-        Ok(Three { set: *set, tried: attempt(robot, problem, checks_max, lab.seed(problem.id))? })
+        Ok(Three { set: *set, tried: attempt(robot, problem, checks_max, run_context.seed(problem.id))? })
     })?;
     let note = format!(
         "One search each, of {checks_max} poses at most. RBF is foraging with virtual obstacles, BFO the same without (from \
@@ -81,17 +81,17 @@ fn cells(three: &[&Three]) -> Vec<Cell> {
 
 fn attempt(robot: &Robot, problem: &Problem, checks_max: usize, seed: u64) -> Result<[Tried; 3], Stop> {
     let world = World::new(robot, &problem.scene).map_err(Stop::Refused)?;
-    let work = Work::unbounded();
+    let budget = Budget::unbounded();
     let ends = [&problem.start_rad, &problem.goal_rad];
     let mut tried = [Tried::default(); 3];
     for (tried, numbers) in tried.iter_mut().zip([Some(Numbers::ROBUST), Some(Numbers::PLAIN), None]) {
-        let (space, mut draw) = (Space::new(&world, &work), Draw::new(seed, 0));
+        let (space, mut rng) = (Space::new(&world, &budget), SeededRng::new(seed, 0));
         let (found, virtuals) = match numbers {
             Some(numbers) => {
-                let foraged = forage(&space, ends, &numbers, checks_max, &mut draw)?;
+                let foraged = forage(&space, ends, &numbers, checks_max, &mut rng)?;
                 (foraged.path.is_some(), foraged.virtuals.len())
             }
-            None => (rrt_connect(&space, ends[0], ends[1], checks_max, &mut draw).path.is_some(), 0),
+            None => (rrt_connect(&space, ends[0], ends[1], checks_max, &mut rng).path.is_some(), 0),
         };
         *tried = Tried { found, checks: space.checks(), virtuals };
     }

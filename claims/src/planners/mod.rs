@@ -15,7 +15,7 @@ pub use entrant::Entrant;
 pub use problems::{Problem, ProblemSet, Surroundings};
 pub use published::published;
 
-use crate::lab::{Lab, Stop};
+use crate::run_context::{RunContext, Stop};
 use crate::table::Table;
 
 /// What a contest came to.
@@ -31,11 +31,11 @@ pub struct Standings {
 ///
 /// # Errors
 /// When the user ended it, or a robot's shapes cannot be built.
-pub fn compare(lab: &Lab, contest: &Contest) -> Result<Standings, Stop> {
-    let runs = contest.run(lab)?;
+pub fn compare(run_context: &RunContext, contest: &Contest) -> Result<Standings, Stop> {
+    let runs = contest.run(run_context)?;
     let mut tables = vec![standings::overall(contest, &runs), standings::by_set(contest, &runs)];
-    lab.say("foraging with and without virtual obstacles ..");
-    tables.push(escape::table(lab, contest)?);
+    run_context.say("foraging with and without virtual obstacles ..");
+    tables.push(escape::table(run_context, contest)?);
     Ok(Standings { notes: contest.notes(), tables })
 }
 

@@ -8,14 +8,14 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::JointArray;
 use taustream_motion::chain::Pose;
-use taustream_planner::draw::Draw;
-use taustream_planner::leave::is_clear;
+use taustream_planner::budget::Budget;
+use taustream_planner::margin_exit::is_clear;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Space;
-use taustream_planner::work::Work;
 use taustream_planner::world::{Snapshot, World};
 
 /// Pairs of poses that are drawn for one problem before it is given up.
-const DRAWS_MAX: usize = 2_000;
+const RETRIES_MAX: usize = 2_000;
 /// Legs of the walk from a start to its goal.
 const LEGS: usize = 8;
 /// Steps of the walk, in metres of weighted distance: it turns this far before what blocks it, at most.
@@ -69,7 +69,7 @@ impl ProblemSet {
     ///
     /// # Errors
     /// The name of a shape of the robot that cannot be built.
-    pub fn draw(
+    pub fn random(
         name: &str,
         robot: &Robot,
         surroundings: &Surroundings,
@@ -84,10 +84,10 @@ impl ProblemSet {
             left_out: String::new(),
         };
         for id in 0..count {
-            let mut draw = Draw::new(seed, id as u64);
+            let mut rng = SeededRng::new(seed, id as u64);
             let mut drawn = None;
-            for _ in 0..DRAWS_MAX {
-                match draw_one(robot, surroundings, &mut draw)? {
+            for _ in 0..RETRIES_MAX {
+                match random_one(robot, surroundings, &mut rng)? {
                     One::Blocked(scene, [start_rad, goal_rad]) => {
                         drawn = Some(Problem { id, scene: *scene, start_rad, goal_rad });
                         break;
@@ -100,7 +100,7 @@ impl ProblemSet {
         }
         let missing = count - set.problems.len();
         if missing > 0 {
-            set.left_out = format!("{missing} problems: no two clear poses in {DRAWS_MAX} draws");
+            set.left_out = format!("{missing} problems: no two clear poses in {RETRIES_MAX} draws");
         }
         Ok(set)
     }
@@ -113,28 +113,28 @@ enum One {
     Blocked(Box<Scene>, [JointArray; 2]),
 }
 
-fn draw_one(robot: &Robot, surroundings: &Surroundings, draw: &mut Draw) -> Result<One, String> {
+fn random_one(robot: &Robot, surroundings: &Surroundings, rng: &mut SeededRng) -> Result<One, String> {
     let empty = Scene { margin_m: taustream_arm::scene::MARGIN_M_DEFAULT, ..Scene::default() };
     let size_m = WORKING_SHARE * World::new(robot, &empty)?.reach_m()[0];
     let mut scene = match surroundings {
         Surroundings::Given(scene) => (**scene).clone(),
-        Surroundings::Clutter => Scene { obstacles: clutter(size_m, draw), ..empty },
+        Surroundings::Clutter => Scene { obstacles: clutter(size_m, rng), ..empty },
         Surroundings::Cup => empty,
     };
-    let (world, work) = (World::new(robot, &scene)?, Work::unbounded());
-    let space = Space::new(&world, &work);
-    let start_rad = space.draw_pose(draw);
+    let (world, budget) = (World::new(robot, &scene)?, Budget::unbounded());
+    let space = Space::new(&world, &budget);
+    let start_rad = space.random_pose(rng);
     if !is_clear(&world, &start_rad) {
         return Ok(One::Unclear);
     }
-    let walk = walk(&space, start_rad, draw);
+    let walk = walk(&space, start_rad, rng);
     let [start_rad, goal_rad] = [start_rad, walk.last().copied().unwrap_or(start_rad)];
     if *surroundings == Surroundings::Cup {
         let tips = [tip(&world, &start_rad), tip(&world, &goal_rad)];
-        scene.obstacles = cup(tips, size_m, draw);
+        scene.obstacles = cup(tips, size_m, rng);
     }
     let world = World::new(robot, &scene)?;
-    let space = Space::new(&world, &work);
+    let space = Space::new(&world, &budget);
     let is_free = |legs: &[JointArray]| if let [a, b] = legs { space.is_edge_free(a, b) } else { true };
     if !(is_clear(&world, &start_rad) && is_clear(&world, &goal_rad) && walk.windows(2).all(is_free)) {
         return Ok(One::Unclear);
@@ -144,10 +144,10 @@ fn draw_one(robot: &Robot, surroundings: &Surroundings, draw: &mut Draw) -> Resu
 }
 
 /// Goes straight towards random poses, a step at a time, and turns where it is blocked; the poses in order.
-fn walk(space: &Space, start_rad: JointArray, draw: &mut Draw) -> Vec<JointArray> {
+fn walk(space: &Space, start_rad: JointArray, rng: &mut SeededRng) -> Vec<JointArray> {
     let mut poses = vec![start_rad];
     for _ in 0..LEGS {
-        let (mut here, target) = (poses.last().copied().unwrap_or(start_rad), space.draw_pose(draw));
+        let (mut here, target) = (poses.last().copied().unwrap_or(start_rad), space.random_pose(rng));
         let steps = (space.distance_m(&here, &target) / LEG_STEP_M).ceil().max(1.0);
         let mut step = 1.0;
         let from = here;
@@ -172,12 +172,12 @@ fn tip(world: &World, pose_rad: &JointArray) -> [f64; 3] {
 }
 
 /// Balls, boxes and posts around the arm, none where its first links stand.
-fn clutter(size_m: f64, draw: &mut Draw) -> Vec<Obstacle> {
+fn clutter(size_m: f64, rng: &mut SeededRng) -> Vec<Obstacle> {
     let mut obstacles = Vec::new();
     for i in 0..CLUTTER {
-        let (turn_rad, away_m) = (draw.within(0.0, std::f64::consts::TAU), size_m * draw.within(0.3, 1.0));
-        let center_m = [away_m * turn_rad.cos(), away_m * turn_rad.sin(), size_m * draw.within(-0.2, 1.0)];
-        let mut length_m = || size_m * draw.within(0.08, 0.25);
+        let (turn_rad, away_m) = (rng.within(0.0, std::f64::consts::TAU), size_m * rng.within(0.3, 1.0));
+        let center_m = [away_m * turn_rad.cos(), away_m * turn_rad.sin(), size_m * rng.within(-0.2, 1.0)];
+        let mut length_m = || size_m * rng.within(0.08, 0.25);
         let shape = match i % 3 {
             0 => Shape::Sphere { radius_m: 0.5 * length_m() },
             1 => Shape::Box { size_m: std::array::from_fn(|_| length_m()) },
@@ -190,13 +190,13 @@ fn clutter(size_m: f64, draw: &mut Draw) -> Vec<Obstacle> {
 
 /// A bottom across the way of the tip and two walls along it. Its mouth is turned to the start, so that a greedy search
 /// runs into it, or away from it, so that the goal may lie inside.
-fn cup([from_m, to_m]: [[f64; 3]; 2], size_m: f64, draw: &mut Draw) -> Vec<Obstacle> {
-    let way_m = [from_m[0] - to_m[0], from_m[1] - to_m[1]];
-    let heading_rad = way_m[1].atan2(way_m[0]);
+fn cup([from_m, to_m]: [[f64; 3]; 2], size_m: f64, rng: &mut SeededRng) -> Vec<Obstacle> {
+    let distance_m = [from_m[0] - to_m[0], from_m[1] - to_m[1]];
+    let heading_rad = distance_m[1].atan2(distance_m[0]);
     let (ahead, aside) = ([heading_rad.cos(), heading_rad.sin()], [-heading_rad.sin(), heading_rad.cos()]);
-    let (half_width_m, depth_m) = (size_m * draw.within(0.15, 0.3), size_m * draw.within(0.15, 0.35));
-    let (height_m, away_m) = (size_m * draw.within(0.4, 0.8), size_m * draw.within(0.12, 0.3));
-    let mouth = if draw.unit() < 0.5 { 1.0 } else { -1.0 };
+    let (half_width_m, depth_m) = (size_m * rng.within(0.15, 0.3), size_m * rng.within(0.15, 0.35));
+    let (height_m, away_m) = (size_m * rng.within(0.4, 0.8), size_m * rng.within(0.12, 0.3));
+    let mouth = if rng.unit() < 0.5 { 1.0 } else { -1.0 };
     let thick_m = 0.02 * size_m;
     let wall = |name: &str, along_m: f64, side_m: f64, size_m: [f64; 3]| {
         let at = |k: usize| to_m[k] + along_m * ahead[k] + side_m * aside[k];

@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::chain::Pose;
 use taustream_motion::{JointArray, MAX_JOINTS};
-use taustream_planner::leave::is_clear;
+use taustream_planner::budget::Budget;
+use taustream_planner::margin_exit::is_clear;
 use taustream_planner::tree::Space;
-use taustream_planner::work::Work;
 use taustream_planner::world::World;
 
 /// Margin that plans keep, m: the problems are published without one, and some goals leave little.
@@ -99,10 +99,10 @@ fn read(path: &Path, count: usize) -> Result<ProblemSet, String> {
         }
         let problem = problem(&set.robot, question, set.problems.len()).map_err(fail)?;
         let world = World::new(&set.robot, &problem.scene).map_err(fail)?;
-        let work = Work::unbounded();
+        let budget = Budget::unbounded();
         if !(is_clear(&world, &problem.start_rad) && is_clear(&world, &problem.goal_rad)) {
             unclear += 1;
-        } else if Space::new(&world, &work).is_edge_free(&problem.start_rad, &problem.goal_rad) {
+        } else if Space::new(&world, &budget).is_edge_free(&problem.start_rad, &problem.goal_rad) {
             set.free_lines += 1;
         } else {
             set.problems.push(problem);

@@ -181,7 +181,7 @@ impl Process {
 
     fn end(&mut self) -> Result<(), Failure> {
         if let Ok(Some(status)) = self.child.try_wait() {
-            return self.judge(status);
+            return self.evaluate(status);
         }
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
         if let Some(pid) = pid {
@@ -191,7 +191,7 @@ impl Process {
         let limit = Limit::after_s(END_S_MAX);
         while !limit.is_over() {
             if let Ok(Some(status)) = self.child.try_wait() {
-                return self.judge(status);
+                return self.evaluate(status);
             }
             thread::sleep(Duration::from_millis(10));
         }
@@ -200,7 +200,7 @@ impl Process {
         Err(self.failed(&format!("did not end within {END_S_MAX} s of being told to, {how}")))
     }
 
-    fn judge(&self, status: ExitStatus) -> Result<(), Failure> {
+    fn evaluate(&self, status: ExitStatus) -> Result<(), Failure> {
         if status.success() { Ok(()) } else { Err(self.failed(&format!("ended with {status}"))) }
     }
 

@@ -6,7 +6,7 @@ use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::live::client::{Client, Limit};
-use crate::live::command::obey;
+use crate::live::command::execute;
 use crate::live::follow::follow;
 use crate::live::replan::ask_while;
 use crate::output::{Form, note};
@@ -77,7 +77,7 @@ impl<'a> Session<'a> {
     /// Enables, then plans and executes one move after the other.
     pub(crate) fn go_through_goals(&mut self, demo: &DemoFile) -> Result<(), Failure> {
         self.enable()?;
-        obey(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
+        execute(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
         for (i, goal_rad) in demo.goals_rad.iter().enumerate() {
             self.seen.borrow_mut().view.begin_move(i + 1);
             let done = loop {
@@ -120,20 +120,20 @@ impl<'a> Session<'a> {
         note(format_args!("FAULT: {fault}; the arm was stopped. Clearing, enabling, planning again .."));
         self.faults.push(fault);
         self.wait_for(Phase::Fault, "come to rest")?;
-        obey(&self.client, self.arm, Command::ClearFault, REST_S_MAX)?;
+        execute(&self.client, self.arm, Command::ClearFault, REST_S_MAX)?;
         self.enable()
     }
 
     fn enable(&self) -> Result<(), Failure> {
         self.look()?;
-        obey(&self.client, self.arm, Command::Enable, DRIVES_S_MAX)
+        execute(&self.client, self.arm, Command::Enable, DRIVES_S_MAX)
     }
 
     /// Switches the drives off and sums up.
     pub(crate) fn finish(self) -> Result<Summary, Failure> {
         self.look()?;
         let moved = self.seen.borrow().tracking_error_rad_max;
-        obey(&self.client, self.arm, Command::Disable, DRIVES_S_MAX)?;
+        execute(&self.client, self.arm, Command::Disable, DRIVES_S_MAX)?;
         self.look()?;
         let seen = self.seen.into_inner();
         let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
@@ -161,7 +161,7 @@ impl<'a> Session<'a> {
         note("stopping the arm (Ctrl-C again ends the processes at once) ..");
         let mut well = true;
         for (command, wait_s) in [(Command::Stop, REST_S_MAX), (Command::Disable, DRIVES_S_MAX)] {
-            if let Err(refused) = obey(&self.client, self.arm, command, wait_s) {
+            if let Err(refused) = execute(&self.client, self.arm, command, wait_s) {
                 note(format_args!("  {refused}"));
                 well = false;
             }

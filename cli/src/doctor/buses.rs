@@ -43,8 +43,8 @@ fn of_bus(s: &Subject, settings: &Settings, index: usize, bus: &Bus) -> Vec<Find
         return vec![missing(bus)];
     }
     if s.tree.number(&format!("{at}/type")) != Some(CAN_TYPE) {
-        let cure = "name a CAN interface in the settings (list them: ip link show type can)";
-        return vec![Finding::problem(NAME, format!("{interface} is no CAN interface"), cure)];
+        let remedy = "name a CAN interface in the settings (list them: ip link show type can)";
+        return vec![Finding::problem(NAME, format!("{interface} is no CAN interface"), remedy)];
     }
     let mut findings = vec![state(s, bus, &at)];
     findings.extend(queue(s, settings, index, bus, &at));
@@ -60,18 +60,18 @@ fn missing(bus: &Bus) -> Finding {
     const NAME: &str = "CAN interface";
     let interface = &bus.interface;
     let what = format!("{interface} of bus {} does not exist", bus.name);
-    let virtual_cure = format!(
+    let virtual_remedy = format!(
         "make it: modprobe vcan && ip link add dev {interface} type vcan && ip link set {interface} up"
     );
     match bus.kind {
         BusKind::Virtual => Finding::warning(
             NAME,
             format!("{what}; its bus is virtual and will use the local link"),
-            virtual_cure,
+            virtual_remedy,
         ),
         BusKind::Classic { .. } | BusKind::Fd { .. } => {
-            let cure = "plug the adapter in, load its driver, or name another interface (list them: ip link show type can)";
-            Finding::problem(NAME, what, cure)
+            let remedy = "plug the adapter in, load its driver, or name another interface (list them: ip link show type can)";
+            Finding::problem(NAME, what, remedy)
         }
     }
 }
@@ -90,8 +90,8 @@ fn state(s: &Subject, bus: &Bus, at: &str) -> Finding {
     };
     let declared = bus.kind.bitrate_bit_s();
     if flags & UP == 0 {
-        let cure = declared.map_or_else(|| format!("ip link set {interface} up"), set);
-        return Finding::problem(NAME, format!("{interface} is down"), cure);
+        let remedy = declared.map_or_else(|| format!("ip link set {interface} up"), set);
+        return Finding::problem(NAME, format!("{interface} is down"), remedy);
     }
     match (declared, controller.bitrate_bit_s) {
         (Some(declared), Some(actual)) if declared != actual => {
@@ -104,14 +104,14 @@ fn state(s: &Subject, bus: &Bus, at: &str) -> Finding {
         controller.state
     {
         let what = format!("{interface} is {}: frames get lost on the wire", state.word());
-        let cure = "look at cable, both terminations (60 ohm between CAN_H and CAN_L), drives' power and bit rates; \
+        let remedy = "look at cable, both terminations (60 ohm between CAN_H and CAN_L), drives' power and bit rates; \
                     then take the interface down and up";
         return match state {
-            ControllerState::Warning => Finding::warning(NAME, what, cure),
+            ControllerState::Warning => Finding::warning(NAME, what, remedy),
             ControllerState::Passive
             | ControllerState::Off
             | ControllerState::Active
-            | ControllerState::Stopped => Finding::problem(NAME, what, cure),
+            | ControllerState::Stopped => Finding::problem(NAME, what, remedy),
         };
     }
     if let Some(ms) = controller.restart_ms.filter(|ms| *ms > 0) {
@@ -133,16 +133,16 @@ fn queue(s: &Subject, settings: &Settings, index: usize, bus: &Bus, at: &str) ->
     let servos = settings.servos.iter().filter(|servo| servo.bus == index).count();
     // One setpoint a servo, and a SYNC.
     let wanted = i64::try_from(servos).unwrap_or(i64::MAX).saturating_add(1);
-    let cure = format!("ip link set {interface} txqueuelen {}", wanted.saturating_mul(2).max(16));
+    let remedy = format!("ip link set {interface} txqueuelen {}", wanted.saturating_mul(2).max(16));
     Some(if length < wanted {
         let what = format!(
             "{interface} queues {length} frames, and a cycle sends {wanted}: some are refused (ENOBUFS)"
         );
-        Finding::problem(NAME, what, cure)
+        Finding::problem(NAME, what, remedy)
     } else if length > QUEUE_MAX && bus.kind != BusKind::Virtual {
         let what =
             format!("{interface} queues {length} frames: on a bus in trouble old setpoints wait in it");
-        Finding::warning(NAME, what, cure)
+        Finding::warning(NAME, what, remedy)
     } else {
         Finding::ok(NAME, format!("{interface} queues {length} frames; a cycle sends {wanted}"))
     })

@@ -22,7 +22,7 @@ fn isolation(s: &Subject) -> Finding {
     let online = listed(s, "online");
     let (isolated, tickless) = (listed(s, "isolated"), listed(s, "nohz_full"));
     let own = s.cpu().or(isolated.last().copied()).or(online.last().copied()).unwrap_or(0);
-    let cure = format!(
+    let remedy = format!(
         "boot with isolcpus=managed_irq,domain,{own} nohz_full={own} rcu_nocbs={own}, and set cycle.cpu = {own} in the settings"
     );
     match s.cpu() {
@@ -38,15 +38,15 @@ fn isolation(s: &Subject) -> Finding {
             "set cycle.cpu to one of them, the last one preferably",
         ),
         Some(cpu) if !isolated.contains(&cpu) => {
-            Finding::warning(NAME, format!("the cycle's CPU {cpu} is shared with all other work"), cure)
+            Finding::warning(NAME, format!("the cycle's CPU {cpu} is shared with all other work"), remedy)
         }
         Some(cpu) if !tickless.contains(&cpu) => {
             let what = format!("the cycle's CPU {cpu} is isolated, but the scheduler's clock interrupts it");
-            Finding::warning(NAME, what, cure)
+            Finding::warning(NAME, what, remedy)
         }
         Some(cpu) => Finding::ok(NAME, format!("CPU {cpu} belongs to the cycle, without a scheduler tick")),
         None if isolated.is_empty() => {
-            Finding::warning(NAME, "none: any process can get in the way of the cycle", cure)
+            Finding::warning(NAME, "none: any process can get in the way of the cycle", remedy)
         }
         None => Finding::warning(
             NAME,

@@ -38,33 +38,34 @@ pub(crate) struct Finding {
     /// What was found.
     pub(crate) what: String,
     /// What to do; none where nothing needs to be done.
-    pub(crate) cure: Option<String>,
+    #[serde(rename = "cure")]
+    pub(crate) remedy: Option<String>,
 }
 
 impl Finding {
     /// All is well.
     pub(crate) fn ok(name: &'static str, what: impl Into<String>) -> Self {
-        Self { name, grade: Grade::Ok, what: what.into(), cure: None }
+        Self { name, grade: Grade::Ok, what: what.into(), remedy: None }
     }
     /// Nothing is known.
     pub(crate) fn unknown(name: &'static str, what: impl Into<String>) -> Self {
-        Self { name, grade: Grade::Unknown, what: what.into(), cure: None }
+        Self { name, grade: Grade::Unknown, what: what.into(), remedy: None }
     }
     /// It could be better.
-    pub(crate) fn warning(name: &'static str, what: impl Into<String>, cure: impl Into<String>) -> Self {
-        Self { name, grade: Grade::Warning, what: what.into(), cure: Some(cure.into()) }
+    pub(crate) fn warning(name: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { name, grade: Grade::Warning, what: what.into(), remedy: Some(remedy.into()) }
     }
     /// It must be mended.
-    pub(crate) fn problem(name: &'static str, what: impl Into<String>, cure: impl Into<String>) -> Self {
-        Self { name, grade: Grade::Problem, what: what.into(), cure: Some(cure.into()) }
+    pub(crate) fn problem(name: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { name, grade: Grade::Problem, what: what.into(), remedy: Some(remedy.into()) }
     }
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<8} {:<20} {}", self.grade.word(), self.name, self.what)?;
-        match &self.cure {
-            Some(cure) => write!(f, "\n{:<30}cure: {cure}", ""),
+        match &self.remedy {
+            Some(remedy) => write!(f, "\n{:<30}cure: {remedy}", ""),
             None => Ok(()),
         }
     }

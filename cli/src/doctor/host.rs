@@ -12,7 +12,7 @@ pub(crate) fn examine(s: &Subject) -> Vec<Finding> {
 
 fn virtual_machine(s: &Subject) -> Finding {
     const NAME: &str = "virtual machine";
-    const CURE: &str = "drive arms from a computer of their own; trials on virtual buses are fine";
+    const REMEDY: &str = "drive arms from a computer of their own; trials on virtual buses are fine";
     let cpus = s.tree.text("proc/cpuinfo").unwrap_or_default();
     let hypervisor = s.tree.text("sys/hypervisor/type");
     let product = s.tree.text("sys/class/dmi/id/product_name").unwrap_or_default();
@@ -31,12 +31,12 @@ fn virtual_machine(s: &Subject) -> Finding {
     } else {
         return Finding::ok(NAME, "no sign of one");
     };
-    Finding::warning(NAME, format!("this runs under {kind}: the host takes its CPUs away at will"), CURE)
+    Finding::warning(NAME, format!("this runs under {kind}: the host takes its CPUs away at will"), REMEDY)
 }
 
 fn container(s: &Subject) -> Finding {
     const NAME: &str = "container";
-    const CURE: &str = "run the streamer on the host by its systemd unit, or give the container CAP_SYS_NICE, CAP_IPC_LOCK \
+    const REMEDY: &str = "run the streamer on the host by its systemd unit, or give the container CAP_SYS_NICE, CAP_IPC_LOCK \
                         (--ulimit rtprio=99 --ulimit memlock=-1) and the CAN interfaces";
     let groups = s.tree.text("proc/1/cgroup").unwrap_or_default();
     let by_group = ["docker", "lxc", "kubepods", "libpod"].into_iter().find(|word| groups.contains(word));
@@ -54,13 +54,13 @@ fn container(s: &Subject) -> Finding {
     Finding::warning(
         NAME,
         format!("this runs in a container ({kind}), which has its own rights and interfaces"),
-        CURE,
+        REMEDY,
     )
 }
 
 fn temperature(s: &Subject) -> Finding {
     const NAME: &str = "temperature";
-    const CURE: &str =
+    const REMEDY: &str =
         "clean fan and heat sink, or cool it better; a processor that slows down makes cycles late";
     let throttled: i64 = s
         .tree
@@ -82,12 +82,12 @@ fn temperature(s: &Subject) -> Finding {
     if throttled > 0 {
         let what =
             format!("the processor has slowed down {throttled} times since boot because it was too hot");
-        return Finding::warning(NAME, what, CURE);
+        return Finding::warning(NAME, what, REMEDY);
     }
     match hottest {
         None => Finding::unknown(NAME, "no sensor"),
         Some((milli, zone)) if milli > MILLI_CELSIUS_MAX => {
-            Finding::warning(NAME, format!("{zone} is at {} degrees Celsius", milli / 1000), CURE)
+            Finding::warning(NAME, format!("{zone} is at {} degrees Celsius", milli / 1000), REMEDY)
         }
         Some((milli, zone)) => {
             Finding::ok(NAME, format!("{zone}, the hottest, is at {} degrees Celsius", milli / 1000))

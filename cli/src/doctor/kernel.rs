@@ -43,14 +43,14 @@ fn can(s: &Subject) -> Finding {
         );
     }
     let what = "this kernel has none, and no module for them";
-    let cure = "install a kernel with CONFIG_CAN and CONFIG_CAN_RAW (Debian's linux-image-amd64 and linux-image-rt-amd64 have both)";
+    let remedy = "install a kernel with CONFIG_CAN and CONFIG_CAN_RAW (Debian's linux-image-amd64 and linux-image-rt-amd64 have both)";
     let only_virtual =
         s.settings.as_ref().is_some_and(|settings| settings.buses.iter().all(|b| b.kind == BusKind::Virtual));
     if only_virtual {
         let what = format!("{what}; the buses of these settings are virtual and can use the local link");
-        return Finding::warning(NAME, what, cure);
+        return Finding::warning(NAME, what, remedy);
     }
-    Finding::problem(NAME, what, cure)
+    Finding::problem(NAME, what, remedy)
 }
 
 /// CAN frames go through software interrupts, which the kernel hands to a thread of its own when there are many; as an
@@ -81,18 +81,18 @@ fn software_interrupts(s: &Subject) -> Finding {
 
 fn throttling(s: &Subject) -> Finding {
     const NAME: &str = "real-time throttling";
-    const CURE: &str =
+    const REMEDY: &str =
         "sysctl kernel.sched_rt_runtime_us=-1, and the same line in /etc/sysctl.d/taustream.conf";
     match s.tree.number("proc/sys/kernel/sched_rt_runtime_us") {
         None => Finding::unknown(NAME, "kernel.sched_rt_runtime_us cannot be read"),
         Some(-1) => Finding::ok(NAME, "off"),
-        Some(0) => Finding::problem(NAME, "the kernel gives real-time threads no time at all", CURE),
+        Some(0) => Finding::problem(NAME, "the kernel gives real-time threads no time at all", REMEDY),
         Some(us) => {
             let period_us = s.tree.number("proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000);
             let what = format!(
                 "real-time threads are stopped after {us} us of every {period_us} us, whoever of them used the time"
             );
-            Finding::warning(NAME, what, CURE)
+            Finding::warning(NAME, what, REMEDY)
         }
     }
 }

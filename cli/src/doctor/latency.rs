@@ -25,9 +25,9 @@ pub(crate) struct Latency {
 
 impl Latency {
     /// The grade of the worst wake-up against the period.
-    pub(crate) fn judge(&self) -> Finding {
+    pub(crate) fn evaluate(&self) -> Finding {
         const NAME: &str = "wake-up latency";
-        const CURE: &str = "mend what is named above, then measure under the load that the arm will meet, for minutes: \
+        const REMEDY: &str = "mend what is named above, then measure under the load that the arm will meet, for minutes: \
                             taustream doctor --seconds 600";
         let lateness = &self.wake_ups.lateness;
         let (p50, p99, max) = (us(lateness.p50_ns), us(lateness.p99_ns), us(lateness.max_ns));
@@ -38,9 +38,9 @@ impl Latency {
             self.seconds
         );
         if max > LATE * period_us || self.wake_ups.skipped > 0 {
-            Finding::problem(NAME, format!("{what}: cycles will be late"), CURE)
+            Finding::problem(NAME, format!("{what}: cycles will be late"), REMEDY)
         } else if max > GOOD * period_us || !self.wake_ups.realtime {
-            Finding::warning(NAME, what, CURE)
+            Finding::warning(NAME, what, REMEDY)
         } else {
             Finding::ok(NAME, what)
         }

@@ -77,18 +77,18 @@ fn stale_segments(s: &Subject) -> Finding {
 
 fn runtime_directory(s: &Subject) -> Finding {
     const NAME: &str = "runtime directory";
-    let Ok(facts) = s.tree.path(&s.runtime).symlink_metadata() else {
+    let Ok(metadata) = s.tree.path(&s.runtime).symlink_metadata() else {
         return Finding::ok(NAME, format!("{} will be made at the first start", s.runtime));
     };
-    let cure = format!("remove {}, or set TAUSTREAM_RUNTIME_DIR to a directory of your own", s.runtime);
-    if !facts.is_dir() {
-        return Finding::problem(NAME, format!("{} is no directory", s.runtime), cure);
+    let remedy = format!("remove {}, or set TAUSTREAM_RUNTIME_DIR to a directory of your own", s.runtime);
+    if !metadata.is_dir() {
+        return Finding::problem(NAME, format!("{} is no directory", s.runtime), remedy);
     }
-    if facts.uid() != s.uid {
-        let what = format!("{} belongs to uid {}, and this is uid {}", s.runtime, facts.uid(), s.uid);
-        return Finding::problem(NAME, what, cure);
+    if metadata.uid() != s.uid {
+        let what = format!("{} belongs to uid {}, and this is uid {}", s.runtime, metadata.uid(), s.uid);
+        return Finding::problem(NAME, what, remedy);
     }
-    let mode = facts.mode() & 0o7777;
+    let mode = metadata.mode() & 0o7777;
     if mode & 0o077 != 0 {
         return Finding::problem(
             NAME,

@@ -24,12 +24,12 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 use subject::Subject;
-use taustream_arm::{Settings, runtime, settings::Cycle};
+use taustream_arm::{Settings, runtime, settings::CycleSettings};
 use taustream_streamer::bench::wake_ups;
 use tree::Tree;
 
 /// Where settings say nothing of the cycle: what the shipped ones say.
-const USUAL_CYCLE: Cycle = Cycle {
+const USUAL_CYCLE: CycleSettings = CycleSettings {
     period_us: 1_000,
     tolerated_gap_periods: 2,
     stall_resume_ms: 20,
@@ -127,12 +127,10 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &DoctorArgs) -> Result
     } else {
         None
     };
-    findings.push(
-        latency.as_ref().map_or_else(
-            || Finding::unknown("wake-up latency", "not measured (--seconds 0)"),
-            Latency::judge,
-        ),
-    );
+    findings.push(latency.as_ref().map_or_else(
+        || Finding::unknown("wake-up latency", "not measured (--seconds 0)"),
+        Latency::evaluate,
+    ));
     let diagnosis = Diagnosis::of(subject.settings.as_ref(), findings, latency);
     form.print(&diagnosis)?;
     if diagnosis.grade == Grade::Problem {
@@ -158,7 +156,7 @@ fn this_computer(settings: Option<Settings>, priority: u8) -> Subject {
         priority,
         uid,
         runtime: runtime::expected(uid, Path::new("/run")).display().to_string(),
-        shm_free: shm.map(|facts| facts.f_bavail.saturating_mul(facts.f_frsize)),
+        shm_free: shm.map(|metadata| metadata.f_bavail.saturating_mul(metadata.f_frsize)),
         controller: taustream_drivers::link::controller,
     }
 }

@@ -6,7 +6,7 @@ use super::subject::Subject;
 const IPC_LOCK: u64 = 1 << 14;
 const SYS_NICE: u64 = 1 << 23;
 
-const CURE: &str = "run it by the packaged systemd unit; by hand: setcap cap_sys_nice,cap_ipc_lock+ep taustream-streamer, \
+const REMEDY: &str = "run it by the packaged systemd unit; by hand: setcap cap_sys_nice,cap_ipc_lock+ep taustream-streamer, \
                     or `rtprio 99` and `memlock unlimited` for the user in /etc/security/limits.conf and a new login";
 
 pub(crate) fn examine(s: &Subject) -> Vec<Finding> {
@@ -38,7 +38,7 @@ fn priority(wanted: u8, limit: Option<u64>, capabilities: u64, who: &str) -> Fin
         Some(limit) => {
             let what =
                 format!("{who} may use {limit}; the cycle wants {wanted}, and the streamer will not start");
-            Finding::problem(NAME, what, CURE)
+            Finding::problem(NAME, what, REMEDY)
         }
         None => Finding::unknown(NAME, "RLIMIT_RTPRIO is not told"),
     }
@@ -53,7 +53,7 @@ fn memory(limit: Option<u64>, capabilities: u64, who: &str) -> Finding {
         Some(u64::MAX) => Finding::ok(NAME, format!("{who} may lock all its memory")),
         Some(bytes) => {
             let what = format!("{who} may lock {bytes} bytes only, and the streamer will not start");
-            Finding::problem(NAME, what, CURE)
+            Finding::problem(NAME, what, REMEDY)
         }
         None => Finding::unknown(NAME, "RLIMIT_MEMLOCK is not told"),
     }

@@ -135,8 +135,8 @@ impl Computer {
         for word in words {
             assert!(found.to_string().contains(word), "no `{word}`: {found}");
         }
-        let needs_cure = matches!(grade, Grade::Warning | Grade::Problem);
-        assert_eq!(found.cure.is_some(), needs_cure, "{found}");
+        let needs_remedy = matches!(grade, Grade::Warning | Grade::Problem);
+        assert_eq!(found.remedy.is_some(), needs_remedy, "{found}");
         for other in findings.iter().filter(|f| f.name != name) {
             assert_eq!(other.grade, Grade::Ok, "only {name} was doctored: {other}");
         }
@@ -311,7 +311,7 @@ const ROWS: &[Row] = &[
 ];
 
 #[test]
-fn one_doctored_file_makes_one_finding_with_its_cure() {
+fn one_corrupted_file_makes_one_finding_with_its_remedy() {
     for (path, text, name, grade, words) in ROWS {
         let computer = Computer::healthy();
         computer.write(path, text);
@@ -363,7 +363,7 @@ fn control_group_without_a_budget_is_a_problem() {
 }
 
 #[test]
-fn controller_in_trouble_is_told_from_its_driver() {
+fn faulty_controller_is_reported_by_its_driver() {
     let cases: [(AskController, Grade, &[&str]); 4] = [
         (
             |_| Controller { bitrate_bit_s: Some(500_000), ..active("") },
@@ -390,7 +390,7 @@ fn controller_in_trouble_is_told_from_its_driver() {
 }
 
 #[test]
-fn interface_that_is_missing_or_on_usb_is_told() {
+fn interface_that_is_missing_or_on_usb_is_reported() {
     let computer = Computer::healthy();
     computer.remove("sys/devices/pci/net/can0/device/subsystem");
     symlink("../../../../bus/usb", computer.path("sys/devices/pci/net/can0/device/subsystem")).unwrap();
@@ -406,7 +406,7 @@ fn interface_that_is_missing_or_on_usb_is_told() {
 }
 
 #[test]
-fn runtime_directory_and_shared_memory_are_judged() {
+fn runtime_directory_and_shared_memory_are_graded() {
     let mut computer = Computer::healthy();
     fs::set_permissions(computer.path("run/taustream"), fs::Permissions::from_mode(0o755)).unwrap();
     computer.finds("runtime directory", Grade::Problem, &["0755", "chmod 0700"]);
@@ -424,7 +424,7 @@ fn runtime_directory_and_shared_memory_are_judged() {
 }
 
 #[test]
-fn computer_that_tells_nothing_is_unknown_and_no_panic() {
+fn computer_without_any_information_is_unknown_and_no_panic() {
     let mut computer = Computer::healthy();
     computer.subject.tree = Tree::new(computer.root.join("nothing"));
     computer.subject.settings = None;
@@ -473,7 +473,7 @@ fn hostile_text_anywhere_is_no_panic_and_is_shown_without_escapes() {
 }
 
 #[test]
-fn latency_is_judged_against_the_period_and_the_rights() {
+fn latency_is_graded_against_the_period_and_the_rights() {
     let latency = |max_us: u64, realtime: bool, skipped: u64| {
         let max_ns = max_us * 1_000;
         let lateness = Quantiles { count: 9, p50_ns: max_ns / 4, p99_ns: max_ns, p999_ns: max_ns, max_ns };
@@ -487,10 +487,10 @@ fn latency_is_judged_against_the_period_and_the_rights() {
         };
         Latency { wake_ups, seconds: 5.0, bounded: false }
     };
-    assert_eq!(latency(60, true, 0).judge().grade, Grade::Ok);
-    assert_eq!(latency(60, false, 0).judge().grade, Grade::Warning);
-    assert_eq!(latency(160, true, 0).judge().grade, Grade::Warning);
-    assert_eq!(latency(600, true, 0).judge().grade, Grade::Problem);
-    assert_eq!(latency(60, true, 1).judge().grade, Grade::Problem);
+    assert_eq!(latency(60, true, 0).evaluate().grade, Grade::Ok);
+    assert_eq!(latency(60, false, 0).evaluate().grade, Grade::Warning);
+    assert_eq!(latency(160, true, 0).evaluate().grade, Grade::Warning);
+    assert_eq!(latency(600, true, 0).evaluate().grade, Grade::Problem);
+    assert_eq!(latency(60, true, 1).evaluate().grade, Grade::Problem);
     assert!(latency(60, true, 0).to_string().contains("promises no bound"));
 }

@@ -93,7 +93,7 @@ pub(crate) fn run(form: Form, arm: &ArmName, command: Command, wait_s: f64) -> R
 }
 
 /// Like [`run`], without printing: the demo's way to command.
-pub(crate) fn obey(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<(), Failure> {
+pub(crate) fn execute(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<(), Failure> {
     send(client, arm, command, wait_s).map(drop)
 }
 

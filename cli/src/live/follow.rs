@@ -49,7 +49,7 @@ pub(crate) fn follow(
         client.drain_reports(|report, phase| news.push((*report, phase)))?;
         for (report, phase) in &news {
             see(report, *phase);
-            if let Some(executed) = watch.judge(report, *phase, arm)? {
+            if let Some(executed) = watch.evaluate(report, *phase, arm)? {
                 return Ok(executed);
             }
         }
@@ -81,7 +81,7 @@ impl Watch {
     }
 
     /// `Some` when the motion has ended at its end; an error when it has ended elsewhere.
-    fn judge(&mut self, r: &Report, phase: Phase, arm: &ArmName) -> Result<Option<Executed>, Failure> {
+    fn evaluate(&mut self, r: &Report, phase: Phase, arm: &ArmName) -> Result<Option<Executed>, Failure> {
         let stopped = |how: &str, why: &str| {
             let (at_s, of_s) = (r.trajectory_s, r.trajectory_duration_s);
             Failure::Failed(format!("the motion was {how} at {at_s:.3} of {of_s:.3} s: {why}"))
@@ -140,7 +140,7 @@ mod tests {
     fn walk(steps: &[(Report, Phase)]) -> Result<Option<Executed>, String> {
         let mut watch = Watch::of(7);
         for (report, phase) in steps {
-            if let Some(end) = watch.judge(report, *phase, &arm()).map_err(|e| e.to_string())? {
+            if let Some(end) = watch.evaluate(report, *phase, &arm()).map_err(|e| e.to_string())? {
                 return Ok(Some(end));
             }
         }

@@ -9,9 +9,9 @@ use std::fmt;
 use std::path::Path;
 use std::thread;
 use std::time::Duration;
-use taustream_arm::turn::possible_rad;
+use taustream_arm::revolution::possible_rad;
 use taustream_arm::{Feedback, Servo, Settings};
-use taustream_messages::{Command, Report, Standing};
+use taustream_messages::{Command, ReferenceState, Report};
 
 /// Most angles that are listed: a single turn behind a gear can mean a hundred.
 const ANGLES_MAX: usize = 12;
@@ -61,8 +61,8 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &ReferenceArgs) -> Res
     };
     let mut answers = Vec::new();
     for (joint, at_rad) in words {
-        let asked = Command::Reference { joint: u32::try_from(joint).unwrap_or(u32::MAX), at_rad };
-        let reply = client.command(asked)?;
+        let requested = Command::Reference { joint: u32::try_from(joint).unwrap_or(u32::MAX), at_rad };
+        let reply = client.command(requested)?;
         if !reply.is_accepted() {
             return Err(Failure::Refused(format!("reference refused: {}", reply.text())));
         }
@@ -130,13 +130,15 @@ impl References {
     fn of(settings: &Settings, report: &Report) -> Self {
         let line = |servo: &Servo| {
             let at = |values: &[f64]| values.get(servo.joint).copied().unwrap_or(f64::NAN);
-            let standing = Standing::from_code(report.standing.get(servo.joint).copied().unwrap_or_default());
+            let reference_state = ReferenceState::from_code(
+                report.reference_state.get(servo.joint).copied().unwrap_or_default(),
+            );
             let measured_rad = at(&report.measured_rad);
             let joint = settings.robot.joints.get(servo.joint);
             let range_rad = joint.map_or([0.0; 2], |joint| joint.limits.position_rad);
-            let reading_rad = measured_rad - at(&report.turn_offset_rad);
+            let reading_rad = measured_rad - at(&report.multi_turn_offset_rad);
             let possible = match servo.feedback {
-                Feedback::Incremental if standing.is_referenced() => vec![measured_rad],
+                Feedback::Incremental if reference_state.is_referenced() => vec![measured_rad],
                 Feedback::Incremental | Feedback::MultiTurn | Feedback::Wraps if !reading_rad.is_finite() => {
                     Vec::new()
                 }
@@ -146,8 +148,8 @@ impl References {
             };
             JointReference {
                 joint: joint.map(|joint| joint.name.clone()).unwrap_or_default(),
-                referenced: standing.is_referenced(),
-                known: standing.word(),
+                referenced: reference_state.is_referenced(),
+                known: reference_state.word(),
                 feedback: servo.feedback.word(),
                 measured_rad,
                 possible_rad: possible,

@@ -7,7 +7,7 @@ use crate::words::fault_sentence;
 use serde::Serialize;
 use std::fmt;
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusReport, Phase, Report, Standing};
+use taustream_messages::{BusReport, Phase, ReferenceState, Report};
 
 /// One joint.
 #[derive(Debug, Serialize)]
@@ -188,8 +188,8 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
             feedback_age_s: at(&r.feedback_age_s, j),
             drive_status: word(&r.drive_status, j),
             drive_error: word(&r.drive_error, j),
-            referenced: Standing::from_code(word(&r.standing, j)).is_referenced(),
-            reference: Standing::from_code(word(&r.standing, j)).word(),
+            referenced: ReferenceState::from_code(word(&r.reference_state, j)).is_referenced(),
+            reference: ReferenceState::from_code(word(&r.reference_state, j)).word(),
         })
         .collect()
 }

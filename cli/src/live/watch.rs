@@ -77,7 +77,7 @@ struct Watch {
     /// The report of the last line or picture.
     last: Option<(Report, Phase)>,
     sequence: Option<u64>,
-    heard: Instant,
+    received: Instant,
     missed: u64,
     shown: u64,
     silence_said: bool,
@@ -102,7 +102,7 @@ impl Watch {
             due: Vec::new(),
             last: None,
             sequence: None,
-            heard: Instant::now(),
+            received: Instant::now(),
             missed: 0,
             shown: 0,
             silence_said: false,
@@ -115,7 +115,7 @@ impl Watch {
         let gap = self.sequence.and_then(|last| report.sequence.checked_sub(last.saturating_add(1)));
         self.missed = self.missed.saturating_add(gap.unwrap_or(0));
         self.sequence = Some(report.sequence);
-        self.heard = Instant::now();
+        self.received = Instant::now();
         self.silence_said = false;
         let newest = self.due.last().or(self.last.as_ref()).map(|(r, _)| r.time_ns);
         let is_due = newest.is_none_or(|last_ns| {
@@ -162,7 +162,7 @@ impl Watch {
 
     /// Says that no reports come, once in a log and all the time on a terminal.
     fn show_silence(&mut self, client: &Client) -> Result<(), Failure> {
-        let silent_s = self.heard.elapsed().as_secs_f64();
+        let silent_s = self.received.elapsed().as_secs_f64();
         if silent_s < SILENCE_S_MAX {
             return Ok(());
         }

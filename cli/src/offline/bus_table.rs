@@ -28,7 +28,7 @@ pub(super) struct BusTable {
     packed: bool,
     frames: Vec<FrameLine>,
     /// Empty when the bus has room.
-    ways_out: Vec<WayLine>,
+    ways_out: Vec<RemedyLine>,
 }
 
 /// One kind of frame.
@@ -47,7 +47,7 @@ struct FrameLine {
 
 /// One way out.
 #[derive(Debug, Serialize)]
-struct WayLine {
+struct RemedyLine {
     what: String,
     load_percent: f64,
     suffices: bool,
@@ -58,11 +58,11 @@ impl BusTable {
     pub(super) fn of(settings: &Settings, index: usize, bus: &Bus) -> Option<Self> {
         let load = settings.bus_load(index)?;
         let Traffic { setpoint_every, stagger, feedback_every, packed } = bus.traffic;
-        let ways = if load.is_warned() { settings.ways_out(index) } else { Vec::new() };
-        let way = |way: taustream_arm::bus_load::WayOut| WayLine {
-            what: way.what,
-            load_percent: way.percent,
-            suffices: way.suffices,
+        let remedies = if load.is_warned() { settings.remedies(index) } else { Vec::new() };
+        let remedy = |remedy: taustream_arm::bus_load::LoadRemedy| RemedyLine {
+            what: remedy.what,
+            load_percent: remedy.percent,
+            suffices: remedy.suffices,
         };
         Some(Self {
             bus: bus.name.clone(),
@@ -78,7 +78,7 @@ impl BusTable {
             feedback_every,
             packed,
             frames: load.flows.iter().map(|flow| FrameLine::of(flow, &load)).collect(),
-            ways_out: ways.into_iter().map(way).collect(),
+            ways_out: remedies.into_iter().map(remedy).collect(),
         })
     }
 }
@@ -159,9 +159,9 @@ impl fmt::Display for BusTable {
         if !self.ways_out.is_empty() {
             write!(f, "\n  ways out, and the load of the fullest bus then (* is enough by itself):")?;
         }
-        for way in &self.ways_out {
-            let mark = if way.suffices { '*' } else { ' ' };
-            write!(f, "\n  {mark} {:>6.1} %  {}", way.load_percent, way.what)?;
+        for remedy in &self.ways_out {
+            let mark = if remedy.suffices { '*' } else { ' ' };
+            write!(f, "\n  {mark} {:>6.1} %  {}", remedy.load_percent, remedy.what)?;
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::fmt;
 use std::fs;
 use std::path::Path;
-use taustream_claims::{Lab, Report, Stop};
+use taustream_claims::{Report, RunContext, Stop};
 
 /// The report, for people and programs.
 #[derive(Serialize)]
@@ -28,11 +28,12 @@ pub(super) fn run(form: Form, args: &PapersArgs) -> Result<(), Failure> {
         fs::create_dir_all(directory).map_err(|e| Failure::writing(directory.display().to_string(), e))?;
     }
     let say = |text: &str| form.progress(text);
-    let lab = Lab::new(args.effort(), &say, &interrupt::has_come);
-    let report = taustream_claims::run(&lab, args.effort(), args.paper).map_err(|stop| match stop {
-        Stop::Interrupted => Failure::Interrupted(format!("{stop}; nothing was written")),
-        Stop::Refused(_) => Failure::Failed(stop.to_string()),
-    })?;
+    let run_context = RunContext::new(args.effort(), &say, &interrupt::has_come);
+    let report =
+        taustream_claims::run(&run_context, args.effort(), args.paper).map_err(|stop| match stop {
+            Stop::Interrupted => Failure::Interrupted(format!("{stop}; nothing was written")),
+            Stop::Refused(_) => Failure::Failed(stop.to_string()),
+        })?;
     if let Some(directory) = &args.output {
         write_all(directory, &report)?;
         form.progress(format_args!("{}: report.md, tables.json, pictures", directory.display()));

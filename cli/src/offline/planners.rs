@@ -10,7 +10,7 @@ use std::fs;
 use std::time::Duration;
 use taustream_arm::Robot;
 use taustream_claims::planners::{Contest, ProblemSet, Standings, Surroundings, compare, published};
-use taustream_claims::{Lab, Stop};
+use taustream_claims::{RunContext, Stop};
 
 /// Problems a set and deadline of a quick run.
 const QUICK: (usize, u32) = (2, 100);
@@ -39,8 +39,8 @@ pub(super) fn run(form: Form, args: &PlannersArgs) -> Result<(), Failure> {
         fs::create_dir_all(directory).map_err(|e| Failure::writing(directory.display().to_string(), e))?;
     }
     let say = |text: &str| form.progress(text);
-    let lab = Lab::new(args.effort(), &say, &interrupt::has_come);
-    let standings = compare(&lab, &contest).map_err(|stop| match stop {
+    let run_context = RunContext::new(args.effort(), &say, &interrupt::has_come);
+    let standings = compare(&run_context, &contest).map_err(|stop| match stop {
         Stop::Interrupted => Failure::Interrupted(format!("{stop}; nothing was written")),
         Stop::Refused(_) => Failure::Failed(stop.to_string()),
     })?;
@@ -80,19 +80,21 @@ fn contest(form: Form, args: &PlannersArgs) -> Result<Contest, Failure> {
         Vec::new()
     };
     form.progress("drawing problems ..");
-    let sets = kinds.iter().map(|(name, surroundings)| draw(name, &robot, surroundings, (count, args.seed)));
+    let sets = kinds
+        .iter()
+        .map(|(name, surroundings)| random_problems(name, &robot, surroundings, (count, args.seed)));
     let mut sets = sets.collect::<Result<Vec<_>, Failure>>()?;
     sets.extend(outside);
     Ok(Contest { sets, entrants, deadline: Duration::from_millis(deadline_ms.into()), remarks })
 }
 
-fn draw(
+fn random_problems(
     name: &str,
     robot: &Robot,
     surroundings: &Surroundings,
     (count, seed): (usize, u64),
 ) -> Result<ProblemSet, Failure> {
-    ProblemSet::draw(name, robot, surroundings, count, seed).map_err(|shape| {
+    ProblemSet::random(name, robot, surroundings, count, seed).map_err(|shape| {
         Failure::Failed(format!("{shape}: its mesh has no usable triangles; correct the file"))
     })
 }

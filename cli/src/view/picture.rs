@@ -88,7 +88,7 @@ impl Picture {
     fn buses(&self, r: &Report) -> impl Iterator<Item = Line> {
         let names = self.arm.names();
         r.buses().iter().enumerate().map(move |(index, bus)| {
-            let is_well = bus.trouble == 0 && bus.silent == 0;
+            let is_well = bus.bus_fault == 0 && bus.silent == 0;
             Line(vec![
                 Span::plain(format!("{}: ", names.bus(index))),
                 Span::new(names.bus_state(index, bus), if is_well { Tone::Good } else { Tone::Bad }),
@@ -144,11 +144,11 @@ fn frames(r: &Report, before: Option<&Report>) -> Line {
     };
     let rates = before.filter(|b| b.time_ns < r.time_ns).map_or_else(String::new, |b| {
         let seconds = Duration::from_nanos(r.time_ns - b.time_ns).as_secs_f64();
-        let (sent, heard) = (
+        let (sent, received) = (
             rate(r.frames_sent, b.frames_sent, seconds),
             rate(r.frames_received, b.frames_received, seconds),
         );
-        format!("   now {sent:.0} and {heard:.0} a second")
+        format!("   now {sent:.0} and {received:.0} a second")
     });
     Line(vec![
         Span::plain(format!("frames    {} sent   {} received", r.frames_sent, r.frames_received)),
@@ -202,7 +202,7 @@ pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taustream_messages::{BusTrouble, Cause, FaultReason};
+    use taustream_messages::{BusFault, Cause, FaultReason};
 
     fn arm() -> ArmName {
         ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], buses: Vec::new() }
@@ -235,9 +235,9 @@ mod tests {
     }
 
     #[test]
-    fn picture_tells_a_bus_in_trouble_from_one_that_is_well() {
+    fn picture_distinguishes_a_faulty_bus_from_a_healthy_one() {
         let mut r = report();
-        r.buses[1].trouble = BusTrouble::QueueFull.code();
+        r.buses[1].bus_fault = BusFault::QueueFull.code();
         let lines = Picture { arm: arm(), scale: None, ink: Ink::ASCII }.lines(&r, Phase::Moving, None, 200);
         let tone = |word: &str| {
             let line = lines.iter().find(|l| text(&[(*l).clone()]).starts_with(word)).unwrap();
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn picture_and_line_say_a_fault_in_words_with_the_way_out() {
+    fn picture_and_line_state_a_fault_with_its_remedy() {
         let mut fault = report();
         fault.set_cause(Some(Cause::new(FaultReason::TrackingError).at_joint(1)));
         let picture = Picture { arm: arm(), scale: None, ink: Ink::ASCII };

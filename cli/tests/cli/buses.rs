@@ -11,7 +11,7 @@ fn one_bus(scratch: &Scratch, keys: &str) -> String {
 }
 
 #[test]
-fn overloaded_bus_is_refused_with_its_table_and_the_ways_out() {
+fn overloaded_bus_is_refused_with_its_table_and_remedies() {
     let scratch = Scratch::new();
     let file = one_bus(&scratch, "bitrate_bit_s = 1000000");
     let text = scratch.run(&["check", &file]);
@@ -34,7 +34,7 @@ fn overloaded_bus_is_refused_with_its_table_and_the_ways_out() {
 }
 
 #[test]
-fn bus_with_little_room_is_warned_of_and_one_with_room_is_not() {
+fn bus_with_high_load_is_warned_of_and_one_with_low_load_is_not() {
     let scratch = Scratch::new();
     let file = one_bus(&scratch, "bitrate_bit_s = 1000000\npacked = true\nfeedback_every = 2");
     let warned = scratch.run(&["check", &file]);

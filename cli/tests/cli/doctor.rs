@@ -18,8 +18,8 @@ fn doctor_grades_this_computer_and_ends_with_1_on_a_problem() {
         d["latency"]["histogram"].as_array().unwrap().iter().filter_map(|b| b["count"].as_u64()).sum();
     assert_eq!(Some(binned), d["latency"]["lateness"]["count"].as_u64(), "every wake-up is in one bin");
     for finding in d["findings"].as_array().unwrap() {
-        let needs_cure = matches!(finding["grade"].as_str(), Some("warning" | "problem"));
-        assert_eq!(finding["cure"].is_string(), needs_cure, "{finding}");
+        let needs_remedy = matches!(finding["grade"].as_str(), Some("warning" | "problem"));
+        assert_eq!(finding["cure"].is_string(), needs_remedy, "{finding}");
     }
     if problems > 0 {
         let error: serde_json::Value = serde_json::from_str(&ran.err).unwrap();

@@ -13,17 +13,17 @@ use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
 use taustream_drivers::sim::serve::{StandardInput, serve};
 use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{FaultOrder, Rig, WiredRig, priority};
+use taustream_drivers::sim::{FaultRequest, LinkedSimulator, ServoSimulator, priority};
 use taustream_drivers::{Nanos, link};
 
 fn main() -> ExitCode {
     daemon::start_log();
     let args = Arguments::parse();
-    let rig = match prepare(&args) {
+    let simulator = match prepare(&args) {
         Ok(prepared) => prepared,
         Err(error) => return fail(&error, 2),
     };
-    match run(&args, rig) {
+    match run(&args, simulator) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error, 1),
     }
@@ -35,18 +35,18 @@ fn fail(error: &anyhow::Error, code: u8) -> ExitCode {
 }
 
 /// Everything that can be wrong with arguments and files.
-fn prepare(args: &Arguments) -> anyhow::Result<(Settings, WiredRig)> {
+fn prepare(args: &Arguments) -> anyhow::Result<(Settings, LinkedSimulator)> {
     let settings = Settings::load(&taustream_arm::find(Kind::Settings, &args.settings)?)?;
     let start_rad = args.start_rad.as_deref().map(|text| angles(text, &settings)).transpose()?;
     let setups = drives(&settings, start_rad.as_deref())?;
-    let mut rig = Rig::new(setups, settings.buses.len(), args.seed);
-    let joints = rig.joints();
+    let mut simulator = ServoSimulator::new(setups, settings.buses.len(), args.seed);
+    let joints = simulator.joints();
     for text in &args.faults {
-        let order = FaultOrder::parse(text, &joints).with_context(|| format!("--fault {text}"))?;
-        rig.order(Nanos(0), order);
+        let order = FaultRequest::parse(text, &joints).with_context(|| format!("--fault {text}"))?;
+        simulator.request(Nanos(0), order);
     }
-    let rig = WiredRig::new(rig, &settings.buses, queue_frames(&settings)?);
-    Ok((settings, rig))
+    let simulator = LinkedSimulator::new(simulator, &settings.buses, queue_frames(&settings)?);
+    Ok((settings, simulator))
 }
 
 /// Angles of all joints, inside their ranges.
@@ -73,7 +73,7 @@ fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
 }
 
 /// Opens the links and serves until told to stop.
-fn run(args: &Arguments, (settings, rig): (Settings, WiredRig)) -> anyhow::Result<()> {
+fn run(args: &Arguments, (settings, simulator): (Settings, LinkedSimulator)) -> anyhow::Result<()> {
     let runtime = runtime::directory()?;
     let mut links: Vec<Box<dyn CanLink>> = Vec::with_capacity(settings.buses.len());
     for bus in &settings.buses {
@@ -91,7 +91,7 @@ fn run(args: &Arguments, (settings, rig): (Settings, WiredRig)) -> anyhow::Resul
     writeln!(stdout, "taustream-servosim ready: {} drives on {}", settings.servos.len(), on.join(", "))?;
     stdout.flush()?;
     Manager::from_environment().progress();
-    let served = serve(links, rig, Some(&mut StandardInput::default()), &stop)?;
-    tracing::info!("heard {} frames, sent {}, lost {}", served.heard, served.sent, served.lost);
+    let served = serve(links, simulator, Some(&mut StandardInput::default()), &stop)?;
+    tracing::info!("heard {} frames, sent {}, lost {}", served.received, served.sent, served.lost);
     Ok(())
 }

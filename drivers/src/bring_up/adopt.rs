@@ -2,12 +2,12 @@
 //!
 //! A streamer that was killed leaves drives that hold. The next one may take the hold over only if every object that it
 //! would have written says what it would have written, and the drive's own target rests. Nothing is written here.
+use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::plan::{Check, NodePlan, Step};
-use crate::bring_up::trouble::Trouble;
 use crate::codec::cia402_words::DriveStep;
+use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX};
 use crate::codec::object::{self, Address};
 use crate::codec::sdo_client::{SdoJob, SdoOutcome};
-use crate::codec::words::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX};
 use crate::servo::Nanos;
 
 /// Time between the two readings of the target that must agree: a ramp under way shows itself in it.
@@ -21,9 +21,9 @@ pub(crate) enum Finding {
     /// Ours; it holds this target, in counts.
     Holds(i32),
     /// Not ours: why, and the object that says so.
-    Foreign(Trouble, u32),
+    Foreign(BringUpFault, u32),
     /// It does not answer.
-    Silent,
+    NoReply,
 }
 
 /// The reading of one energised drive.
@@ -77,14 +77,14 @@ impl Adoption {
         let object = job.address().packed();
         let value = match outcome {
             SdoOutcome::Value(value) => value,
-            SdoOutcome::TimedOut => return Finding::Silent,
+            SdoOutcome::TimedOut => return Finding::NoReply,
             SdoOutcome::Aborted(code) => return self.missing(code, object),
             SdoOutcome::Written => return Finding::More,
         };
         let Some(step) = self.steps.get(self.at) else {
             return match value.as_unsigned(4) {
                 Some(counts) => self.target(now, counts.cast_signed()),
-                None => Finding::Foreign(Trouble::WrongWidth, object),
+                None => Finding::Foreign(BringUpFault::WrongWidth, object),
             };
         };
         let fits = value.as_unsigned(step.width).is_some_and(|number| match step.check {
@@ -95,7 +95,7 @@ impl Adoption {
             }
         });
         if !fits {
-            return Finding::Foreign(Trouble::Foreign, object);
+            return Finding::Foreign(BringUpFault::Foreign, object);
         }
         self.at += 1;
         Finding::More
@@ -106,7 +106,7 @@ impl Adoption {
         match self.steps.get(self.at) {
             Some(step) if absent && step.optional => self.at += 1,
             None if absent && self.source + 1 < self.sources.len() => self.source += 1,
-            _ => return Finding::Foreign(Trouble::Foreign, object),
+            _ => return Finding::Foreign(BringUpFault::Foreign, object),
         }
         Finding::More
     }

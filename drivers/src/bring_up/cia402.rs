@@ -4,26 +4,26 @@
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's patient
 //! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
-use crate::bring_up::pace::{Cycle, Patience};
+use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
-use crate::bring_up::power::{Aim, Heard, Power};
-use crate::bring_up::trouble::Trouble;
+use crate::bring_up::power::{Power, Received, TargetSource};
+use crate::bring_up::timing::{BringUpCycle, Timeouts};
 use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
 use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING};
+use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
 use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
-use crate::codec::words::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
-use crate::servo::{DriveState, DriveWish, Nanos};
+use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// How long a boot-up may take.
 const BOOT_UP_TIMEOUT: Nanos = Nanos(5_000_000_000);
 /// Pause between two looks at a drive that is waited for.
-pub(super) const LOOK_AGAIN: Nanos = Nanos(100_000_000);
+pub(super) const OBSERVE_AGAIN: Nanos = Nanos(100_000_000);
 /// How long the bus is listened to before anything is reset: a foreign SYNC shows itself in this time.
-pub(super) const LISTEN_LEAST: Nanos = Nanos(100_000_000);
+pub(super) const OBSERVE_MIN: Nanos = Nanos(100_000_000);
 /// How long "voltage off" is sent to a lost drive before its setpoints end.
-const FAREWELL: Nanos = Nanos(100_000_000);
+const SHUTDOWN_FRAMES: Nanos = Nanos(100_000_000);
 /// How long a node may take from NMT start to its first TPDO.
 const START_TIMEOUT: Nanos = Nanos(500_000_000);
 const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
@@ -34,9 +34,9 @@ const DENIALS_MAX: u8 = 2;
 
 /// Where the bring-up stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
+pub(super) enum NodeStage {
     /// Reading the statusword, changing nothing.
-    Listen { since: Nanos, next: Nanos, trouble: Option<Trouble> },
+    Observe { since: Nanos, next: Nanos, fault: Option<BringUpFault> },
     /// Found energised; reading whether it is ours.
     Verify,
     /// Found energised and ours: it holds, and waits for the wish to keep it.
@@ -44,7 +44,7 @@ pub(super) enum Stage {
     /// To be kept: NMT start sent, which leaves the power stage alone; waiting for the first TPDO.
     Rejoin { since: Nanos, tries: u8 },
     /// Found energised and not ours, and why; watched, left alone.
-    Unowned { next: Nanos, trouble: Trouble, object: u32 },
+    Unowned { next: Nanos, fault: BringUpFault, object: u32 },
     /// Waiting for boot-up.
     Reset { since: Nanos },
     /// At this step of the plan.
@@ -52,9 +52,9 @@ pub(super) enum Stage {
     /// NMT start sent; waiting for the first TPDO.
     Start { since: Nanos, tries: u8 },
     /// Process data flows.
-    Operational { farewell: Option<Nanos> },
+    Operational { shutdown_since: Option<Nanos> },
     /// Lost its configuration while in use; waits for the wish to be disabled.
-    Gone(Trouble),
+    Gone(BringUpFault),
     /// A step was refused.
     Refused { code: u32, object: u32 },
 }
@@ -70,7 +70,7 @@ pub struct Service {
 
 /// What a node is told in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Setpoint {
+pub struct DriveSetpoint {
     /// Controlword.
     pub control: u16,
     /// Target in counts.
@@ -91,56 +91,59 @@ pub struct Target {
 pub struct Node {
     pub(super) plan: NodePlan,
     steps: Vec<Step>,
-    patience: Patience,
-    pub(super) stage: Stage,
+    timeouts: Timeouts,
+    pub(super) stage: NodeStage,
     pub(super) sdo: SdoClient,
     pub(super) adoption: Adoption,
     pub(super) held: Option<i32>,
     pub(super) nmt: Option<NmtCommand>,
     power: Power,
-    wished: DriveWish,
-    pub(super) heard: bool,
+    last_target: DriveTarget,
+    pub(super) received: bool,
     pub(super) status: u16,
     position: Option<i32>,
-    told: Option<i32>,
+    commanded: Option<i32>,
     tpdo_at: Nanos,
     heartbeat_at: Nanos,
     denials: u8,
     emcy: u16,
-    asked_error: bool,
+    requested_error: bool,
 }
 
 impl Node {
     /// A node of which nothing is known.
     #[must_use]
-    pub fn new(plan: NodePlan, patience: Patience) -> Self {
+    pub fn new(plan: NodePlan, timeouts: Timeouts) -> Self {
         Self {
             plan,
             steps: plan.steps(),
-            patience,
-            stage: Stage::Listen { since: Nanos(0), next: Nanos(0), trouble: None },
+            timeouts,
+            stage: NodeStage::Observe { since: Nanos(0), next: Nanos(0), fault: None },
             sdo: SdoClient::default(),
             adoption: Adoption::new(&plan),
             held: None,
             nmt: None,
-            power: Power::new(patience.step, plan.feedback_every),
-            wished: DriveWish::Disabled,
-            heard: false,
+            power: Power::new(timeouts.step, plan.feedback_every),
+            last_target: DriveTarget::Disabled,
+            received: false,
             status: 0,
             position: None,
-            told: None,
+            commanded: None,
             tpdo_at: Nanos(0),
             heartbeat_at: Nanos(0),
             denials: 0,
             emcy: 0,
-            asked_error: false,
+            requested_error: false,
         }
     }
 
     /// True when the node needs SYNC to come up or to work.
     #[must_use]
     pub const fn needs_sync(&self) -> bool {
-        matches!(self.stage, Stage::Start { .. } | Stage::Rejoin { .. } | Stage::Operational { .. })
+        matches!(
+            self.stage,
+            NodeStage::Start { .. } | NodeStage::Rejoin { .. } | NodeStage::Operational { .. }
+        )
     }
 
     /// What an adopted drive holds, in counts.
@@ -171,17 +174,17 @@ impl Node {
     #[must_use]
     pub fn state(&self) -> DriveState {
         match self.stage {
-            Stage::Listen { .. } if !self.heard => DriveState::Absent,
-            Stage::Listen { .. }
-            | Stage::Verify
-            | Stage::Reset { .. }
-            | Stage::Configure { .. }
-            | Stage::Start { .. } => DriveState::Configuring,
-            Stage::Held { .. } | Stage::Rejoin { .. } => DriveState::Adopted,
-            Stage::Unowned { .. } => DriveState::EnergisedUnowned,
-            Stage::Operational { .. } => self.power.state(self.status),
-            Stage::Gone(_) => DriveState::Fault,
-            Stage::Refused { .. } => DriveState::Refused,
+            NodeStage::Observe { .. } if !self.received => DriveState::Absent,
+            NodeStage::Observe { .. }
+            | NodeStage::Verify
+            | NodeStage::Reset { .. }
+            | NodeStage::Configure { .. }
+            | NodeStage::Start { .. } => DriveState::Configuring,
+            NodeStage::Held { .. } | NodeStage::Rejoin { .. } => DriveState::Adopted,
+            NodeStage::Unowned { .. } => DriveState::EnergisedUnowned,
+            NodeStage::Operational { .. } => self.power.state(self.status),
+            NodeStage::Gone(_) => DriveState::Fault,
+            NodeStage::Refused { .. } => DriveState::Refused,
         }
     }
 
@@ -189,89 +192,96 @@ impl Node {
     #[must_use]
     pub fn error(&self) -> (u32, u32) {
         let emcy = u32::from(self.emcy);
-        let of = |trouble: Option<Trouble>| trouble.map_or(0, Trouble::code);
+        let of = |fault: Option<BringUpFault>| fault.map_or(0, BringUpFault::code);
         match self.stage {
-            Stage::Listen { trouble, .. } => (of(trouble), 0),
-            Stage::Refused { code, object } => (code, object),
-            Stage::Gone(trouble) => (trouble.code(), 0),
-            Stage::Operational { .. } => {
-                let trouble = of(self.power.trouble());
-                let drive_first = emcy != 0 && (self.in_fault() || trouble == 0);
-                (if drive_first { emcy } else { trouble }, 0)
+            NodeStage::Observe { fault, .. } => (of(fault), 0),
+            NodeStage::Refused { code, object } => (code, object),
+            NodeStage::Gone(fault) => (fault.code(), 0),
+            NodeStage::Operational { .. } => {
+                let fault = of(self.power.fault());
+                let drive_first = emcy != 0 && (self.in_fault() || fault == 0);
+                (if drive_first { emcy } else { fault }, 0)
             }
-            Stage::Unowned { trouble, object, .. } => (trouble.code(), object),
-            Stage::Verify
-            | Stage::Held { .. }
-            | Stage::Rejoin { .. }
-            | Stage::Reset { .. }
-            | Stage::Configure { .. }
-            | Stage::Start { .. } => (emcy, 0),
+            NodeStage::Unowned { fault, object, .. } => (fault.code(), object),
+            NodeStage::Verify
+            | NodeStage::Held { .. }
+            | NodeStage::Rejoin { .. }
+            | NodeStage::Reset { .. }
+            | NodeStage::Configure { .. }
+            | NodeStage::Start { .. } => (emcy, 0),
         }
     }
 
     /// The newest target in counts, from the start of process data until the node is looked at anew. Nobody else may
     /// guess one: a drive that still listens would go there.
     #[must_use]
-    pub const fn told(&self) -> Option<i32> {
-        self.told
+    pub const fn commanded(&self) -> Option<i32> {
+        self.commanded
     }
 
     /// What the node is to be told in this cycle, while process data flows.
     ///
     /// Real time: arithmetic only.
-    pub fn setpoint(&mut self, cycle: Cycle, target: Target) -> Option<Setpoint> {
+    pub fn setpoint(&mut self, cycle: BringUpCycle, target: Target) -> Option<DriveSetpoint> {
         if !self.needs_sync() {
-            self.power.watch(cycle.wish);
+            self.power.watch(cycle.drive_target);
             return None;
         }
-        let heard = Heard {
+        let received = Received {
             status: self.status,
-            fresh: self.age(cycle.now, self.tpdo_at) <= self.patience.feedback.0,
+            fresh: self.age(cycle.now, self.tpdo_at) <= self.timeouts.feedback.0,
             command_near: target.near,
         };
         let control = match self.stage {
-            Stage::Operational { .. } => self.power.control(cycle.now, cycle.wish, heard),
-            Stage::Rejoin { .. } if cycle.wish != DriveWish::TorqueOff => Power::keeping(self.status),
-            Stage::Listen { .. }
-            | Stage::Verify
-            | Stage::Held { .. }
-            | Stage::Rejoin { .. }
-            | Stage::Unowned { .. }
-            | Stage::Reset { .. }
-            | Stage::Configure { .. }
-            | Stage::Start { .. }
-            | Stage::Gone(_)
-            | Stage::Refused { .. } => {
-                self.power.watch(cycle.wish);
+            NodeStage::Operational { .. } => self.power.control(cycle.now, cycle.drive_target, received),
+            NodeStage::Rejoin { .. } if cycle.drive_target != DriveTarget::TorqueOff => {
+                Power::keeping(self.status)
+            }
+            NodeStage::Observe { .. }
+            | NodeStage::Verify
+            | NodeStage::Held { .. }
+            | NodeStage::Rejoin { .. }
+            | NodeStage::Unowned { .. }
+            | NodeStage::Reset { .. }
+            | NodeStage::Configure { .. }
+            | NodeStage::Start { .. }
+            | NodeStage::Gone(_)
+            | NodeStage::Refused { .. } => {
+                self.power.watch(cycle.drive_target);
                 CONTROL_OFF
             }
         };
-        let aim = if matches!(self.stage, Stage::Rejoin { .. }) { Aim::Held } else { self.power.aim() };
-        // A command that is no number must never become one: the last good target stays.
-        let wanted = match aim {
-            Aim::Measured => self.position,
-            Aim::Held => self.held,
-            Aim::Command => target.counts,
+        let target_source = if matches!(self.stage, NodeStage::Rejoin { .. }) {
+            TargetSource::Held
+        } else {
+            self.power.target_source()
         };
-        self.told = wanted.or(self.told);
-        if aim == Aim::Command {
+        // A command that is no number must never become one: the last good target stays.
+        let wanted = match target_source {
+            TargetSource::Measured => self.position,
+            TargetSource::Held => self.held,
+            TargetSource::Command => target.counts,
+        };
+        self.commanded = wanted.or(self.commanded);
+        if target_source == TargetSource::Command {
             // What is kept, should the wish become to keep.
-            self.held = self.told;
+            self.held = self.commanded;
         }
-        self.told.map(|target_counts| Setpoint { control, target_counts })
+        self.commanded.map(|target_counts| DriveSetpoint { control, target_counts })
     }
 
     /// This cycle's network command and SDO request: at most one of each.
     ///
     /// Real time: no allocation, bounded work.
-    pub fn service(&mut self, cycle: Cycle) -> Service {
-        let torque_off = cycle.wish == DriveWish::TorqueOff && self.wished != DriveWish::TorqueOff;
-        self.wished = cycle.wish;
+    pub fn service(&mut self, cycle: BringUpCycle) -> Service {
+        let torque_off =
+            cycle.drive_target == DriveTarget::TorqueOff && self.last_target != DriveTarget::TorqueOff;
+        self.last_target = cycle.drive_target;
         if torque_off && !self.needs_sync() {
             // Without process data the emergency goes by SDO, before whatever was being asked; then the drive is looked
             // at again from the start.
-            if matches!(self.stage, Stage::Verify | Stage::Held { .. }) {
-                self.listen(cycle.now, None);
+            if matches!(self.stage, NodeStage::Verify | NodeStage::Held { .. }) {
+                self.observe(cycle.now, None);
             }
             self.torque_off_by_sdo();
         }
@@ -287,31 +297,31 @@ impl Node {
     ///
     /// Real time: arithmetic only. True when it was taken: before the mapping is ours its meaning is not known.
     pub fn take_tpdo(&mut self, now: Nanos, status: u16, position: i32) -> bool {
-        self.heard = true;
+        self.received = true;
         match self.stage {
-            Stage::Start { .. } => {
-                self.stage = Stage::Operational { farewell: None };
+            NodeStage::Start { .. } => {
+                self.stage = NodeStage::Operational { shutdown_since: None };
                 self.heartbeat_at = now;
                 self.denials = 0;
             }
-            Stage::Rejoin { .. } => {
-                self.stage = Stage::Operational { farewell: None };
+            NodeStage::Rejoin { .. } => {
+                self.stage = NodeStage::Operational { shutdown_since: None };
                 self.heartbeat_at = now;
                 self.denials = 0;
                 self.power.adopt();
             }
-            Stage::Operational { .. } => {}
-            Stage::Listen { .. }
-            | Stage::Verify
-            | Stage::Held { .. }
-            | Stage::Unowned { .. }
-            | Stage::Reset { .. }
-            | Stage::Configure { .. }
-            | Stage::Gone(_)
-            | Stage::Refused { .. } => return false,
+            NodeStage::Operational { .. } => {}
+            NodeStage::Observe { .. }
+            | NodeStage::Verify
+            | NodeStage::Held { .. }
+            | NodeStage::Unowned { .. }
+            | NodeStage::Reset { .. }
+            | NodeStage::Configure { .. }
+            | NodeStage::Gone(_)
+            | NodeStage::Refused { .. } => return false,
         }
         if self.in_fault() && DriveStep::from_status(status) != Some(DriveStep::Fault) {
-            (self.emcy, self.asked_error) = (0, false);
+            (self.emcy, self.requested_error) = (0, false);
         }
         (self.status, self.position, self.tpdo_at) = (status, Some(position), now);
         true
@@ -321,7 +331,7 @@ impl Node {
     ///
     /// Real time: no allocation.
     pub fn take_sdo(&mut self, response: SdoResponse) {
-        self.heard = true;
+        self.received = true;
         self.sdo.accept(response);
     }
 
@@ -329,7 +339,7 @@ impl Node {
     ///
     /// Real time: arithmetic only.
     pub fn take_emcy(&mut self, emcy: Emcy) {
-        self.heard = true;
+        self.received = true;
         self.emcy = emcy.code;
     }
 
@@ -337,19 +347,21 @@ impl Node {
     ///
     /// Real time: arithmetic only.
     pub fn take_heartbeat(&mut self, now: Nanos, state: NmtState) {
-        self.heard = true;
+        self.received = true;
         self.heartbeat_at = now;
         self.denials = if state == NmtState::Operational { 0 } else { self.denials.saturating_add(1) };
         match (state, self.stage) {
-            (NmtState::BootUp, Stage::Reset { .. }) => self.stage = Stage::Configure { step: 0, since: now },
-            (NmtState::BootUp, Stage::Operational { .. }) => self.leave(now, Trouble::Restarted),
-            (NmtState::BootUp, Stage::Gone(_)) => {}
+            (NmtState::BootUp, NodeStage::Reset { .. }) => {
+                self.stage = NodeStage::Configure { step: 0, since: now }
+            }
+            (NmtState::BootUp, NodeStage::Operational { .. }) => self.leave(now, BringUpFault::Restarted),
+            (NmtState::BootUp, NodeStage::Gone(_)) => {}
             // It has just started: whatever was asked before is lost, and it can be asked at once.
-            (NmtState::BootUp, _) => self.listen(now, None),
+            (NmtState::BootUp, _) => self.observe(now, None),
             // SDO does not work in NMT stopped; pre-operational does not touch the power stage.
-            (NmtState::Stopped, Stage::Listen { .. }) => self.nmt = Some(NmtCommand::PreOperational),
-            (_, Stage::Operational { .. }) if self.denials >= DENIALS_MAX => {
-                self.leave(now, Trouble::LeftOperational);
+            (NmtState::Stopped, NodeStage::Observe { .. }) => self.nmt = Some(NmtCommand::PreOperational),
+            (_, NodeStage::Operational { .. }) if self.denials >= DENIALS_MAX => {
+                self.leave(now, BringUpFault::LeftOperational);
             }
             _ => {}
         }
@@ -363,9 +375,9 @@ impl Node {
         if !self.in_fault() {
             self.emcy = 0;
         }
-        self.asked_error = false;
-        if matches!(self.stage, Stage::Refused { .. }) {
-            self.listen(now, None);
+        self.requested_error = false;
+        if matches!(self.stage, NodeStage::Refused { .. }) {
+            self.observe(now, None);
         }
     }
 
@@ -373,8 +385,8 @@ impl Node {
     ///
     /// Real time: no allocation.
     pub fn start_over(&mut self, now: Nanos) {
-        self.listen(now, None);
-        (self.heard, self.status, self.position) = (false, 0, None);
+        self.observe(now, None);
+        (self.received, self.status, self.position) = (false, 0, None);
         (self.nmt, self.denials) = (None, 0);
     }
 
@@ -387,21 +399,21 @@ impl Node {
     }
 
     /// Back to the start, where nothing is changed before the drive has been looked at.
-    pub(super) fn listen(&mut self, now: Nanos, trouble: Option<Trouble>) {
+    pub(super) fn observe(&mut self, now: Nanos, fault: Option<BringUpFault>) {
         self.sdo.cancel();
-        self.power = Power::new(self.patience.step, self.plan.feedback_every);
-        self.told = None;
-        self.power.watch(self.wished);
-        (self.emcy, self.asked_error) = (0, false);
-        self.stage = Stage::Listen { since: now, next: now, trouble };
+        self.power = Power::new(self.timeouts.step, self.plan.feedback_every);
+        self.commanded = None;
+        self.power.watch(self.last_target);
+        (self.emcy, self.requested_error) = (0, false);
+        self.stage = NodeStage::Observe { since: now, next: now, fault };
     }
 
-    fn leave(&mut self, now: Nanos, trouble: Trouble) {
-        if self.wished == DriveWish::Disabled {
-            self.listen(now, Some(trouble));
+    fn leave(&mut self, now: Nanos, fault: BringUpFault) {
+        if self.last_target == DriveTarget::Disabled {
+            self.observe(now, Some(fault));
         } else {
             self.sdo.cancel();
-            self.stage = Stage::Gone(trouble);
+            self.stage = NodeStage::Gone(fault);
         }
     }
 
@@ -410,44 +422,44 @@ impl Node {
     }
 
     pub(super) fn refuse(&mut self, code: u32, job: SdoJob) {
-        self.stage = Stage::Refused { code, object: job.address().packed() };
+        self.stage = NodeStage::Refused { code, object: job.address().packed() };
     }
 
     /// What the stage does by itself, when no answer is awaited.
-    fn advance(&mut self, cycle: Cycle) {
+    fn advance(&mut self, cycle: BringUpCycle) {
         let now = cycle.now;
         match self.stage {
-            Stage::Held { .. } if cycle.wish == DriveWish::Keep && !cycle.other_master => {
+            NodeStage::Held { .. } if cycle.drive_target == DriveTarget::Keep && !cycle.other_master => {
                 self.sdo.cancel();
                 self.rejoin(now, 1);
             }
-            Stage::Listen { next, .. } | Stage::Unowned { next, .. } | Stage::Held { next } => {
+            NodeStage::Observe { next, .. } | NodeStage::Unowned { next, .. } | NodeStage::Held { next } => {
                 if self.sdo.is_idle() && now >= next {
                     self.sdo.begin(SdoJob::Read(object::STATUSWORD));
                 }
             }
-            Stage::Verify => {
+            NodeStage::Verify => {
                 if self.sdo.is_idle()
                     && let Some(job) = self.adoption.job(now)
                 {
                     self.sdo.begin(job);
                 }
             }
-            Stage::Rejoin { since, tries } => {
+            NodeStage::Rejoin { since, tries } => {
                 if self.age(now, since) >= START_TIMEOUT.0 {
                     if tries < START_TRIES {
                         self.rejoin(now, tries + 1);
                     } else {
-                        self.unowned(now, Trouble::NotOperational, 0);
+                        self.unowned(now, BringUpFault::NotOperational, 0);
                     }
                 }
             }
-            Stage::Reset { since } => {
+            NodeStage::Reset { since } => {
                 if self.age(now, since) >= BOOT_UP_TIMEOUT.0 {
-                    self.listen(now, Some(Trouble::NoBootUp));
+                    self.observe(now, Some(BringUpFault::NoBootUp));
                 }
             }
-            Stage::Configure { step, .. } => {
+            NodeStage::Configure { step, .. } => {
                 if self.sdo.is_idle() {
                     match self.steps.get(step) {
                         Some(step) => self.sdo.begin(step.job),
@@ -455,60 +467,63 @@ impl Node {
                     }
                 }
             }
-            Stage::Start { since, tries } => {
+            NodeStage::Start { since, tries } => {
                 if self.age(now, since) >= START_TIMEOUT.0 {
                     if tries < START_TRIES {
                         self.start(now, tries + 1);
                     } else {
-                        self.stage = Stage::Refused { code: Trouble::NotOperational.code(), object: 0 };
+                        self.stage =
+                            NodeStage::Refused { code: BringUpFault::NotOperational.code(), object: 0 };
                     }
                 }
             }
-            Stage::Operational { farewell } => self.supervise(cycle, farewell),
-            Stage::Gone(trouble) => {
-                if cycle.wish == DriveWish::Disabled {
-                    self.listen(now, Some(trouble));
+            NodeStage::Operational { shutdown_since } => self.supervise(cycle, shutdown_since),
+            NodeStage::Gone(fault) => {
+                if cycle.drive_target == DriveTarget::Disabled {
+                    self.observe(now, Some(fault));
                 }
             }
-            Stage::Refused { .. } => {}
+            NodeStage::Refused { .. } => {}
         }
     }
 
     fn start(&mut self, now: Nanos, tries: u8) {
         self.nmt = Some(NmtCommand::Start);
-        self.stage = Stage::Start { since: now, tries };
+        self.stage = NodeStage::Start { since: now, tries };
     }
 
-    fn supervise(&mut self, cycle: Cycle, farewell: Option<Nanos>) {
+    fn supervise(&mut self, cycle: BringUpCycle, shutdown_since: Option<Nanos>) {
         let now = cycle.now;
         if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
             // A silent drive may still listen: it keeps its setpoints until the wish is disabled.
-            self.power.note(Trouble::HeartbeatLost);
-            if cycle.wish == DriveWish::Disabled && self.power.aim() == Aim::Measured {
-                let since = farewell.unwrap_or(now);
-                self.stage = Stage::Operational { farewell: Some(since) };
-                if self.age(now, since) >= FAREWELL.0 {
-                    self.heard = false;
-                    self.listen(now, Some(Trouble::HeartbeatLost));
+            self.power.note(BringUpFault::HeartbeatLost);
+            if cycle.drive_target == DriveTarget::Disabled
+                && self.power.target_source() == TargetSource::Measured
+            {
+                let since = shutdown_since.unwrap_or(now);
+                self.stage = NodeStage::Operational { shutdown_since: Some(since) };
+                if self.age(now, since) >= SHUTDOWN_FRAMES.0 {
+                    self.received = false;
+                    self.observe(now, Some(BringUpFault::HeartbeatLost));
                 }
             }
         } else {
-            self.ask_error();
+            self.request_error();
         }
     }
 
     /// Asks a drive in fault for its error code, once: its emergency message was lost, or came before we listened.
-    pub(super) fn ask_error(&mut self) -> bool {
-        let due = self.in_fault() && self.emcy == 0 && !self.asked_error && self.sdo.is_idle();
+    pub(super) fn request_error(&mut self) -> bool {
+        let due = self.in_fault() && self.emcy == 0 && !self.requested_error && self.sdo.is_idle();
         if due {
-            self.asked_error = true;
+            self.requested_error = true;
             self.sdo.begin(SdoJob::Read(object::ERROR_CODE));
         }
         due
     }
 
     /// What an answer means for the stage.
-    fn settle(&mut self, cycle: Cycle, job: SdoJob, outcome: SdoOutcome) {
+    fn settle(&mut self, cycle: BringUpCycle, job: SdoJob, outcome: SdoOutcome) {
         if job.address() == object::CONTROLWORD {
             // The emergency's own write: the stage asks on, and sees what came of it.
             return;
@@ -523,17 +538,17 @@ impl Node {
             return;
         }
         match self.stage {
-            Stage::Listen { .. } | Stage::Unowned { .. } | Stage::Held { .. } => {
-                self.settle_look(cycle, job, outcome);
+            NodeStage::Observe { .. } | NodeStage::Unowned { .. } | NodeStage::Held { .. } => {
+                self.settle_observation(cycle, job, outcome);
             }
-            Stage::Verify => self.settle_verify(cycle.now, job, outcome),
-            Stage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
-            Stage::Reset { .. }
-            | Stage::Start { .. }
-            | Stage::Rejoin { .. }
-            | Stage::Operational { .. }
-            | Stage::Gone(_)
-            | Stage::Refused { .. } => {}
+            NodeStage::Verify => self.settle_verify(cycle.now, job, outcome),
+            NodeStage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
+            NodeStage::Reset { .. }
+            | NodeStage::Start { .. }
+            | NodeStage::Rejoin { .. }
+            | NodeStage::Operational { .. }
+            | NodeStage::Gone(_)
+            | NodeStage::Refused { .. } => {}
         }
     }
 
@@ -547,38 +562,44 @@ impl Node {
             }
             SdoOutcome::Aborted(code) => self.refuse(code, step.job),
             SdoOutcome::TimedOut => self.refuse(ABORT_TIMEOUT, step.job),
-            SdoOutcome::Value(value) => match self.judge(now, step, since, value) {
+            SdoOutcome::Value(value) => match self.check_value(now, step, since, value) {
                 Ok(true) => self.next_step(now, index),
                 Ok(false) => {}
-                Err(trouble) => self.refuse(trouble.code(), step.job),
+                Err(fault) => self.refuse(fault.code(), step.job),
             },
         }
     }
 
     fn next_step(&mut self, now: Nanos, index: usize) {
-        self.stage = Stage::Configure { step: index + 1, since: now };
+        self.stage = NodeStage::Configure { step: index + 1, since: now };
     }
 
     /// Whether the value lets the plan go on; false asks again, or the stage has changed.
-    fn judge(&mut self, now: Nanos, step: Step, since: Nanos, value: SdoValue) -> Result<bool, Trouble> {
-        let Some(number) = value.as_unsigned(step.width) else { return Err(Trouble::WrongWidth) };
+    fn check_value(
+        &mut self,
+        now: Nanos,
+        step: Step,
+        since: Nanos,
+        value: SdoValue,
+    ) -> Result<bool, BringUpFault> {
+        let Some(number) = value.as_unsigned(step.width) else { return Err(BringUpFault::WrongWidth) };
         match step.check {
             Check::Present => Ok(true),
             Check::Profile402 if number & 0xFFFF == u32::from(object::PROFILE_402) => Ok(true),
-            Check::Profile402 => Err(Trouble::NotCia402),
+            Check::Profile402 => Err(BringUpFault::NotCia402),
             Check::OffersCsp if number & object::SUPPORTS_CSP != 0 => Ok(true),
-            Check::OffersCsp => Err(Trouble::NoCsp),
+            Check::OffersCsp => Err(BringUpFault::NoCsp),
             Check::NotEnergised => {
                 self.status = (number & 0xFFFF) as u16;
                 if self.status & STATUS_ENERGISED == 0 {
                     return Ok(true);
                 }
-                self.stage = Stage::Unowned { next: now, trouble: Trouble::Foreign, object: 0 };
+                self.stage = NodeStage::Unowned { next: now, fault: BringUpFault::Foreign, object: 0 };
                 Ok(false)
             }
             Check::BecomesCsp if number == u32::from(object::MODE_CSP.cast_unsigned()) => Ok(true),
-            Check::BecomesCsp if self.age(now, since) < self.patience.step.0 => Ok(false),
-            Check::BecomesCsp => Err(Trouble::ModeNotTaken),
+            Check::BecomesCsp if self.age(now, since) < self.timeouts.step.0 => Ok(false),
+            Check::BecomesCsp => Err(BringUpFault::ModeNotTaken),
             Check::Position => {
                 self.position = Some(number.cast_signed());
                 Ok(true)
@@ -587,7 +608,7 @@ impl Node {
                 if number & mask == value & mask {
                     Ok(true)
                 } else {
-                    Err(Trouble::Foreign)
+                    Err(BringUpFault::Foreign)
                 }
             }
         }

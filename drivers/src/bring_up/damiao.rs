@@ -5,33 +5,33 @@
 //! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
 //! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
 //! All times are on the driver's patient clock, which stands still while the master itself is stalled.
-use crate::bring_up::damiao_plan::{CONFIGURE, Job, Judged, MotorPlan, VERIFY};
-use crate::bring_up::damiao_trouble::{DamiaoTrouble, differs, register_object, status_code};
-use crate::bring_up::pace::{Cycle, Patience};
-use crate::bring_up::trouble::Trouble;
+use crate::bring_up::damiao_fault::{DamiaoFault, differs, register_object, status_code};
+use crate::bring_up::damiao_plan::{CONFIGURE, CheckResult, Job, MotorPlan, VERIFY};
+use crate::bring_up::fault::BringUpFault;
+use crate::bring_up::timing::{BringUpCycle, Timeouts};
 use crate::codec::damiao_frames::{Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, Special};
 use crate::codec::mit::{MitCommand, MitState};
-use crate::servo::{DriveState, DriveWish, Nanos};
+use crate::servo::{DriveState, DriveTarget, Nanos};
 use taustream_arm::DamiaoMode;
 
 /// Pause between two looks at a motor that is waited for.
-const LOOK_AGAIN: Nanos = Nanos(100_000_000);
+const OBSERVE_AGAIN: Nanos = Nanos(100_000_000);
 /// How long the bus is listened to before anything is written: a foreign master shows itself in this time.
-const LISTEN_LEAST: Nanos = Nanos(100_000_000);
+const OBSERVE_MIN: Nanos = Nanos(100_000_000);
 /// An answer that has not come by then was lost; it is asked for again.
-const ASK_AGAIN: Nanos = Nanos(20_000_000);
+const REQUEST_AGAIN: Nanos = Nanos(20_000_000);
 /// A special command is repeated after this, until the motor's status shows it.
 const REPEAT: Nanos = Nanos(20_000_000);
 /// What a change of mode takes (vendor's library).
 const SETTLE: Nanos = Nanos(100_000_000);
 /// Without feedback for so long, at one request a cycle, the motor is gone.
-const SILENT: Nanos = Nanos(350_000_000);
+const NO_REPLY: Nanos = Nanos(350_000_000);
 
 /// Where the bring-up stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum MotorStage {
     /// Asking for feedback, changing nothing.
-    Listen { since: Nanos },
+    Observe { since: Nanos },
     /// Found energised; watched, left alone.
     Unowned,
     /// At this job of [`CONFIGURE`].
@@ -76,19 +76,19 @@ pub struct MotorTarget {
 #[derive(Clone, Debug)]
 pub struct Motor {
     plan: MotorPlan,
-    patience: Patience,
+    timeouts: Timeouts,
     near_rad: f64,
-    stage: Stage,
-    wished: DriveWish,
-    trouble: Option<DamiaoTrouble>,
+    stage: MotorStage,
+    last_target: DriveTarget,
+    fault: Option<DamiaoFault>,
     /// What was asked last and not answered yet.
-    asked: Option<Request>,
-    asked_at: Nanos,
+    requested: Option<Request>,
+    requested_at: Nanos,
     /// The newest register that was answered.
     answer: Option<(u8, bool, [u8; 4])>,
     /// A feedback has come since this was looked at.
     looked: bool,
-    heard: bool,
+    received: bool,
     feedback: Feedback,
     measured: MitState,
     measured_at: Nanos,
@@ -101,19 +101,19 @@ pub struct Motor {
 impl Motor {
     /// A motor of which nothing is known. Energised only when its command is within `near_rad` of where it stands.
     #[must_use]
-    pub const fn new(plan: MotorPlan, patience: Patience, near_rad: f64) -> Self {
+    pub const fn new(plan: MotorPlan, timeouts: Timeouts, near_rad: f64) -> Self {
         Self {
             plan,
-            patience,
+            timeouts,
             near_rad,
-            stage: Stage::Listen { since: Nanos(0) },
-            wished: DriveWish::TorqueOff,
-            trouble: None,
-            asked: None,
-            asked_at: Nanos(0),
+            stage: MotorStage::Observe { since: Nanos(0) },
+            last_target: DriveTarget::TorqueOff,
+            fault: None,
+            requested: None,
+            requested_at: Nanos(0),
             answer: None,
             looked: false,
-            heard: false,
+            received: false,
             feedback: NO_FEEDBACK,
             measured: NOT_MEASURED,
             measured_at: Nanos(0),
@@ -139,32 +139,33 @@ impl Motor {
     /// Where the motor is.
     #[must_use]
     pub fn state(&self) -> DriveState {
-        let troubled = self.trouble.is_some();
+        let faulty = self.fault.is_some();
         match self.stage {
-            Stage::Listen { .. } if !self.heard => DriveState::Absent,
-            Stage::Listen { .. } | Stage::Configure { .. } => DriveState::Configuring,
-            Stage::Unowned => DriveState::EnergisedUnowned,
-            Stage::Refused { .. } => DriveState::Refused,
-            Stage::Gone => DriveState::Fault,
-            _ if troubled || self.in_error() => DriveState::Fault,
-            Stage::Ready => DriveState::Disabled,
-            Stage::Verify { .. } | Stage::Arm { .. } | Stage::Enable { .. } | Stage::Ramp { .. } => {
-                DriveState::Enabling
-            }
-            Stage::On => DriveState::Enabled,
-            Stage::Disable { .. } => DriveState::Disabling,
+            MotorStage::Observe { .. } if !self.received => DriveState::Absent,
+            MotorStage::Observe { .. } | MotorStage::Configure { .. } => DriveState::Configuring,
+            MotorStage::Unowned => DriveState::EnergisedUnowned,
+            MotorStage::Refused { .. } => DriveState::Refused,
+            MotorStage::Gone => DriveState::Fault,
+            _ if faulty || self.in_error() => DriveState::Fault,
+            MotorStage::Ready => DriveState::Disabled,
+            MotorStage::Verify { .. }
+            | MotorStage::Arm { .. }
+            | MotorStage::Enable { .. }
+            | MotorStage::Ramp { .. } => DriveState::Enabling,
+            MotorStage::On => DriveState::Enabled,
+            MotorStage::Disable { .. } => DriveState::Disabling,
         }
     }
 
     /// The code to report, and the register that it concerns.
     #[must_use]
     pub fn error(&self) -> (u32, u32) {
-        match (self.stage, self.trouble) {
-            (Stage::Refused { code, object }, _) => (code, object),
+        match (self.stage, self.fault) {
+            (MotorStage::Refused { code, object }, _) => (code, object),
             // Its target and gains came in frames: no register tells what it holds, so no hold can be adopted.
-            (Stage::Unowned, _) => (Trouble::Foreign.code(), 0),
-            _ if self.heard && self.in_error() => (status_code(self.feedback.status), 0),
-            (_, Some(trouble)) => (trouble.code(), 0),
+            (MotorStage::Unowned, _) => (BringUpFault::Foreign.code(), 0),
+            _ if self.received && self.in_error() => (status_code(self.feedback.status), 0),
+            (_, Some(fault)) => (fault.code(), 0),
             (_, None) => (0, 0),
         }
     }
@@ -173,29 +174,32 @@ impl Motor {
     ///
     /// Real time: arithmetic only.
     pub fn take(&mut self, now: Nanos, reply: Reply) -> bool {
-        self.heard = true;
+        self.received = true;
         let feedback = match reply {
             Reply::Feedback(feedback) => feedback,
             Reply::Register { number, written, value } => {
-                let awaited = match self.asked {
-                    Some(Request::Read(asked)) => asked == number && !written,
-                    Some(Request::Write(asked, _)) => asked == number && written,
+                let awaited = match self.requested {
+                    Some(Request::Read(requested)) => requested == number && !written,
+                    Some(Request::Write(requested, _)) => requested == number && written,
                     _ => false,
                 };
                 if awaited {
-                    (self.answer, self.asked) = (Some((number, written, value)), None);
+                    (self.answer, self.requested) = (Some((number, written, value)), None);
                 }
                 return false;
             }
         };
         (self.feedback, self.looked) = (feedback, true);
-        if self.asked == Some(Request::Refresh) {
-            self.asked = None;
+        if self.requested == Some(Request::Refresh) {
+            self.requested = None;
         }
         // Before the ranges were read nobody knows how it scales.
         let known = !matches!(
             self.stage,
-            Stage::Listen { .. } | Stage::Unowned | Stage::Configure { .. } | Stage::Refused { .. }
+            MotorStage::Observe { .. }
+                | MotorStage::Unowned
+                | MotorStage::Configure { .. }
+                | MotorStage::Refused { .. }
         );
         if known {
             (self.measured, self.measured_at) = (feedback.values(&self.plan.ranges()), now);
@@ -208,17 +212,17 @@ impl Motor {
     /// Real time: no allocation.
     pub fn clear_faults(&mut self, now: Nanos) {
         match self.stage {
-            Stage::Refused { .. } => self.listen(now, None),
-            Stage::Ready if self.in_error() => self.clearing = Some((now, now)),
-            Stage::Ready | Stage::On | Stage::Ramp { .. } => self.trouble = None,
-            Stage::Listen { .. }
-            | Stage::Unowned
-            | Stage::Configure { .. }
-            | Stage::Verify { .. }
-            | Stage::Arm { .. }
-            | Stage::Enable { .. }
-            | Stage::Disable { .. }
-            | Stage::Gone => {}
+            MotorStage::Refused { .. } => self.observe(now, None),
+            MotorStage::Ready if self.in_error() => self.clearing = Some((now, now)),
+            MotorStage::Ready | MotorStage::On | MotorStage::Ramp { .. } => self.fault = None,
+            MotorStage::Observe { .. }
+            | MotorStage::Unowned
+            | MotorStage::Configure { .. }
+            | MotorStage::Verify { .. }
+            | MotorStage::Arm { .. }
+            | MotorStage::Enable { .. }
+            | MotorStage::Disable { .. }
+            | MotorStage::Gone => {}
         }
     }
 
@@ -226,13 +230,14 @@ impl Motor {
     ///
     /// Real time: no allocation.
     pub fn start_over(&mut self, now: Nanos) {
-        self.listen(now, None);
-        (self.heard, self.feedback, self.measured) = (false, NO_FEEDBACK, NOT_MEASURED);
+        self.observe(now, None);
+        (self.received, self.feedback, self.measured) = (false, NO_FEEDBACK, NOT_MEASURED);
     }
 
     /// Makes the angle where it stands its zero, in the next cycle; false unless it is configured and not energised.
     pub fn set_zero(&mut self) -> bool {
-        let able = self.stage == Stage::Ready && !self.in_error() && self.wished == DriveWish::Disabled;
+        let able =
+            self.stage == MotorStage::Ready && !self.in_error() && self.last_target == DriveTarget::Disabled;
         self.set_zero |= able;
         able
     }
@@ -240,99 +245,105 @@ impl Motor {
     /// This cycle's request to the motor: one at most.
     ///
     /// Real time: no allocation, bounded work.
-    pub fn request(&mut self, cycle: Cycle, target: Option<MotorTarget>) -> Option<Request> {
-        let before = std::mem::replace(&mut self.wished, cycle.wish);
-        if cycle.wish == DriveWish::TorqueOff && before != DriveWish::TorqueOff {
+    pub fn request(&mut self, cycle: BringUpCycle, target: Option<MotorTarget>) -> Option<Request> {
+        let before = std::mem::replace(&mut self.last_target, cycle.drive_target);
+        if cycle.drive_target == DriveTarget::TorqueOff && before != DriveTarget::TorqueOff {
             return self.torque_off(cycle.now);
         }
-        let rises =
-            cycle.wish == DriveWish::Enabled && matches!(before, DriveWish::Disabled | DriveWish::Keep);
+        let rises = cycle.drive_target == DriveTarget::Enabled
+            && matches!(before, DriveTarget::Disabled | DriveTarget::Keep);
         let looked = std::mem::take(&mut self.looked);
         let status = looked.then_some(self.feedback.status);
         match self.stage {
-            Stage::Listen { since } => self.listening(cycle, since, status),
-            Stage::Unowned => self.unowned(cycle, status),
-            Stage::Configure { job, since } => self.configuring(cycle.now, status, (job, since)),
-            Stage::Ready => self.ready(cycle.now, status, rises),
-            Stage::Verify { .. } | Stage::Arm { .. } | Stage::Enable { .. }
-                if cycle.wish != DriveWish::Enabled =>
+            MotorStage::Observe { since } => self.observing(cycle, since, status),
+            MotorStage::Unowned => self.unowned(cycle, status),
+            MotorStage::Configure { job, since } => self.configuring(cycle.now, status, (job, since)),
+            MotorStage::Ready => self.ready(cycle.now, status, rises),
+            MotorStage::Verify { .. } | MotorStage::Arm { .. } | MotorStage::Enable { .. }
+                if cycle.drive_target != DriveTarget::Enabled =>
             {
                 self.disable(cycle.now)
             }
-            Stage::Verify { job, since } => self.verifying(cycle.now, (job, since)),
-            Stage::Arm { since } => self.arming(cycle.now, target, since),
-            Stage::Enable { since, next } => self.enabling(cycle.now, status, target, (since, next)),
-            Stage::Ramp { .. } | Stage::On => self.following(cycle, status, target),
-            Stage::Disable { since } => self.disabling(cycle.now, status, since),
-            Stage::Gone => self.gone(cycle),
-            Stage::Refused { .. } => None,
+            MotorStage::Verify { job, since } => self.verifying(cycle.now, (job, since)),
+            MotorStage::Arm { since } => self.arming(cycle.now, target, since),
+            MotorStage::Enable { since, next } => self.enabling(cycle.now, status, target, (since, next)),
+            MotorStage::Ramp { .. } | MotorStage::On => self.following(cycle, status, target),
+            MotorStage::Disable { since } => self.disabling(cycle.now, status, since),
+            MotorStage::Gone => self.gone(cycle),
+            MotorStage::Refused { .. } => None,
         }
     }
 
-    fn listening(&mut self, cycle: Cycle, since: Nanos, status: Option<u8>) -> Option<Request> {
+    fn observing(&mut self, cycle: BringUpCycle, since: Nanos, status: Option<u8>) -> Option<Request> {
         match status {
-            Some(STATUS_ENABLED) => self.stage = Stage::Unowned,
-            Some(_) if cycle.other_master => self.trouble = Some(DamiaoTrouble::OtherMaster),
-            Some(_) if cycle.wish == DriveWish::Disabled && age(cycle.now, since) >= LISTEN_LEAST.0 => {
-                self.trouble = None;
+            Some(STATUS_ENABLED) => self.stage = MotorStage::Unowned,
+            Some(_) if cycle.other_master => self.fault = Some(DamiaoFault::OtherMaster),
+            Some(_)
+                if cycle.drive_target == DriveTarget::Disabled && age(cycle.now, since) >= OBSERVE_MIN.0 =>
+            {
+                self.fault = None;
                 return self.at_job(cycle.now, 0);
             }
-            None if self.asked.is_some() && age(cycle.now, self.asked_at) >= LOOK_AGAIN.0 => {
-                self.heard = false;
-                self.trouble.get_or_insert(DamiaoTrouble::NoAnswer);
+            None if self.requested.is_some() && age(cycle.now, self.requested_at) >= OBSERVE_AGAIN.0 => {
+                self.received = false;
+                self.fault.get_or_insert(DamiaoFault::NoAnswer);
             }
             Some(_) | None => {}
         }
         self.look(cycle.now)
     }
 
-    fn unowned(&mut self, cycle: Cycle, status: Option<u8>) -> Option<Request> {
+    fn unowned(&mut self, cycle: BringUpCycle, status: Option<u8>) -> Option<Request> {
         match status {
-            Some(status) if status != STATUS_ENABLED => self.listen(cycle.now, None),
+            Some(status) if status != STATUS_ENABLED => self.observe(cycle.now, None),
             _ => {}
         }
         let look = self.look(cycle.now)?;
         // Its answer to the emergency is a feedback as good as any.
-        Some(if cycle.wish == DriveWish::TorqueOff { Request::Special(Special::Disable, 0) } else { look })
+        Some(if cycle.drive_target == DriveTarget::TorqueOff {
+            Request::Special(Special::Disable, 0)
+        } else {
+            look
+        })
     }
 
     fn configuring(&mut self, now: Nanos, status: Option<u8>, at: (usize, Nanos)) -> Option<Request> {
         let (index, since) = at;
         if status == Some(STATUS_ENABLED) {
-            self.stage = Stage::Unowned;
+            self.stage = MotorStage::Unowned;
             return None;
         }
         let Some(job) = CONFIGURE.get(index).copied() else {
-            self.stage = Stage::Ready;
+            self.stage = MotorStage::Ready;
             return Some(Request::Refresh);
         };
         if let Some((_, _, value)) = self.answer.take() {
-            return match self.plan.judge(job, Some(index), value) {
-                Judged::On(steps) => self.at_job(now, index + steps),
-                Judged::Differs => {
+            return match self.plan.check_value(job, Some(index), value) {
+                CheckResult::On(steps) => self.at_job(now, index + steps),
+                CheckResult::Differs => {
                     let (code, object) = differs(job.register(), value);
-                    self.stage = Stage::Refused { code, object };
+                    self.stage = MotorStage::Refused { code, object };
                     None
                 }
             };
         }
-        if age(now, since) >= self.patience.step.0 {
-            let code = DamiaoTrouble::NoRegister.code();
-            self.stage = Stage::Refused { code, object: register_object(job.register()) };
+        if age(now, since) >= self.timeouts.step.0 {
+            let code = DamiaoFault::NoRegister.code();
+            self.stage = MotorStage::Refused { code, object: register_object(job.register()) };
             return None;
         }
-        self.ask_job(now, job, since)
+        self.request_job(now, job, since)
     }
 
     fn ready(&mut self, now: Nanos, status: Option<u8>, rises: bool) -> Option<Request> {
         if status == Some(STATUS_ENABLED) {
             // Somebody else has energised it.
-            self.stage = Stage::Unowned;
+            self.stage = MotorStage::Unowned;
             return None;
         }
-        if age(now, self.measured_at) >= SILENT.0 && age(now, self.asked_at) >= SILENT.0 {
-            self.heard = false;
-            self.listen(now, Some(DamiaoTrouble::Silent));
+        if age(now, self.measured_at) >= NO_REPLY.0 && age(now, self.requested_at) >= NO_REPLY.0 {
+            self.received = false;
+            self.observe(now, Some(DamiaoFault::NoReply));
             return None;
         }
         if std::mem::take(&mut self.set_zero) {
@@ -340,17 +351,17 @@ impl Motor {
         }
         if let Some((since, next)) = self.clearing {
             if !self.in_error() {
-                (self.clearing, self.trouble) = (None, None);
-            } else if age(now, since) >= self.patience.step.0 {
+                (self.clearing, self.fault) = (None, None);
+            } else if age(now, since) >= self.timeouts.step.0 {
                 self.clearing = None;
             } else if now >= next {
                 self.clearing = Some((since, later(now, REPEAT)));
                 return Some(Request::Special(Special::ClearError, 0));
             }
         }
-        if rises && !self.in_error() && self.trouble.is_none() {
-            (self.asked, self.answer) = (None, None);
-            self.stage = Stage::Verify { job: 0, since: now };
+        if rises && !self.in_error() && self.fault.is_none() {
+            (self.requested, self.answer) = (None, None);
+            self.stage = MotorStage::Verify { job: 0, since: now };
         }
         Some(Request::Refresh)
     }
@@ -359,29 +370,29 @@ impl Motor {
     fn verifying(&mut self, now: Nanos, at: (usize, Nanos)) -> Option<Request> {
         let (index, since) = at;
         let Some(job) = VERIFY.get(index).copied() else {
-            self.stage = Stage::Arm { since: now };
+            self.stage = MotorStage::Arm { since: now };
             return Some(Request::Refresh);
         };
         if let Some((_, _, value)) = self.answer.take() {
-            if self.plan.judge(job, None, value) == Judged::Differs {
-                return self.go(DamiaoTrouble::Restarted);
+            if self.plan.check_value(job, None, value) == CheckResult::Differs {
+                return self.go(DamiaoFault::Restarted);
             }
-            self.stage = Stage::Verify { job: index + 1, since: now };
+            self.stage = MotorStage::Verify { job: index + 1, since: now };
             return Some(Request::Refresh);
         }
-        if age(now, since) >= self.patience.step.0 {
-            return self.go(DamiaoTrouble::NoRegister);
+        if age(now, since) >= self.timeouts.step.0 {
+            return self.go(DamiaoFault::NoRegister);
         }
-        self.ask_job(now, job, since)
+        self.request_job(now, job, since)
     }
 
     fn arming(&mut self, now: Nanos, target: Option<MotorTarget>, since: Nanos) -> Option<Request> {
         if self.in_error() {
-            self.stage = Stage::Ready;
+            self.stage = MotorStage::Ready;
             return Some(Request::Refresh);
         }
-        if age(now, since) >= self.patience.step.0 {
-            return self.go(DamiaoTrouble::Silent);
+        if age(now, since) >= self.timeouts.step.0 {
+            return self.go(DamiaoFault::NoReply);
         }
         if self.measured_at <= since {
             return Some(Request::Refresh);
@@ -390,10 +401,10 @@ impl Motor {
         let near =
             target.is_some_and(|t| (t.position_rad - self.measured.position_rad).abs() <= self.near_rad);
         if !near {
-            return self.go(DamiaoTrouble::CommandFar);
+            return self.go(DamiaoFault::CommandFar);
         }
         self.sent_rad = self.measured.position_rad;
-        self.stage = Stage::Enable { since: now, next: now };
+        self.stage = MotorStage::Enable { since: now, next: now };
         // A command without gains first: whatever the motor was told before, it is not taken up.
         self.command(target, 0.0)
     }
@@ -407,70 +418,70 @@ impl Motor {
     ) -> Option<Request> {
         let (since, next) = at;
         if status == Some(STATUS_ENABLED) {
-            self.stage = Stage::Ramp { since: now };
+            self.stage = MotorStage::Ramp { since: now };
             return self.command(target, 0.0);
         }
         if self.in_error() {
-            self.stage = Stage::Ready;
+            self.stage = MotorStage::Ready;
             return Some(Request::Refresh);
         }
-        if age(now, since) >= self.patience.step.0 {
-            self.trouble = Some(DamiaoTrouble::EnableTimeout);
+        if age(now, since) >= self.timeouts.step.0 {
+            self.fault = Some(DamiaoFault::EnableTimeout);
             return self.disable(now);
         }
         if now < next {
             return self.command(target, 0.0);
         }
-        self.stage = Stage::Enable { since, next: later(now, REPEAT) };
+        self.stage = MotorStage::Enable { since, next: later(now, REPEAT) };
         Some(Request::Special(Special::Enable, 0))
     }
 
     fn following(
         &mut self,
-        cycle: Cycle,
+        cycle: BringUpCycle,
         status: Option<u8>,
         target: Option<MotorTarget>,
     ) -> Option<Request> {
         let now = cycle.now;
-        if matches!(cycle.wish, DriveWish::Disabled | DriveWish::TorqueOff) {
+        if matches!(cycle.drive_target, DriveTarget::Disabled | DriveTarget::TorqueOff) {
             return self.disable(now);
         }
         match status {
             None | Some(STATUS_ENABLED) => {}
-            Some(STATUS_DISABLED) => return self.go(DamiaoTrouble::DroppedOut),
+            Some(STATUS_DISABLED) => return self.go(DamiaoFault::DroppedOut),
             Some(_) => {
-                self.stage = Stage::Ready;
+                self.stage = MotorStage::Ready;
                 return Some(Request::Refresh);
             }
         }
-        if age(now, self.measured_at) >= SILENT.0 {
+        if age(now, self.measured_at) >= NO_REPLY.0 {
             // A silent motor may still listen: it gets its commands until the wish is disabled.
-            self.trouble.get_or_insert(DamiaoTrouble::Silent);
+            self.fault.get_or_insert(DamiaoFault::NoReply);
         }
         let ramped = |since| ratio(age(now, since), self.plan.ramp_ns());
-        let share = if let Stage::Ramp { since } = self.stage { ramped(since) } else { 1.0 };
+        let share = if let MotorStage::Ramp { since } = self.stage { ramped(since) } else { 1.0 };
         if share >= 1.0 {
-            self.stage = Stage::On;
+            self.stage = MotorStage::On;
         }
         self.command(target, share)
     }
 
     fn disabling(&mut self, now: Nanos, status: Option<u8>, since: Nanos) -> Option<Request> {
         if status.is_some_and(|status| status != STATUS_ENABLED) {
-            self.stage = if self.trouble.is_some() { Stage::Gone } else { Stage::Ready };
+            self.stage = if self.fault.is_some() { MotorStage::Gone } else { MotorStage::Ready };
             return Some(Request::Refresh);
         }
-        if age(now, since) >= SILENT.0 && age(now, self.measured_at) >= SILENT.0 {
-            self.heard = false;
-            self.listen(now, Some(DamiaoTrouble::Silent));
+        if age(now, since) >= NO_REPLY.0 && age(now, self.measured_at) >= NO_REPLY.0 {
+            self.received = false;
+            self.observe(now, Some(DamiaoFault::NoReply));
             return None;
         }
         Some(Request::Special(Special::Disable, 0))
     }
 
-    fn gone(&mut self, cycle: Cycle) -> Option<Request> {
-        if cycle.wish == DriveWish::Disabled {
-            self.listen(cycle.now, self.trouble);
+    fn gone(&mut self, cycle: BringUpCycle) -> Option<Request> {
+        if cycle.drive_target == DriveTarget::Disabled {
+            self.observe(cycle.now, self.fault);
         }
         // It was ours: should it be energised after all, it is not left to its last command.
         let energised = self.feedback.status == STATUS_ENABLED;
@@ -480,65 +491,65 @@ impl Motor {
     /// The emergency: in any stage, before anything else.
     fn torque_off(&mut self, now: Nanos) -> Option<Request> {
         match self.stage {
-            Stage::Listen { .. }
-            | Stage::Unowned
-            | Stage::Configure { .. }
-            | Stage::Gone
-            | Stage::Refused { .. } => {
-                self.asked = None;
+            MotorStage::Observe { .. }
+            | MotorStage::Unowned
+            | MotorStage::Configure { .. }
+            | MotorStage::Gone
+            | MotorStage::Refused { .. } => {
+                self.requested = None;
                 Some(Request::Special(Special::Disable, 0))
             }
-            Stage::Ready
-            | Stage::Verify { .. }
-            | Stage::Arm { .. }
-            | Stage::Enable { .. }
-            | Stage::Ramp { .. }
-            | Stage::On
-            | Stage::Disable { .. } => self.disable(now),
+            MotorStage::Ready
+            | MotorStage::Verify { .. }
+            | MotorStage::Arm { .. }
+            | MotorStage::Enable { .. }
+            | MotorStage::Ramp { .. }
+            | MotorStage::On
+            | MotorStage::Disable { .. } => self.disable(now),
         }
     }
 
     fn disable(&mut self, now: Nanos) -> Option<Request> {
-        (self.asked, self.answer, self.clearing) = (None, None, None);
-        self.stage = Stage::Disable { since: now };
+        (self.requested, self.answer, self.clearing) = (None, None, None);
+        self.stage = MotorStage::Disable { since: now };
         Some(Request::Special(Special::Disable, 0))
     }
 
-    fn go(&mut self, trouble: DamiaoTrouble) -> Option<Request> {
-        (self.asked, self.answer, self.clearing) = (None, None, None);
-        self.trouble = Some(trouble);
-        self.stage = Stage::Gone;
+    fn go(&mut self, fault: DamiaoFault) -> Option<Request> {
+        (self.requested, self.answer, self.clearing) = (None, None, None);
+        self.fault = Some(fault);
+        self.stage = MotorStage::Gone;
         Some(Request::Refresh)
     }
 
     /// Back to the start, where nothing is changed before the motor has been looked at.
-    fn listen(&mut self, now: Nanos, trouble: Option<DamiaoTrouble>) {
-        (self.asked, self.answer, self.clearing) = (None, None, None);
-        (self.trouble, self.set_zero, self.looked) = (trouble, false, false);
-        self.stage = Stage::Listen { since: now };
+    fn observe(&mut self, now: Nanos, fault: Option<DamiaoFault>) {
+        (self.requested, self.answer, self.clearing) = (None, None, None);
+        (self.fault, self.set_zero, self.looked) = (fault, false, false);
+        self.stage = MotorStage::Observe { since: now };
     }
 
     fn look(&mut self, now: Nanos) -> Option<Request> {
-        let due = self.asked_at == Nanos(0) || age(now, self.asked_at) >= LOOK_AGAIN.0;
-        due.then(|| self.ask(now, Request::Refresh))
+        let due = self.requested_at == Nanos(0) || age(now, self.requested_at) >= OBSERVE_AGAIN.0;
+        due.then(|| self.send_request(now, Request::Refresh))
     }
 
-    fn ask(&mut self, now: Nanos, request: Request) -> Request {
-        (self.asked, self.asked_at) = (Some(request), now);
+    fn send_request(&mut self, now: Nanos, request: Request) -> Request {
+        (self.requested, self.requested_at) = (Some(request), now);
         request
     }
 
     fn at_job(&mut self, now: Nanos, job: usize) -> Option<Request> {
-        (self.asked, self.answer) = (None, None);
-        self.stage = Stage::Configure { job, since: now };
+        (self.requested, self.answer) = (None, None);
+        self.stage = MotorStage::Configure { job, since: now };
         None
     }
 
     /// Asks for the answer to a job, again when it was lost.
-    fn ask_job(&mut self, now: Nanos, job: Job, since: Nanos) -> Option<Request> {
+    fn request_job(&mut self, now: Nanos, job: Job, since: Nanos) -> Option<Request> {
         let settling = matches!(job, Job::ReadSettled(_)) && age(now, since) < SETTLE.0;
-        let waiting = self.asked.is_some() && age(now, self.asked_at) < ASK_AGAIN.0;
-        (!settling && !waiting).then(|| self.ask(now, self.plan.request(job)))
+        let waiting = self.requested.is_some() && age(now, self.requested_at) < REQUEST_AGAIN.0;
+        (!settling && !waiting).then(|| self.send_request(now, self.plan.request(job)))
     }
 
     /// The command of this cycle with this share of the gains. What is no number never becomes one: the last good

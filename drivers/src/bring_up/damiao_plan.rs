@@ -30,7 +30,7 @@ pub struct MotorPlan {
 
 /// What an answer means for the list of jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+pub enum CheckResult {
     /// This many jobs further.
     On(usize),
     /// The register holds something else.
@@ -106,7 +106,7 @@ impl MotorPlan {
 
     /// Whether an answer lets the list go on. `index` is of [`CONFIGURE`], or none in [`VERIFY`].
     #[must_use]
-    pub fn judge(&self, job: Job, index: Option<usize>, value: [u8; 4]) -> Judged {
+    pub fn check_value(&self, job: Job, index: Option<usize>, value: [u8; 4]) -> CheckResult {
         let register = job.register();
         let agrees = match register {
             Register::PositionRange | Register::VelocityRange | Register::TorqueRange => {
@@ -117,9 +117,9 @@ impl MotorPlan {
             }
         };
         match (index == Some(MODE_READ), agrees) {
-            (true, true) => Judged::On(MODE_WRITTEN),
-            (true, false) | (false, true) => Judged::On(1),
-            (false, false) => Judged::Differs,
+            (true, true) => CheckResult::On(MODE_WRITTEN),
+            (true, false) | (false, true) => CheckResult::On(1),
+            (false, false) => CheckResult::Differs,
         }
     }
 

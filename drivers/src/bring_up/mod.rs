@@ -4,13 +4,13 @@
 pub(crate) mod adopt;
 pub mod cia402;
 pub mod damiao;
+pub mod damiao_fault;
 pub mod damiao_plan;
-pub mod damiao_trouble;
-mod look;
-pub mod pace;
+pub mod fault;
+mod observe;
 pub mod plan;
 pub mod power;
-pub mod trouble;
+pub mod timing;
 
 pub use cia402::Node;
-pub use trouble::{Trouble, explain, explain_refusal};
+pub use fault::{BringUpFault, explain, explain_refusal};

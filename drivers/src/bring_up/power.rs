@@ -3,12 +3,12 @@
 //! Everything follows from the newest statusword and the wish; the enable command is sent only to a drive whose own
 //! last word was "switched on" or "operation enabled". Enabling begins only on the change of the wish from disabled
 //! to enabled: a drive that drops out by itself is never energised again by a wish that merely stays.
-use crate::bring_up::trouble::Trouble;
+use crate::bring_up::fault::BringUpFault;
 use crate::codec::cia402_words::{
     CONTROL_ENABLE, CONTROL_FAULT_RESET, CONTROL_OFF, CONTROL_QUICK_STOP, CONTROL_SHUTDOWN,
     CONTROL_SWITCH_ON, DriveStep, STATUS_FOLLOWS,
 };
-use crate::servo::{DriveState, DriveWish, Nanos};
+use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// Cycles for which 0 is sent before the rising edge of fault reset, so that a latched RPDO has surely passed.
 const RESET_LOW_CYCLES: u8 = 3;
@@ -17,7 +17,7 @@ const NOT_FOLLOWING_MAX: u8 = 3;
 
 /// What the drive last said, and when it may be trusted.
 #[derive(Clone, Copy, Debug)]
-pub struct Heard {
+pub struct Received {
     /// Newest statusword.
     pub status: u16,
     /// The statusword is recent.
@@ -44,7 +44,7 @@ enum Phase {
 
 /// Which target goes out beside the controlword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Aim {
+pub enum TargetSource {
     /// Where the drive stands.
     Measured,
     /// What it has held since before this master.
@@ -69,8 +69,8 @@ enum Reset {
 pub struct Power {
     phase: Phase,
     reset: Reset,
-    wished: DriveWish,
-    trouble: Option<Trouble>,
+    last_target: DriveTarget,
+    fault: Option<BringUpFault>,
     not_following: u8,
     /// Cycles in which that many answers come.
     not_following_max: u8,
@@ -99,8 +99,8 @@ impl Power {
         Self {
             phase: Phase::Off,
             reset: Reset::Idle,
-            wished: DriveWish::TorqueOff,
-            trouble: None,
+            last_target: DriveTarget::TorqueOff,
+            fault: None,
             not_following: 0,
             not_following_max: NOT_FOLLOWING_MAX.saturating_mul(answer_every),
             step_timeout,
@@ -109,25 +109,25 @@ impl Power {
 
     /// What the master found, until [`Self::clear`].
     #[must_use]
-    pub const fn trouble(&self) -> Option<Trouble> {
-        self.trouble
+    pub const fn fault(&self) -> Option<BringUpFault> {
+        self.fault
     }
 
     /// Which target goes out.
     #[must_use]
-    pub fn aim(&self) -> Aim {
+    pub fn target_source(&self) -> TargetSource {
         match self.phase {
-            Phase::Off => Aim::Measured,
-            Phase::Kept => Aim::Held,
+            Phase::Off => TargetSource::Measured,
+            Phase::Kept => TargetSource::Held,
             Phase::Enabling { .. } | Phase::On | Phase::Disabling { .. } | Phase::TakingOver { .. } => {
-                Aim::Command
+                TargetSource::Command
             }
         }
     }
 
     /// Keeps a drive that was found holding.
     pub fn adopt(&mut self) {
-        (self.phase, self.wished) = (Phase::Kept, DriveWish::Keep);
+        (self.phase, self.last_target) = (Phase::Kept, DriveTarget::Keep);
     }
 
     /// The controlword that changes nothing about a drive that holds.
@@ -141,18 +141,18 @@ impl Power {
     }
 
     /// Keeps up with the wish while the drive is not operational, so that an old change does not energise it later.
-    pub fn watch(&mut self, wish: DriveWish) {
-        self.wished = wish;
+    pub fn watch(&mut self, drive_target: DriveTarget) {
+        self.last_target = drive_target;
     }
 
     /// Takes a trouble found elsewhere (heartbeat); the first one stays.
-    pub fn note(&mut self, trouble: Trouble) {
-        self.trouble.get_or_insert(trouble);
+    pub fn note(&mut self, fault: BringUpFault) {
+        self.fault.get_or_insert(fault);
     }
 
     /// Forgets the trouble and, when the drive is in fault, starts the reset sequence.
     pub fn clear(&mut self, status: u16) {
-        self.trouble = None;
+        self.fault = None;
         self.not_following = 0;
         if DriveStep::from_status(status) == Some(DriveStep::Fault) {
             self.reset = Reset::Low(RESET_LOW_CYCLES);
@@ -162,34 +162,36 @@ impl Power {
     /// The controlword for this cycle.
     ///
     /// Real time: arithmetic only.
-    pub fn control(&mut self, now: Nanos, wish: DriveWish, heard: Heard) -> u16 {
-        let before = self.wished;
-        self.wished = wish;
-        let step = DriveStep::from_status(heard.status);
-        if wish == DriveWish::TorqueOff {
+    pub fn control(&mut self, now: Nanos, drive_target: DriveTarget, received: Received) -> u16 {
+        let before = self.last_target;
+        self.last_target = drive_target;
+        let step = DriveStep::from_status(received.status);
+        if drive_target == DriveTarget::TorqueOff {
             self.phase = Phase::Off;
-            if before != DriveWish::TorqueOff {
+            if before != DriveTarget::TorqueOff {
                 self.reset = Reset::Idle;
                 return CONTROL_OFF;
             }
         }
-        match (before, wish, self.phase) {
-            (DriveWish::Keep, DriveWish::Enabled, Phase::Kept) => {
+        match (before, drive_target, self.phase) {
+            (DriveTarget::Keep, DriveTarget::Enabled, Phase::Kept) => {
                 self.phase = Phase::TakingOver { since: now };
             }
-            (DriveWish::Disabled | DriveWish::Keep, DriveWish::Enabled, _) => self.try_enable(now, step),
-            (_, DriveWish::Keep, Phase::On | Phase::TakingOver { .. }) => self.phase = Phase::Kept,
-            (_, DriveWish::Keep, Phase::Enabling { .. }) => {
+            (DriveTarget::Disabled | DriveTarget::Keep, DriveTarget::Enabled, _) => {
+                self.try_enable(now, step)
+            }
+            (_, DriveTarget::Keep, Phase::On | Phase::TakingOver { .. }) => self.phase = Phase::Kept,
+            (_, DriveTarget::Keep, Phase::Enabling { .. }) => {
                 self.phase = Phase::Disabling { since: now, rung: rung(step) };
             }
             _ => {}
         }
-        self.advance(now, wish, step, heard);
+        self.advance(now, drive_target, step, received);
         match self.phase {
-            Phase::Off => self.control_off(now, wish, step),
-            Phase::Enabling { .. } | Phase::On => Self::control_up(step, heard),
+            Phase::Off => self.control_off(now, drive_target, step),
+            Phase::Enabling { .. } | Phase::On => Self::control_up(step, received),
             Phase::Disabling { .. } => Self::control_down(step),
-            Phase::Kept => Self::keeping(heard.status),
+            Phase::Kept => Self::keeping(received.status),
             Phase::TakingOver { .. } => CONTROL_ENABLE,
         }
     }
@@ -199,12 +201,12 @@ impl Power {
     pub fn state(&self, status: u16) -> DriveState {
         let step = DriveStep::from_status(status);
         let faulty = matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction));
-        let trouble = self.trouble.is_some_and(|trouble| trouble != Trouble::DroppedOut);
+        let fault = self.fault.is_some_and(|fault| fault != BringUpFault::DroppedOut);
         match self.phase {
             _ if faulty => DriveState::Fault,
             // It holds, whatever the last try to take it over has found.
             Phase::Kept => DriveState::Adopted,
-            _ if trouble => DriveState::Fault,
+            _ if fault => DriveState::Fault,
             Phase::Enabling { .. } | Phase::TakingOver { .. } => DriveState::Enabling,
             Phase::On => DriveState::Enabled,
             Phase::Disabling { .. } => DriveState::Disabling,
@@ -220,24 +222,34 @@ impl Power {
             step,
             Some(DriveStep::SwitchOnDisabled | DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn)
         );
-        let untroubled = matches!(self.trouble, None | Some(Trouble::DroppedOut));
+        let untroubled = matches!(self.fault, None | Some(BringUpFault::DroppedOut));
         if self.phase == Phase::Off && self.reset == Reset::Idle && ready && untroubled {
-            self.trouble = None;
+            self.fault = None;
             self.not_following = 0;
             self.phase = Phase::Enabling { since: now, rung: rung(step) };
         }
     }
 
-    fn advance(&mut self, now: Nanos, wish: DriveWish, step: Option<DriveStep>, heard: Heard) {
-        if wish == DriveWish::Disabled && !matches!(self.phase, Phase::Off | Phase::Disabling { .. }) {
+    fn advance(
+        &mut self,
+        now: Nanos,
+        drive_target: DriveTarget,
+        step: Option<DriveStep>,
+        received: Received,
+    ) {
+        if drive_target == DriveTarget::Disabled
+            && !matches!(self.phase, Phase::Off | Phase::Disabling { .. })
+        {
             self.phase = Phase::Disabling { since: now, rung: rung(step) };
         }
         match self.phase {
             Phase::Off => {}
-            Phase::Enabling { since, rung: reached } => self.advance_up(now, step, heard, (since, reached)),
-            Phase::On => self.advance_on(step, heard),
+            Phase::Enabling { since, rung: reached } => {
+                self.advance_up(now, step, received, (since, reached))
+            }
+            Phase::On => self.advance_on(step, received),
             Phase::Kept => self.advance_kept(step),
-            Phase::TakingOver { since } => self.advance_taking_over(now, step, heard, since),
+            Phase::TakingOver { since } => self.advance_taking_over(now, step, received, since),
             Phase::Disabling { since, rung: reached } => {
                 let at = rung(step);
                 if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
@@ -250,34 +262,34 @@ impl Power {
         }
     }
 
-    fn advance_up(&mut self, now: Nanos, step: Option<DriveStep>, heard: Heard, at: (Nanos, u8)) {
+    fn advance_up(&mut self, now: Nanos, step: Option<DriveStep>, received: Received, at: (Nanos, u8)) {
         let (since, reached) = at;
         let rung = rung(step);
         if rung < reached || matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction)) {
             self.drop_out(step);
-        } else if step == Some(DriveStep::SwitchedOn) && heard.fresh && !heard.command_near {
-            self.note(Trouble::CommandFar);
+        } else if step == Some(DriveStep::SwitchedOn) && received.fresh && !received.command_near {
+            self.note(BringUpFault::CommandFar);
             self.phase = Phase::Off;
-        } else if rung == 3 && heard.status & STATUS_FOLLOWS != 0 {
+        } else if rung == 3 && received.status & STATUS_FOLLOWS != 0 {
             self.phase = Phase::On;
         } else if rung > reached {
             self.phase = Phase::Enabling { since: now, rung };
         } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
-            self.note(Trouble::EnableTimeout);
+            self.note(BringUpFault::EnableTimeout);
             self.phase = Phase::Off;
         }
     }
 
-    fn advance_on(&mut self, step: Option<DriveStep>, heard: Heard) {
+    fn advance_on(&mut self, step: Option<DriveStep>, received: Received) {
         if step != Some(DriveStep::OperationEnabled) {
             self.drop_out(step);
-        } else if heard.status & STATUS_FOLLOWS != 0 {
+        } else if received.status & STATUS_FOLLOWS != 0 {
             self.not_following = 0;
         } else {
             self.not_following = self.not_following.saturating_add(1);
             if self.not_following >= self.not_following_max {
                 // It stays energised: letting go of a drive that still holds would be worse.
-                self.note(Trouble::NotFollowing);
+                self.note(BringUpFault::NotFollowing);
             }
         }
     }
@@ -289,16 +301,16 @@ impl Power {
     }
 
     /// Whatever fails here, the drive goes on holding as it did.
-    fn advance_taking_over(&mut self, now: Nanos, step: Option<DriveStep>, heard: Heard, since: Nanos) {
+    fn advance_taking_over(&mut self, now: Nanos, step: Option<DriveStep>, received: Received, since: Nanos) {
         if !holds(step) {
             self.drop_out(step);
-        } else if !heard.command_near {
-            self.note(Trouble::CommandFar);
+        } else if !received.command_near {
+            self.note(BringUpFault::CommandFar);
             self.phase = Phase::Kept;
-        } else if step == Some(DriveStep::OperationEnabled) && heard.status & STATUS_FOLLOWS != 0 {
+        } else if step == Some(DriveStep::OperationEnabled) && received.status & STATUS_FOLLOWS != 0 {
             self.phase = Phase::On;
         } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
-            self.note(Trouble::EnableTimeout);
+            self.note(BringUpFault::EnableTimeout);
             self.phase = Phase::Kept;
         }
     }
@@ -306,14 +318,14 @@ impl Power {
     fn drop_out(&mut self, step: Option<DriveStep>) {
         self.phase = Phase::Off;
         match step {
-            Some(DriveStep::QuickStopActive) => self.note(Trouble::QuickStopped),
+            Some(DriveStep::QuickStopActive) => self.note(BringUpFault::QuickStopped),
             // The drive says what it has; its emergency code tells more than we could.
             Some(DriveStep::Fault | DriveStep::FaultReaction) => {}
-            _ => self.note(Trouble::DroppedOut),
+            _ => self.note(BringUpFault::DroppedOut),
         }
     }
 
-    fn control_off(&mut self, now: Nanos, wish: DriveWish, step: Option<DriveStep>) -> u16 {
+    fn control_off(&mut self, now: Nanos, drive_target: DriveTarget, step: Option<DriveStep>) -> u16 {
         match self.reset {
             Reset::Low(0) => self.reset = Reset::High { since: now },
             Reset::Low(left) => self.reset = Reset::Low(left - 1),
@@ -327,7 +339,7 @@ impl Power {
         }
         if matches!(self.reset, Reset::High { .. }) {
             CONTROL_FAULT_RESET
-        } else if step == Some(DriveStep::QuickStopActive) && wish == DriveWish::Enabled {
+        } else if step == Some(DriveStep::QuickStopActive) && drive_target == DriveTarget::Enabled {
             // It may be holding a load: keep it in quick stop until the wish says otherwise.
             CONTROL_QUICK_STOP
         } else {
@@ -335,12 +347,12 @@ impl Power {
         }
     }
 
-    fn control_up(step: Option<DriveStep>, heard: Heard) -> u16 {
+    fn control_up(step: Option<DriveStep>, received: Received) -> u16 {
         match step {
             Some(DriveStep::SwitchOnDisabled) => CONTROL_SHUTDOWN,
             // The step into torque needs a recent word of the drive; staying in it does not: a silent drive that
             // still listens must be able to follow the arm to rest.
-            Some(DriveStep::SwitchedOn) if heard.fresh => CONTROL_ENABLE,
+            Some(DriveStep::SwitchedOn) if received.fresh => CONTROL_ENABLE,
             Some(DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn) => CONTROL_SWITCH_ON,
             Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,
             _ => CONTROL_OFF,

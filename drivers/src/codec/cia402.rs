@@ -3,15 +3,15 @@
 //! One cycle on the bus: SYNC, which makes the drives apply the setpoints of the cycle before and sample their
 //! position; the new setpoints; then, one frame a node at most, configuration. So a command acts one period after it
 //! was sent, and a position is one period old when it is seen.
-use crate::bring_up::cia402::{Node, Setpoint, Target};
-use crate::bring_up::pace::{self, Cycle, Patience, PatientClock};
+use crate::bring_up::cia402::{DriveSetpoint, Node, Target};
+use crate::bring_up::fault;
 use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan, TargetPdo};
-use crate::bring_up::trouble;
+use crate::bring_up::timing::{self, BringUpCycle, StepTimer, Timeouts};
 use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, sync};
 use crate::codec::sdo::SdoResponse;
-use crate::codec::setpoint_frames::{Group, Rhythm, encode_control, encode_pair, groups};
+use crate::codec::setpoint_frames::{Group, SendSchedule, encode_control, encode_pair, groups};
 use crate::frame::{CanFrame, FrameBatch};
-use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus};
+use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
 use taustream_arm::{Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
@@ -97,11 +97,11 @@ pub struct Cia402Driver {
     drives: Vec<Drive>,
     joints: Vec<usize>,
     groups: Vec<Group>,
-    rhythm: Rhythm,
+    send_schedule: SendSchedule,
     /// Node id to index of drive.
     by_node: [Option<usize>; NODE_MAX as usize + 1],
     near_rad: f64,
-    clock: PatientClock,
+    clock: StepTimer,
     heartbeat_at: Option<Nanos>,
     /// The cycle before sent SYNC.
     syncs: bool,
@@ -124,7 +124,7 @@ impl Cia402Driver {
         let on_bus = settings.servos.iter().filter(|servo| servo.bus == bus);
         let mine = || on_bus.clone().filter_map(|servo| Some((servo, CountScale::of(servo)?)));
         let supervision = &settings.supervision;
-        let patience = Patience {
+        let timeouts = Timeouts {
             step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
             feedback: nanos("feedback_age_s_max", supervision.feedback_age_s_max)?,
         };
@@ -136,10 +136,10 @@ impl Cia402Driver {
             drives: Vec::new(),
             joints: Vec::new(),
             groups: groups(mine().count(), traffic.packed),
-            rhythm: Rhythm::new(traffic),
+            send_schedule: SendSchedule::new(traffic),
             by_node: [None; NODE_MAX as usize + 1],
             near_rad,
-            clock: PatientClock::new(period_us),
+            clock: StepTimer::new(period_us),
             heartbeat_at: None,
             syncs: false,
         };
@@ -155,7 +155,7 @@ impl Cia402Driver {
                 target: target_pdo(&driver.groups, &nodes, at),
                 feedback_every,
             };
-            driver.add(servo, scale, Node::new(plan, patience))?;
+            driver.add(servo, scale, Node::new(plan, timeouts))?;
         }
         Ok(driver)
     }
@@ -192,28 +192,33 @@ impl Cia402Driver {
     }
 
     /// The setpoints whose turn it is, and whatever must not wait for a turn: a new controlword, and torque off.
-    fn push_setpoints(&mut self, cycle: Cycle, commands: &[JointCommand; MAX_JOINTS], out: &mut FrameBatch) {
-        let (rhythm, near_rad) = (self.rhythm, self.near_rad);
-        self.rhythm.advance();
+    fn push_setpoints(
+        &mut self,
+        cycle: BringUpCycle,
+        commands: &[JointCommand; MAX_JOINTS],
+        out: &mut FrameBatch,
+    ) {
+        let (send_schedule, near_rad) = (self.send_schedule, self.near_rad);
+        self.send_schedule.advance();
         for (number, group) in self.groups.iter().enumerate() {
-            let turn = rhythm.is_turn(number);
+            let is_due = send_schedule.is_due(number);
             match *group {
                 Group::One(at) => {
                     let Some(drive) = self.drives.get_mut(at) else { continue };
-                    drive.push_own(cycle, drive.target(commands, near_rad), turn, out);
+                    drive.push_own(cycle, drive.target(commands, near_rad), is_due, out);
                 }
                 Group::Pair([first, second]) => {
                     let Ok([first, second]) = self.drives.get_disjoint_mut([first, second]) else { continue };
-                    let repeats = rhythm.repeats_control(number);
+                    let repeats = send_schedule.repeats_control(number);
                     // Its target comes with the other's: a drive must not be energised before both can be told.
-                    let together = first.node.told().is_some() && second.node.told().is_some();
+                    let together = first.node.commanded().is_some() && second.node.commanded().is_some();
                     let mut news = false;
                     for drive in [&mut *first, &mut *second] {
                         let target = drive.target(commands, near_rad);
                         let target = Target { near: target.near && together, ..target };
                         news |= drive.push_control(cycle, target, repeats, out);
                     }
-                    push_shared(first, second, turn || news, out);
+                    push_shared(first, second, is_due || news, out);
                 }
             }
         }
@@ -226,7 +231,7 @@ impl Cia402Driver {
         for group in &self.groups {
             match *group {
                 Group::One(at) => {
-                    if let Some((node, Setpoint { control, target_counts })) = kept(at) {
+                    if let Some((node, DriveSetpoint { control, target_counts })) = kept(at) {
                         out.push(encode_rpdo(node, control, target_counts));
                     }
                 }
@@ -268,18 +273,18 @@ fn target_pdo(groups: &[Group], nodes: &[u8], at: usize) -> TargetPdo {
 
 /// A positive time of the settings in nanoseconds.
 fn nanos(key: &'static str, value: f64) -> Result<Nanos, Cia402Error> {
-    pace::nanos(value).ok_or(Cia402Error::Supervision { key, value })
+    timing::nanos(value).ok_or(Cia402Error::Supervision { key, value })
 }
 
 impl ServoDriver for Cia402Driver {
     fn encode(
         &mut self,
         now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
-        let cycle = self.clock.tick(now, wish);
+        let cycle = self.clock.tick(now, drive_target);
         let syncs = self.drives.iter().any(|drive| drive.node.needs_sync());
         if syncs && !self.syncs {
             // A drive that holds may still have latched the last setpoint of the master before: it must not act now.
@@ -346,7 +351,7 @@ impl ServoDriver for Cia402Driver {
             // The position read while configuring is no feedback yet: nothing would tell its age.
             position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
             velocity_rad_s: f64::NAN,
-            held_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
+            hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
             status_word: u32::from(node.status()),
             error_code,
@@ -372,7 +377,7 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn explain(&self, error_code: u32) -> String {
-        trouble::explain(error_code)
+        fault::explain(error_code)
     }
 }
 
@@ -380,8 +385,8 @@ impl ServoDriver for Cia402Driver {
 /// drive was last told; while nobody knows that, nothing is sent, for a drive that listens would go wherever it says.
 fn push_shared(first: &mut Drive, second: &mut Drive, due: bool, out: &mut FrameBatch) {
     let works = [&*first, &*second].map(|drive| drive.control.is_some());
-    let told = (first.node.told(), second.node.told());
-    let carried = match told {
+    let commanded = (first.node.commanded(), second.node.commanded());
+    let carried = match commanded {
         (Some(a), Some(b)) if due && works != [false; 2] => out.push(encode_pair(first.node_id, [a, b])),
         _ => false,
     };
@@ -390,22 +395,28 @@ fn push_shared(first: &mut Drive, second: &mut Drive, due: bool, out: &mut Frame
 
 impl Drive {
     /// Controlword and target in one frame.
-    fn push_own(&mut self, cycle: Cycle, target: Target, turn: bool, out: &mut FrameBatch) {
+    fn push_own(&mut self, cycle: BringUpCycle, target: Target, is_due: bool, out: &mut FrameBatch) {
         let before = self.control;
         let setpoint = self.node.setpoint(cycle, target);
         self.control = setpoint.map(|setpoint| setpoint.control);
-        let urgent = cycle.wish == DriveWish::TorqueOff || self.control != before;
-        self.carried = setpoint.is_some_and(|Setpoint { control, target_counts }| {
-            (turn || urgent) && out.push(encode_rpdo(self.node_id, control, target_counts))
+        let urgent = cycle.drive_target == DriveTarget::TorqueOff || self.control != before;
+        self.carried = setpoint.is_some_and(|DriveSetpoint { control, target_counts }| {
+            (is_due || urgent) && out.push(encode_rpdo(self.node_id, control, target_counts))
         });
     }
 
     /// The controlword of a drive whose target comes in a shared frame. True when the drive is told anything new: then
     /// the target goes with it, so that a drive is never energised with an old one.
-    fn push_control(&mut self, cycle: Cycle, target: Target, repeats: bool, out: &mut FrameBatch) -> bool {
+    fn push_control(
+        &mut self,
+        cycle: BringUpCycle,
+        target: Target,
+        repeats: bool,
+        out: &mut FrameBatch,
+    ) -> bool {
         let before = self.control;
         self.control = self.node.setpoint(cycle, target).map(|setpoint| setpoint.control);
-        let urgent = cycle.wish == DriveWish::TorqueOff || self.control != before;
+        let urgent = cycle.drive_target == DriveTarget::TorqueOff || self.control != before;
         if let Some(control) = self.control
             && (repeats || urgent)
         {

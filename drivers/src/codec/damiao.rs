@@ -4,11 +4,11 @@
 //! position at that moment, so a position is less than one period old when it is seen.
 use crate::bring_up::damiao::{Motor, MotorTarget};
 use crate::bring_up::damiao_plan::MotorPlan;
-use crate::bring_up::pace::{self, Patience, PatientClock};
-use crate::bring_up::trouble;
+use crate::bring_up::fault;
+use crate::bring_up::timing::{self, StepTimer, Timeouts};
 use crate::codec::damiao_frames::{Reply, Request, Wire};
 use crate::frame::{CanFrame, FrameBatch};
-use crate::servo::{DriveWish, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
+use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
 use taustream_arm::{BusKind, Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
@@ -51,12 +51,12 @@ pub enum DamiaoError {
 
 /// How link angles and a motor's angles belong together: the motor states the angle of its output shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Side {
+struct JointMapping {
     sign: f64,
     zero_offset_rad: f64,
 }
 
-impl Side {
+impl JointMapping {
     /// A command on the motor side; `None` when a number of it is none.
     fn motor(self, command: &JointCommand) -> Option<MotorTarget> {
         let target = MotorTarget {
@@ -76,11 +76,11 @@ impl Side {
 
 /// One motor: the joint that it moves, where it is heard, and its newest feedback.
 #[derive(Clone, Debug)]
-struct Joint {
+struct MotorJoint {
     joint: usize,
     node_id: u8,
     feedback_id: u16,
-    side: Side,
+    mapping: JointMapping,
     motor: Motor,
     received: Option<Nanos>,
 }
@@ -88,10 +88,10 @@ struct Joint {
 /// The master of all Damiao motors of one bus.
 #[derive(Clone, Debug)]
 pub struct DamiaoDriver {
-    motors: Vec<Joint>,
+    motors: Vec<MotorJoint>,
     joints: Vec<usize>,
     wire: Wire,
-    clock: PatientClock,
+    clock: StepTimer,
 }
 
 impl DamiaoDriver {
@@ -104,18 +104,18 @@ impl DamiaoDriver {
             return Err(DamiaoError::NoSuchBus { bus, buses: settings.buses.len() });
         };
         let supervision = &settings.supervision;
-        let time = |key, value| pace::nanos(value).ok_or(DamiaoError::Supervision { key, value });
-        let patience = Patience {
+        let time = |key, value| timing::nanos(value).ok_or(DamiaoError::Supervision { key, value });
+        let timeouts = Timeouts {
             step: time("drive_timeout_s", supervision.drive_timeout_s)?,
             feedback: time("feedback_age_s_max", supervision.feedback_age_s_max)?,
         };
         // As with every drive: energising must not start with a step.
         let near_rad = supervision.tracking_error_rad_max.min(supervision.position_jump_rad_max);
         time("tracking_error_rad_max and position_jump_rad_max", near_rad)?;
-        let clock = PatientClock::new(settings.cycle.period_us);
+        let clock = StepTimer::new(settings.cycle.period_us);
         let mut driver = Self { motors: Vec::new(), joints: Vec::new(), wire: wire_of(kind), clock };
         for servo in settings.servos.iter().filter(|servo| servo.bus == bus) {
-            driver.add(settings, servo, patience, near_rad)?;
+            driver.add(settings, servo, timeouts, near_rad)?;
         }
         Ok(driver)
     }
@@ -124,7 +124,7 @@ impl DamiaoDriver {
         &mut self,
         settings: &Settings,
         servo: &Servo,
-        patience: Patience,
+        timeouts: Timeouts,
         near_rad: f64,
     ) -> Result<(), DamiaoError> {
         let Some(damiao) = servo.protocol.as_damiao().copied() else { return Ok(()) };
@@ -138,12 +138,12 @@ impl DamiaoDriver {
             return Err(DamiaoError::NodeId { joint, node_id });
         }
         let plan = MotorPlan { node_id, damiao, speed_rad_s: limits.stop.velocity_rad_s };
-        self.motors.push(Joint {
+        self.motors.push(MotorJoint {
             joint,
             node_id,
             feedback_id: damiao.feedback_id,
-            side: Side { sign: servo.sign, zero_offset_rad: servo.zero_offset_rad },
-            motor: Motor::new(plan, patience, near_rad),
+            mapping: JointMapping { sign: servo.sign, zero_offset_rad: servo.zero_offset_rad },
+            motor: Motor::new(plan, timeouts, near_rad),
             received: None,
         });
         self.joints.push(joint);
@@ -163,13 +163,13 @@ impl ServoDriver for DamiaoDriver {
     fn encode(
         &mut self,
         now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
-        let cycle = self.clock.tick(now, wish);
+        let cycle = self.clock.tick(now, drive_target);
         for joint in &mut self.motors {
-            let target = commands.get(joint.joint).and_then(|command| joint.side.motor(command));
+            let target = commands.get(joint.joint).and_then(|command| joint.mapping.motor(command));
             if let Some(request) = joint.motor.request(cycle, target) {
                 out.push(request.encode(joint.node_id, self.wire));
             }
@@ -204,9 +204,9 @@ impl ServoDriver for DamiaoDriver {
         let (error_code, refused_object) = joint.motor.error();
         ServoStatus {
             state: joint.motor.state(),
-            position_rad: joint.side.link_rad(measured.position_rad),
-            velocity_rad_s: measured.velocity_rad_s * joint.side.sign,
-            held_rad: f64::NAN,
+            position_rad: joint.mapping.link_rad(measured.position_rad),
+            velocity_rad_s: measured.velocity_rad_s * joint.mapping.sign,
+            hold_position_rad: f64::NAN,
             received: joint.received,
             status_word: joint.motor.status_word(),
             error_code,
@@ -238,6 +238,6 @@ impl ServoDriver for DamiaoDriver {
     }
 
     fn explain(&self, error_code: u32) -> String {
-        trouble::explain(error_code)
+        fault::explain(error_code)
     }
 }

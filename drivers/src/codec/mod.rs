@@ -6,12 +6,12 @@ pub mod cia402;
 pub mod cia402_words;
 pub mod damiao;
 pub mod damiao_frames;
+pub mod error_text;
 pub mod mit;
 pub mod object;
 pub mod sdo;
 pub mod sdo_client;
 pub mod setpoint_frames;
-pub mod words;
 
 pub use canopen::{Emcy, Nmt, NmtState, PdoEntry};
 pub use object::Address;

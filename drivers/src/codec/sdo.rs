@@ -166,7 +166,7 @@ pub enum SdoResponse {
         /// As in the request.
         toggle: bool,
     },
-    /// Refused; [`crate::codec::words::sdo_abort`] has the sentence.
+    /// Refused; [`crate::codec::error_text::sdo_abort`] has the sentence.
     Abort(Address, u32),
 }
 

@@ -3,9 +3,9 @@
 //! The client is advanced once a cycle and gives at most one frame a cycle. Nothing that a CSP bring-up writes is
 //! longer than four bytes, so writes are expedited; reads take whatever way the drive chooses.
 //! Source: CiA 301 section 7.2.4.
+use crate::codec::error_text::{ABORT_COMMAND, ABORT_TIMEOUT, ABORT_TOGGLE, ABORT_TOO_LONG};
 use crate::codec::object::Address;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
-use crate::codec::words::{ABORT_COMMAND, ABORT_TIMEOUT, ABORT_TOGGLE, ABORT_TOO_LONG};
 use crate::servo::Nanos;
 
 /// How long one answer may take (can-protocols 1.2).
@@ -87,14 +87,14 @@ pub enum SdoOutcome {
     Value(SdoValue),
     /// The object was written.
     Written,
-    /// The drive, or this client, aborted; [`crate::codec::words::sdo_abort`] has the sentence.
+    /// The drive, or this client, aborted; [`crate::codec::error_text::sdo_abort`] has the sentence.
     Aborted(u32),
     /// No answer to any try.
     TimedOut,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Turn {
+enum TransferState {
     /// A frame is to be sent.
     Ours(SdoRequest),
     /// An answer is awaited.
@@ -109,7 +109,7 @@ enum Turn {
 #[derive(Clone, Copy, Debug)]
 struct Transfer {
     job: SdoJob,
-    turn: Turn,
+    state: TransferState,
     tries: u8,
     /// In a segmented read: the toggle of the segment that is asked for.
     toggle: Option<bool>,
@@ -134,8 +134,8 @@ impl SdoClient {
     /// Answers to the replaced one name another object and are ignored.
     /// Real time: no allocation.
     pub fn begin(&mut self, job: SdoJob) {
-        let turn = Turn::Ours(job.request());
-        self.transfer = Some(Transfer { job, turn, tries: 0, toggle: None, value: SdoValue::EMPTY });
+        let state = TransferState::Ours(job.request());
+        self.transfer = Some(Transfer { job, state, tries: 0, toggle: None, value: SdoValue::EMPTY });
     }
 
     /// Forgets the open transfer.
@@ -148,23 +148,23 @@ impl SdoClient {
     /// Real time: no allocation.
     pub fn poll(&mut self, now: Nanos) -> Option<SdoRequest> {
         let transfer = self.transfer.as_mut()?;
-        if let Turn::Theirs { since } = transfer.turn
+        if let TransferState::Theirs { since } = transfer.state
             && now.0.saturating_sub(since.0) >= SDO_TIMEOUT.0
         {
             transfer.late();
         }
-        match transfer.turn {
-            Turn::Ours(request) => {
+        match transfer.state {
+            TransferState::Ours(request) => {
                 // Only initiating requests count as tries: a long value has many segments.
                 transfer.tries += u8::from(transfer.toggle.is_none());
-                transfer.turn = Turn::Theirs { since: now };
+                transfer.state = TransferState::Theirs { since: now };
                 Some(request)
             }
-            Turn::Closing(request, outcome) => {
-                transfer.turn = Turn::Done(outcome);
+            TransferState::Closing(request, outcome) => {
+                transfer.state = TransferState::Done(outcome);
                 Some(request)
             }
-            Turn::Theirs { .. } | Turn::Done(_) => None,
+            TransferState::Theirs { .. } | TransferState::Done(_) => None,
         }
     }
 
@@ -173,7 +173,7 @@ impl SdoClient {
     /// Real time: no allocation.
     pub fn accept(&mut self, response: SdoResponse) {
         if let Some(transfer) = self.transfer.as_mut()
-            && matches!(transfer.turn, Turn::Theirs { .. })
+            && matches!(transfer.state, TransferState::Theirs { .. })
         {
             transfer.accept(response);
         }
@@ -181,7 +181,9 @@ impl SdoClient {
 
     /// The outcome, once, with its job; the client is idle afterwards.
     pub fn take(&mut self) -> Option<(SdoJob, SdoOutcome)> {
-        let Some(Transfer { job, turn: Turn::Done(outcome), .. }) = self.transfer else { return None };
+        let Some(Transfer { job, state: TransferState::Done(outcome), .. }) = self.transfer else {
+            return None;
+        };
         self.transfer = None;
         Some((job, outcome))
     }
@@ -193,10 +195,10 @@ impl Transfer {
         if self.tries < SDO_TRIES {
             self.toggle = None;
             self.value = SdoValue::EMPTY;
-            self.turn = Turn::Ours(self.job.request());
+            self.state = TransferState::Ours(self.job.request());
         } else {
             let abort = SdoRequest::Abort(self.job.address(), ABORT_TIMEOUT);
-            self.turn = Turn::Closing(abort, SdoOutcome::TimedOut);
+            self.state = TransferState::Closing(abort, SdoOutcome::TimedOut);
         }
     }
 
@@ -204,35 +206,35 @@ impl Transfer {
         let wanted = self.job.address();
         match (response, self.job, self.toggle) {
             (SdoResponse::Abort(address, code), _, _) if address == wanted => {
-                self.turn = Turn::Done(SdoOutcome::Aborted(code));
+                self.state = TransferState::Done(SdoOutcome::Aborted(code));
             }
             (SdoResponse::Written(address), SdoJob::Write(..), _) if address == wanted => {
-                self.turn = Turn::Done(SdoOutcome::Written);
+                self.state = TransferState::Done(SdoOutcome::Written);
             }
             (SdoResponse::Value(address, bytes), SdoJob::Read(_), None) if address == wanted => {
                 self.value = SdoValue { sized: bytes.is_sized(), ..SdoValue::EMPTY };
                 self.value.append(bytes.as_slice());
-                self.turn = Turn::Done(SdoOutcome::Value(self.value));
+                self.state = TransferState::Done(SdoOutcome::Value(self.value));
             }
             (SdoResponse::ValueSegmented(address, size), SdoJob::Read(_), None) if address == wanted => {
                 if size.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > SDO_VALUE_MAX)) {
-                    self.give_up(ABORT_TOO_LONG);
+                    self.abandon(ABORT_TOO_LONG);
                 } else {
-                    self.ask_segment(false);
+                    self.request_segment(false);
                 }
             }
-            (SdoResponse::Segment { toggle, bytes, last }, SdoJob::Read(_), Some(asked)) => {
-                if toggle != asked {
-                    self.give_up(ABORT_TOGGLE);
+            (SdoResponse::Segment { toggle, bytes, last }, SdoJob::Read(_), Some(requested)) => {
+                if toggle != requested {
+                    self.abandon(ABORT_TOGGLE);
                 } else if !self.value.append(bytes.as_slice()) {
-                    self.give_up(ABORT_TOO_LONG);
+                    self.abandon(ABORT_TOO_LONG);
                 } else if last {
-                    self.turn = Turn::Done(SdoOutcome::Value(self.value));
+                    self.state = TransferState::Done(SdoOutcome::Value(self.value));
                 } else if bytes.as_slice().is_empty() {
                     // An empty segment that is not the last would let a drive keep us for ever.
-                    self.give_up(ABORT_COMMAND);
+                    self.abandon(ABORT_COMMAND);
                 } else {
-                    self.ask_segment(!asked);
+                    self.request_segment(!requested);
                 }
             }
             // Answers to a replaced or repeated request, and to nothing we asked.
@@ -240,13 +242,13 @@ impl Transfer {
         }
     }
 
-    fn ask_segment(&mut self, toggle: bool) {
+    fn request_segment(&mut self, toggle: bool) {
         self.toggle = Some(toggle);
-        self.turn = Turn::Ours(SdoRequest::ReadSegment { toggle });
+        self.state = TransferState::Ours(SdoRequest::ReadSegment { toggle });
     }
 
-    fn give_up(&mut self, code: u32) {
+    fn abandon(&mut self, code: u32) {
         let abort = SdoRequest::Abort(self.job.address(), code);
-        self.turn = Turn::Closing(abort, SdoOutcome::Aborted(code));
+        self.state = TransferState::Closing(abort, SdoOutcome::Aborted(code));
     }
 }

@@ -40,13 +40,13 @@ pub fn encode_control(node: u8, control: u16) -> CanFrame {
 
 /// When each group of a bus gets its setpoints.
 #[derive(Clone, Copy, Debug)]
-pub struct Rhythm {
+pub struct SendSchedule {
     every: u64,
     stagger: bool,
     cycle: u64,
 }
 
-impl Rhythm {
+impl SendSchedule {
     /// From the first cycle on.
     #[must_use]
     pub fn new(traffic: Traffic) -> Self {
@@ -62,7 +62,7 @@ impl Rhythm {
 
     /// Whether this cycle carries the setpoints of a group.
     #[must_use]
-    pub fn is_turn(&self, group: usize) -> bool {
+    pub fn is_due(&self, group: usize) -> bool {
         self.phase(group).is_multiple_of(self.every)
     }
 
@@ -71,7 +71,7 @@ impl Rhythm {
     #[must_use]
     pub fn repeats_control(&self, group: usize) -> bool {
         let turn = self.phase(group) / self.every;
-        self.is_turn(group) && (turn + group as u64).is_multiple_of(u64::from(CONTROL_REPEAT_TURNS))
+        self.is_due(group) && (turn + group as u64).is_multiple_of(u64::from(CONTROL_REPEAT_TURNS))
     }
 
     fn phase(&self, group: usize) -> u64 {

@@ -154,21 +154,21 @@ pub(super) fn interface_name(name: &str) -> Option<InterfaceName> {
 /// One `sendmmsg` of at most [`BATCH_MAX`] frames: how many were taken (at least one), or the errno.
 fn send_some(socket: BorrowedFd<'_>, frames: &[CanFrame]) -> Result<usize, i32> {
     let (mut parts, mut headers) = empty_headers();
-    let mut asked: libc::c_uint = 0;
+    let mut requested: libc::c_uint = 0;
     for ((part, header), frame) in parts.iter_mut().zip(headers.iter_mut()).zip(frames) {
         // A send reads through this pointer only, although `iovec` is typed for both directions.
         part.iov_base = (&raw const *frame).cast_mut().cast();
         part.iov_len = frame.wire_size();
         header.msg_hdr.msg_iov = part;
         header.msg_hdr.msg_iovlen = 1;
-        asked += 1;
+        requested += 1;
     }
     // MSG_NOSIGNAL: a local peer that has gone must be an error value, not a SIGPIPE.
     let flags = libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL;
-    // SAFETY: the first `asked` headers each point at one live `iovec` of `parts`, which points at a frame of
+    // SAFETY: the first `requested` headers each point at one live `iovec` of `parts`, which points at a frame of
     // `frames`; `wire_size` is at most the frame's 72 bytes, and a frame has no padding. All three live to the end
     // of this call, and the kernel writes `msg_len` of `headers` only.
-    let taken = unsafe { libc::sendmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), asked, flags) };
+    let taken = unsafe { libc::sendmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), requested, flags) };
     usize::try_from(taken).map_err(|_| errno())
 }
 
@@ -179,21 +179,21 @@ fn receive_some(
     packets: &mut [Packet; BATCH_MAX],
 ) -> Result<usize, i32> {
     let (mut parts, mut headers) = empty_headers();
-    let mut asked: libc::c_uint = 0;
+    let mut requested: libc::c_uint = 0;
     for ((part, header), slot) in parts.iter_mut().zip(headers.iter_mut()).zip(slots) {
         part.iov_base = (&raw mut *slot).cast();
         part.iov_len = FD_SIZE;
         header.msg_hdr.msg_iov = part;
         header.msg_hdr.msg_iovlen = 1;
-        asked += 1;
+        requested += 1;
     }
     // MSG_TRUNC: the true size of a packet that is too long, so that it is not taken for an FD frame.
     let flags = libc::MSG_DONTWAIT | libc::MSG_TRUNC;
-    // SAFETY: each of the `asked` headers points at one live `iovec` of `parts`, which points at a whole slot of 72
+    // SAFETY: each of the `requested` headers points at one live `iovec` of `parts`, which points at a whole slot of 72
     // bytes, exclusively borrowed; any bytes make a valid `CanFrame` (integers without padding). The kernel writes
     // no more than `iov_len` there, and the lengths into `headers`. The null time-out means none.
     let taken = unsafe {
-        libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), asked, flags, std::ptr::null_mut())
+        libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), requested, flags, std::ptr::null_mut())
     };
     let taken = usize::try_from(taken).map_err(|_| errno())?;
     for (packet, header) in packets.iter_mut().zip(&headers).take(taken) {

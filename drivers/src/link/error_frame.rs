@@ -1,7 +1,7 @@
 //! What a CAN controller tells of itself: the error frames of linux/can/error.h.
 //!
 //! The cycle asks only for what changes its course (bus-off, restarted, error-passive) and keeps the rest as numbers;
-//! [`ErrorFrame::sentence`] and [`ErrorFrame::cure`] make words of them elsewhere. Every bit pattern has an answer:
+//! [`ErrorFrame::sentence`] and [`ErrorFrame::remedy`] make words of them elsewhere. Every bit pattern has an answer:
 //! anybody with a raw socket can inject error frames.
 use crate::frame::CanFrame;
 use socketcan::{CanError, CanErrorFrame};
@@ -103,7 +103,7 @@ impl ErrorFrame {
 
     /// What to look at, by the gravest thing that the frame tells. Not for real time.
     #[must_use]
-    pub fn cure(&self) -> &'static str {
+    pub fn remedy(&self) -> &'static str {
         let has = |class: u32| self.class & class != 0;
         if has(BUS_OFF | RESTARTED) || self.is_passive() {
             "see cable, termination at both ends, and that every node has the same bit rate"
@@ -134,7 +134,7 @@ mod tests {
 
     /// Goal: every class that links take, and every state of a controller, has its own words.
     #[test]
-    fn error_frame_of_every_enabled_class_is_told_in_words() {
+    fn error_frame_of_every_enabled_class_has_text() {
         let cases: [(u32, [u8; 8], &[&str]); 15] = [
             (TX_TIMEOUT, [0; 8], &["transmission timeout"]),
             (CONTROLLER, [0, 0x01, 0, 0, 0, 0, 0, 0], &["receive buffer overflow"]),
@@ -188,7 +188,7 @@ mod tests {
             let data = state.to_le_bytes();
             let frame = CanFrame::classic(CanId::from_raw(id), &data[..(round % 9) as usize]);
             let error = ErrorFrame::of(&frame).unwrap();
-            assert!(!error.sentence().is_empty() && !error.cure().is_empty(), "round {round}: {frame:?}");
+            assert!(!error.sentence().is_empty() && !error.remedy().is_empty(), "round {round}: {frame:?}");
             assert!(!error.sentence().contains('\n'));
         }
     }

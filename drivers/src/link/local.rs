@@ -47,11 +47,11 @@ impl Meeting {
         let path = &self.directory;
         let failed = |doing| move |source| OpenError::File { path: path.clone(), doing, source };
         DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(failed("create"))?;
-        let facts = std::fs::symlink_metadata(path).map_err(failed("look at"))?;
-        let mode = facts.mode() & 0o7777;
-        let is_ours = facts.is_dir() && facts.uid() == rustix::process::geteuid().as_raw();
+        let metadata = std::fs::symlink_metadata(path).map_err(failed("look at"))?;
+        let mode = metadata.mode() & 0o7777;
+        let is_ours = metadata.is_dir() && metadata.uid() == rustix::process::geteuid().as_raw();
         if !is_ours || mode & 0o077 != 0 {
-            return Err(OpenError::OpenDirectory { path: path.clone(), uid: facts.uid(), mode });
+            return Err(OpenError::OpenDirectory { path: path.clone(), uid: metadata.uid(), mode });
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use std::os::fd::BorrowedFd;
 mod batch;
 mod controller;
 pub mod error_frame;
-mod facts;
+mod interface_info;
 mod local;
 mod lock;
 pub mod open;

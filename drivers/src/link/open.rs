@@ -1,7 +1,7 @@
 //! Opening a link: which one, whether it may be used, and who else uses it.
 use super::local::{LocalMaster, LocalServos};
 use super::socketcan::{SocketCan, rates_in_words};
-use super::{CanLink, facts};
+use super::{CanLink, interface_info};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -95,12 +95,12 @@ pub enum OpenError {
         interface: String,
     },
     /// The interface does not exist.
-    #[error("interface {interface} does not exist; {cure}")]
+    #[error("interface {interface} does not exist; {remedy}")]
     Missing {
         /// The interface.
         interface: String,
         /// What to do.
-        cure: String,
+        remedy: String,
     },
     /// The interface is down.
     #[error("interface {interface} is down; bring it up: {command}")]
@@ -111,14 +111,14 @@ pub enum OpenError {
         command: String,
     },
     /// The controller is out of order.
-    #[error("the controller of {interface} is {state}; mend cable, termination or bit rate, then: {cure}")]
+    #[error("the controller of {interface} is {state}; mend cable, termination or bit rate, then: {remedy}")]
     Unfit {
         /// The interface.
         interface: String,
         /// Its state.
         state: &'static str,
         /// What to do then.
-        cure: String,
+        remedy: String,
     },
     /// Frames of before the fault have not left yet.
     #[error(
@@ -264,11 +264,11 @@ pub fn open(
 
 /// Decides between SocketCAN and the local link, and says so where it was not asked for by name.
 fn wants_socketcan(bus: &Bus, choice: LinkChoice) -> Result<bool, OpenError> {
-    let has_can = facts::kernel_has_can();
+    let has_can = interface_info::kernel_has_can();
     let interface = &bus.interface;
     match choice {
         LinkChoice::Local => Ok(false),
-        LinkChoice::Auto if has_can && facts::exists(interface) => Ok(true),
+        LinkChoice::Auto if has_can && interface_info::exists(interface) => Ok(true),
         LinkChoice::Auto if bus.kind == BusKind::Virtual => {
             let why = if has_can { "the interface does not exist" } else { "this kernel has no CAN" };
             tracing::warn!("bus {} uses the local link instead of {interface}: {why}", bus.name);

@@ -1,10 +1,10 @@
 //! The kernel's CAN: a raw socket on an interface.
 use super::batch::{self, InterfaceName, Received};
 use super::error_frame::ERROR_CLASSES;
-use super::facts::CanState;
+use super::interface_info::CanState;
 use super::lock::InterfaceLock;
 use super::open::{LinkRole, OpenError};
-use super::{CanLink, LinkFault, Sent, facts};
+use super::{CanLink, LinkFault, Sent, interface_info};
 use crate::frame::{CanFrame, FrameBatch};
 use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_recv_buffer_size_force};
 use socketcan::{CanFdSocket, Socket, SocketOptions};
@@ -121,7 +121,7 @@ impl CanLink for SocketCan {
     fn reopen(&mut self) -> Result<(), OpenError> {
         let interface = &self.bus.interface;
         check(&self.bus)?;
-        check_controller(interface, facts::of(interface)?.state)?;
+        check_controller(interface, interface_info::of(interface)?.state)?;
         if !self.gone {
             let failed =
                 |source| OpenError::System { interface: interface.clone(), doing: "look at", source };
@@ -141,20 +141,20 @@ impl CanLink for SocketCan {
 fn check_controller(interface: &str, state: Option<CanState>) -> Result<(), OpenError> {
     let restart = || format!("ip link set {interface} type can restart");
     let wait = || format!("wait for it, or: ip link set {interface} down && ip link set {interface} up");
-    let (state, cure) = match state {
+    let (state, remedy) = match state {
         Some(CanState::BusOff) => ("bus-off", restart()),
         Some(CanState::ErrorPassive) => ("error-passive", wait()),
         Some(CanState::Stopped | CanState::Sleeping) => ("not started", wait()),
         Some(CanState::ErrorActive | CanState::ErrorWarning) | None => return Ok(()),
     };
-    Err(OpenError::Unfit { interface: interface.to_owned(), state, cure })
+    Err(OpenError::Unfit { interface: interface.to_owned(), state, remedy })
 }
 
 /// Refuses an interface that is absent, down, or not what the settings say.
 fn check(bus: &Bus) -> Result<(), OpenError> {
     let interface = bus.interface.clone();
-    if !facts::exists(&interface) {
-        let cure = match bus.kind {
+    if !interface_info::exists(&interface) {
+        let remedy = match bus.kind {
             BusKind::Virtual => {
                 format!("create it: ip link add dev {interface} type vcan && ip link set {interface} up")
             }
@@ -162,25 +162,25 @@ fn check(bus: &Bus) -> Result<(), OpenError> {
                 "is its adapter plugged in? (list interfaces: ip link show type can)".into()
             }
         };
-        return Err(OpenError::Missing { interface, cure });
+        return Err(OpenError::Missing { interface, remedy });
     }
-    let facts = facts::of(&interface)?;
-    if !facts.is_can {
+    let interface_info = interface_info::of(&interface)?;
+    if !interface_info.is_can {
         return Err(OpenError::NotCan { interface });
     }
     let name = bus.name.clone();
-    let is_vcan = facts.kind.as_deref() == Some("vcan");
+    let is_vcan = interface_info.kind.as_deref() == Some("vcan");
     match bus.kind {
         BusKind::Virtual if !is_vcan => {
-            let kind = facts.kind.unwrap_or_default();
+            let kind = interface_info.kind.unwrap_or_default();
             return Err(OpenError::NotVirtual { bus: name, interface, kind });
         }
         BusKind::Virtual | BusKind::Classic { .. } | BusKind::Fd { .. } => {}
     }
-    if !facts.is_up {
+    if !interface_info.is_up {
         return Err(OpenError::Down { command: up_command(bus), interface });
     }
-    match (bus.kind.bitrate_bit_s(), facts.bitrate_bit_s) {
+    match (bus.kind.bitrate_bit_s(), interface_info.bitrate_bit_s) {
         (Some(declared_bit_s), Some(actual_bit_s)) if declared_bit_s != actual_bit_s => {
             let command = up_command(bus);
             Err(OpenError::OtherBitRate { bus: name, interface, declared_bit_s, actual_bit_s, command })
@@ -191,7 +191,8 @@ fn check(bus: &Bus) -> Result<(), OpenError> {
 
 /// A vcan carries whatever it is given: that a declared bit rate is only modelled must not come as a surprise.
 fn say_what_is_modelled(bus: &Bus, role: LinkRole) {
-    let is_vcan = facts::of(&bus.interface).is_ok_and(|facts| facts.kind.as_deref() == Some("vcan"));
+    let is_vcan = interface_info::of(&bus.interface)
+        .is_ok_and(|interface_info| interface_info.kind.as_deref() == Some("vcan"));
     if let (true, Some(words)) = (is_vcan, rates_in_words(bus.kind)) {
         let interface = &bus.interface;
         match role {
@@ -249,16 +250,16 @@ mod tests {
     /// Goal: a controller that is off the bus, or about to leave it, is not taken for a bus that carries setpoints, and
     /// each refusal names the command that helps. No vcan has such a state, so the kernel's answers are given here.
     #[test]
-    fn controller_out_of_order_is_refused_with_the_cure() {
+    fn faulty_controller_is_refused_with_the_remedy() {
         let said = |state| check_controller("can3", state).map_err(|refusal| refusal.to_string());
-        for (state, word, cure) in [
+        for (state, word, remedy) in [
             (CanState::BusOff, "bus-off", "ip link set can3 type can restart"),
             (CanState::ErrorPassive, "error-passive", "ip link set can3 down && ip link set can3 up"),
             (CanState::Stopped, "not started", "ip link set can3 down && ip link set can3 up"),
             (CanState::Sleeping, "not started", "ip link set can3 down && ip link set can3 up"),
         ] {
             let text = said(Some(state)).expect_err("refused");
-            assert!(text.contains("can3") && text.contains(word) && text.contains(cure), "{text}");
+            assert!(text.contains("can3") && text.contains(word) && text.contains(remedy), "{text}");
         }
         for state in [Some(CanState::ErrorActive), Some(CanState::ErrorWarning), None] {
             assert_eq!(said(state), Ok(()));

@@ -171,14 +171,14 @@ impl Controller {
 
         let gain_nm_s = plant.inertia_kg_m2 * loops.velocity_bandwidth_rad_s;
         let error_nm = gain_nm_s * (wanted_rad_s - velocity_rad_s);
-        let asked_nm = error_nm + self.integral_nm + self.offsets.torque_nm;
-        let given_nm = asked_nm.clamp(-plant.torque_nm_max, plant.torque_nm_max);
+        let requested_nm = error_nm + self.integral_nm + self.offsets.torque_nm;
+        let limited_nm = requested_nm.clamp(-plant.torque_nm_max, plant.torque_nm_max);
         // A saturated integrator stands still unless the error unwinds it.
-        let over_nm = asked_nm - given_nm;
+        let over_nm = requested_nm - limited_nm;
         if over_nm * error_nm <= 0.0 {
             self.integral_nm += error_nm * dt_s / loops.integral_time_s;
         }
-        self.torque_nm += dt_s / (loops.torque_lag_s + dt_s) * (given_nm - self.torque_nm);
+        self.torque_nm += dt_s / (loops.torque_lag_s + dt_s) * (limited_nm - self.torque_nm);
         self.torque_nm
     }
 

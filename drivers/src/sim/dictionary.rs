@@ -4,7 +4,7 @@
 //! Source: CiA 301 section 7.2.4.3.17 (abort codes).
 use super::objects::{Access, Kind, Spec, objects};
 use crate::codec::Address;
-use crate::codec::words;
+use crate::codec::error_text;
 
 /// Longest value in bytes: text.
 pub(crate) const VALUE_MAX: usize = 64;
@@ -90,9 +90,9 @@ impl Dictionary {
         match self.find(address).and_then(|at| self.specs.get(at)) {
             Some(spec) => Ok(spec),
             None if self.specs.iter().any(|spec| spec.index == address.index) => {
-                Err(words::ABORT_NO_SUBINDEX)
+                Err(error_text::ABORT_NO_SUBINDEX)
             }
-            None => Err(words::ABORT_NO_OBJECT),
+            None => Err(error_text::ABORT_NO_OBJECT),
         }
     }
 
@@ -100,7 +100,7 @@ impl Dictionary {
     pub(crate) fn read(&self, address: Address) -> Result<Bytes, AbortCode> {
         let spec = self.spec(address)?;
         if spec.access == Access::WriteOnly {
-            return Err(words::ABORT_WRITE_ONLY);
+            return Err(error_text::ABORT_WRITE_ONLY);
         }
         let mut out = Bytes::new();
         if let Kind::Text(text) = spec.kind {
@@ -118,20 +118,20 @@ impl Dictionary {
     pub(crate) fn check_write(&self, address: Address, bytes: &[u8], sized: bool) -> Result<i64, AbortCode> {
         let spec = self.spec(address)?;
         if spec.access == Access::ReadOnly {
-            return Err(words::ABORT_READ_ONLY);
+            return Err(error_text::ABORT_READ_ONLY);
         }
         let size = usize::from(spec.kind.bits() / 8);
-        let value = bytes.get(..size).ok_or(words::ABORT_TOO_SHORT)?;
+        let value = bytes.get(..size).ok_or(error_text::ABORT_TOO_SHORT)?;
         if sized && bytes.len() > size {
-            return Err(words::ABORT_TOO_LONG);
+            return Err(error_text::ABORT_TOO_LONG);
         }
         let value = number(value, spec.kind);
         if !spec.choices.is_empty() && !spec.choices.contains(&value) {
-            return Err(words::ABORT_RANGE);
+            return Err(error_text::ABORT_RANGE);
         }
         match value {
-            low if low < spec.low => Err(words::ABORT_TOO_LOW),
-            high if high > spec.high => Err(words::ABORT_TOO_HIGH),
+            low if low < spec.low => Err(error_text::ABORT_TOO_LOW),
+            high if high > spec.high => Err(error_text::ABORT_TOO_HIGH),
             _ => Ok(value),
         }
     }

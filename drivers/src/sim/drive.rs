@@ -15,7 +15,7 @@ use super::plant::PlantParameters;
 use super::power::{Power, PowerState};
 use super::sdo_server::SdoServer;
 use crate::codec::canopen::{NmtCommand, decode_sync};
-use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, words};
+use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, error_text};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use taustream_arm::Reaction;
@@ -164,12 +164,12 @@ impl Drive {
         }
         if let Some(command) = NmtFrame::decode(frame) {
             if command.node == 0 || command.node == self.parameters.node_id {
-                self.obey(command.command, out);
+                self.apply(command.command, out);
             }
             return;
         }
         if let Some((node, _)) = NmtState::decode(frame) {
-            self.consumers.heard(now, node);
+            self.consumers.received(now, node);
             return;
         }
         self.converse(now, frame, out);
@@ -227,7 +227,7 @@ impl Drive {
     }
 
     /// NMT commands, with the drive's reaction to losing its master (0x6007).
-    fn obey(&mut self, command: NmtCommand, out: &mut Vec<CanFrame>) {
+    fn apply(&mut self, command: NmtCommand, out: &mut Vec<CanFrame>) {
         let was_operational = self.nmt.state() == NmtState::Operational;
         match command {
             NmtCommand::Start => {
@@ -305,7 +305,7 @@ impl Drive {
                 self.pdos.apply_now(n, |address, value| dictionary.take(address, value));
                 self.commanded(now, out);
             }
-            Received::TooShort(true) => self.report(words::EMCY_PDO_LENGTH, out),
+            Received::TooShort(true) => self.report(error_text::EMCY_PDO_LENGTH, out),
         }
     }
 

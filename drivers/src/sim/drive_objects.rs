@@ -7,7 +7,7 @@ use super::pdo::{self, Pdos};
 use super::power::PowerState;
 use super::sdo_server::Objects;
 use crate::codec::object::{RPDO_COMMUNICATION, TPDO_MAPPING};
-use crate::codec::{Address, words};
+use crate::codec::{Address, error_text};
 use crate::frame::CanFrame;
 use std::f64::consts::TAU;
 
@@ -30,7 +30,7 @@ impl Objects for Session<'_> {
         let value = self.drive.dictionary.read(address)?;
         if address.index == 0x1003 && address.sub > self.drive.errors.count() {
             // CiA 301, 0x1003: the subindex exists, but nothing has been entered there.
-            return Err(words::ABORT_NO_DATA);
+            return Err(error_text::ABORT_NO_DATA);
         }
         Ok(value)
     }
@@ -43,7 +43,7 @@ impl Objects for Session<'_> {
         }
         pdo::check_write(&drive.dictionary, address, value)?;
         if !drive.parameters.dummy_mapping && pdo::maps_dummy(address, value) {
-            return Err(words::ABORT_NOT_MAPPABLE);
+            return Err(error_text::ABORT_NOT_MAPPABLE);
         }
         drive.check_write(address, value)?;
         if !matches!(address.index, 0x1003 | 0x1010 | 0x1011 | 0x2002) {
@@ -154,16 +154,18 @@ impl Drive {
     fn check_write(&self, address: Address, value: i64) -> Result<(), AbortCode> {
         let energised = self.power.is_energised();
         match address.index {
-            0x1010 if value != SAVE => Err(words::ABORT_STORE),
-            0x1011 if value != LOAD => Err(words::ABORT_STORE),
-            0x1010 | 0x1011 if energised => Err(words::ABORT_DEVICE_STATE),
+            0x1010 if value != SAVE => Err(error_text::ABORT_STORE),
+            0x1011 if value != LOAD => Err(error_text::ABORT_STORE),
+            0x1010 | 0x1011 if energised => Err(error_text::ABORT_DEVICE_STATE),
             // CiA 301: one node may be watched by one entry only.
-            0x1016 if self.watched_elsewhere(address.sub, value) => Err(words::ABORT_INCOMPATIBLE),
+            0x1016 if self.watched_elsewhere(address.sub, value) => Err(error_text::ABORT_INCOMPATIBLE),
             // CiA 301: 1 is reserved, and the counter changes only while the SYNC period is 0.
-            0x1019 if value == 1 => Err(words::ABORT_RANGE),
-            0x1019 if self.dictionary.get(0x1006, 0) != 0 => Err(words::ABORT_DEVICE_STATE),
+            0x1019 if value == 1 => Err(error_text::ABORT_RANGE),
+            0x1019 if self.dictionary.get(0x1006, 0) != 0 => Err(error_text::ABORT_DEVICE_STATE),
             // Changing the mode of a moving motor would take its setpoint away.
-            0x6060 if energised && value != self.dictionary.get(0x6060, 0) => Err(words::ABORT_DEVICE_STATE),
+            0x6060 if energised && value != self.dictionary.get(0x6060, 0) => {
+                Err(error_text::ABORT_DEVICE_STATE)
+            }
             _ => Ok(()),
         }
     }

@@ -54,7 +54,7 @@ pub enum After {
 
 /// One fault that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultOrder {
+pub struct FaultRequest {
     /// Joint, base to tip, from 0.
     pub joint: usize,
     /// What goes wrong.
@@ -69,9 +69,9 @@ pub struct FaultOrder {
 
 /// A line of the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
+pub enum SimulatorCommand {
     /// A fault.
-    Fault(FaultOrder),
+    Fault(FaultRequest),
     /// The end of all faults, or of one joint's.
     Clear(Option<usize>),
     /// Where the joints truly are.
@@ -80,7 +80,7 @@ pub enum Order {
 
 /// Why an order was not understood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum OrderError {
+pub enum FaultRequestError {
     /// The first word of a line is none of the known ones.
     #[error("unknown order {0:?}: expected fault SPEC, clear, clear joint=NAME, or status")]
     Word(String),
@@ -121,23 +121,23 @@ pub enum OrderError {
     },
 }
 
-impl Order {
+impl SimulatorCommand {
     /// Reads a line of the standard input; `joints` are the names, base to tip.
     ///
     /// # Errors
     /// What was not understood, and what was expected.
-    pub fn parse(line: &str, joints: &[String]) -> Result<Self, OrderError> {
+    pub fn parse(line: &str, joints: &[String]) -> Result<Self, FaultRequestError> {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         match (word, rest.trim()) {
-            ("fault", spec) => Ok(Self::Fault(FaultOrder::parse(spec, joints)?)),
+            ("fault", spec) => Ok(Self::Fault(FaultRequest::parse(spec, joints)?)),
             ("clear", "") => Ok(Self::Clear(None)),
             ("clear", rest) => match rest.split_once('=') {
                 Some(("joint", name)) => Ok(Self::Clear(Some(joint(name, joints)?))),
-                _ => Err(OrderError::Word(line.to_owned())),
+                _ => Err(FaultRequestError::Word(line.to_owned())),
             },
             ("status", "") => Ok(Self::Status),
-            _ => Err(OrderError::Word(line.to_owned())),
+            _ => Err(FaultRequestError::Word(line.to_owned())),
         }
     }
 }
@@ -147,16 +147,17 @@ impl Order {
 struct Pieces<'a>(Vec<(&'a str, &'a str)>);
 
 impl<'a> Pieces<'a> {
-    fn split(text: &'a str) -> Result<Self, OrderError> {
+    fn split(text: &'a str) -> Result<Self, FaultRequestError> {
         const KEYS: [&str; 6] = ["joint", "kind", "at_s", "after", "for_s", "value"];
         let mut pieces = Self::default();
         for piece in text.split(',').map(str::trim) {
-            let (key, value) = piece.split_once('=').ok_or_else(|| OrderError::Key(piece.to_owned()))?;
+            let (key, value) =
+                piece.split_once('=').ok_or_else(|| FaultRequestError::Key(piece.to_owned()))?;
             if !KEYS.contains(&key) {
-                return Err(OrderError::Key(piece.to_owned()));
+                return Err(FaultRequestError::Key(piece.to_owned()));
             }
             if pieces.get(key).is_some() {
-                return Err(OrderError::Twice(key.to_owned()));
+                return Err(FaultRequestError::Twice(key.to_owned()));
             }
             pieces.0.push((key, value));
         }
@@ -167,29 +168,27 @@ impl<'a> Pieces<'a> {
         self.0.iter().find(|(name, _)| *name == key).map(|(_, value)| *value)
     }
 
-    fn need(&self, key: &'static str) -> Result<&'a str, OrderError> {
-        self.get(key).ok_or(OrderError::Missing(key))
+    fn need(&self, key: &'static str) -> Result<&'a str, FaultRequestError> {
+        self.get(key).ok_or(FaultRequestError::Missing(key))
     }
 
     /// A number from `low` to `high`, or `default` when the key is not there.
-    fn number(&self, key: &'static str, default: f64, fits: &Fits) -> Result<f64, OrderError> {
+    fn number(&self, key: &'static str, default: f64, fits: &Fits) -> Result<f64, FaultRequestError> {
         let Some(text) = self.get(key) else { return Ok(default) };
         let number = text.parse::<f64>().ok();
-        number.filter(|number| (fits.low..=fits.high).contains(number)).ok_or_else(|| OrderError::Number {
-            key,
-            given: text.to_owned(),
-            expected: fits.words,
-        })
+        number
+            .filter(|number| (fits.low..=fits.high).contains(number))
+            .ok_or_else(|| FaultRequestError::Number { key, given: text.to_owned(), expected: fits.words })
     }
 
     /// A code, decimal or after 0x.
-    fn code(&self, default: u32, high: u32, words: &'static str) -> Result<u32, OrderError> {
+    fn code(&self, default: u32, high: u32, words: &'static str) -> Result<u32, FaultRequestError> {
         let Some(text) = self.get("value") else { return Ok(default) };
         let code = match text.strip_prefix("0x") {
             Some(digits) => u32::from_str_radix(digits, 16).ok(),
             None => text.parse().ok(),
         };
-        let wrong = || OrderError::Number { key: "value", given: text.to_owned(), expected: words };
+        let wrong = || FaultRequestError::Number { key: "value", given: text.to_owned(), expected: words };
         code.filter(|code| (1..=high).contains(code)).ok_or_else(wrong)
     }
 }
@@ -204,18 +203,18 @@ struct Fits {
 /// A day is long enough for any test, and keeps nanoseconds far from overflow.
 const TIME: Fits = Fits { low: 0.0, high: 86_400.0, words: "seconds from 0 to 86400" };
 
-impl FaultOrder {
+impl FaultRequest {
     /// Reads a fault; `joints` are the names, base to tip.
     ///
     /// # Errors
     /// What was not understood, and what was expected.
-    pub fn parse(text: &str, joints: &[String]) -> Result<Self, OrderError> {
+    pub fn parse(text: &str, joints: &[String]) -> Result<Self, FaultRequestError> {
         let pieces = Pieces::split(text)?;
         let after = match pieces.get("after") {
             None | Some("start") => After::Start,
             Some("enable") => After::Enable,
             Some("moving") => After::Moving,
-            Some(other) => return Err(OrderError::After(other.to_owned())),
+            Some(other) => return Err(FaultRequestError::After(other.to_owned())),
         };
         let for_s = match pieces.get("for_s") {
             None => None,
@@ -231,7 +230,7 @@ impl FaultOrder {
     }
 }
 
-fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, OrderError> {
+fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, FaultRequestError> {
     const DELAY: Fits = Fits { low: 0.0, high: 10_000.0, words: "milliseconds from 0 to 10000" };
     const CHANCE: Fits = Fits { low: 0.0, high: 1.0, words: "a probability from 0 to 1" };
     const ANGLE: Fits = Fits { low: -100.0, high: 100.0, words: "radians from -100 to 100" };
@@ -250,12 +249,12 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, OrderError> {
         "warning" => FaultKind::Warning,
         "refuse" => FaultKind::Refuse { code: pieces.code(0x0800_0000, u32::MAX, ABORT)? },
         "restart" => FaultKind::Restart,
-        other => return Err(OrderError::Kind(other.to_owned())),
+        other => return Err(FaultRequestError::Kind(other.to_owned())),
     };
     let takes_value =
         !matches!(kind, FaultKind::Silence | FaultKind::Stuck | FaultKind::Warning | FaultKind::Restart);
     match pieces.get("value") {
-        Some(given) if !takes_value => Err(OrderError::Number {
+        Some(given) if !takes_value => Err(FaultRequestError::Number {
             key: "value",
             given: given.to_owned(),
             expected: "no value for this kind",
@@ -265,13 +264,13 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, OrderError> {
 }
 
 /// A joint by name, or by number from 1.
-fn joint(given: &str, names: &[String]) -> Result<usize, OrderError> {
+fn joint(given: &str, names: &[String]) -> Result<usize, FaultRequestError> {
     let by_number = given.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
     names
         .iter()
         .position(|name| name == given)
         .or(by_number.filter(|at| *at < names.len()))
-        .ok_or_else(|| OrderError::Joint { given: given.to_owned(), names: names.to_vec() })
+        .ok_or_else(|| FaultRequestError::Joint { given: given.to_owned(), names: names.to_vec() })
 }
 
 impl fmt::Display for FaultKind {

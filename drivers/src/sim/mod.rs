@@ -1,7 +1,7 @@
 //! Simulated servos, with a motor and gravity, behind a real link: CiA 402 drives with an object dictionary, and Damiao
 //! motors with their registers.
 //!
-//! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`Rig`] the servos of an arm with faults on request, [`serve`] runs
+//! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`ServoSimulator`] the servos of an arm with faults on request, [`serve`] runs
 //! a rig on links. All but the last are pure: frames and time in, frames out.
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; a bus with a bit rate knows no
@@ -15,6 +15,7 @@ mod drive;
 mod drive_motion;
 mod drive_objects;
 pub mod faults;
+mod linked;
 mod mechanics;
 mod motor;
 mod motor_registers;
@@ -24,22 +25,21 @@ mod pdo;
 mod plant;
 mod power;
 pub mod priority;
-pub mod rig;
 mod sdo_server;
 pub mod serve;
 mod servo;
 pub mod settings;
+pub mod simulator;
 pub mod wire;
-mod wired;
 
 pub use controller::LoopParameters;
 pub use disturbance::Disturbance;
 pub use drive::{Drive, DriveParameters};
-pub use faults::{FaultOrder, Order};
+pub use faults::{FaultRequest, SimulatorCommand};
+pub use linked::LinkedSimulator;
 pub use motor::{Motor, MotorParameters};
 pub use plant::PlantParameters;
 pub use power::PowerState;
-pub use rig::Rig;
 pub use servo::{ServoParameters, SimulatedServo};
-pub use wire::{Wire, WireFacts};
-pub use wired::WiredRig;
+pub use simulator::ServoSimulator;
+pub use wire::{Wire, WireCounters};

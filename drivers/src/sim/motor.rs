@@ -73,7 +73,7 @@ pub struct Motor {
     mechanics: Mechanics,
     controller: Controller,
     /// The newest MIT command, motor side.
-    told: MitCommand,
+    commanded: MitCommand,
     /// The largest speed of the newest `POS_VEL` command.
     speed_rad_s: f64,
     status: u8,
@@ -96,7 +96,7 @@ impl Motor {
             registers: Registers::new(&parameters),
             mechanics: Mechanics::new(parameters.plant, parameters.start_rad, parameters.step_ns),
             controller: Controller::new(parameters.loops),
-            told: MitCommand::default(),
+            commanded: MitCommand::default(),
             speed_rad_s: 0.0,
             status: STATUS_DISABLED,
             torque_nm: 0.0,
@@ -120,7 +120,7 @@ impl Motor {
             self.let_go(STATUS_LOST_COMMUNICATION);
         }
         let every_s = f64::from(self.parameters.continuous_ms) * 1e-3;
-        if every_s > 0.0 && self.hears() && now.since_s(self.sent) >= every_s {
+        if every_s > 0.0 && self.receives() && now.since_s(self.sent) >= every_s {
             out.push(self.feedback());
         }
     }
@@ -132,7 +132,7 @@ impl Motor {
         }
         // A classic controller would not even acknowledge an FD frame.
         let foreign = frame.is_fd() && self.parameters.wire == Wire::Classic;
-        let request = Request::decode(frame, self.parameters.node_id).filter(|_| self.hears() && !foreign);
+        let request = Request::decode(frame, self.parameters.node_id).filter(|_| self.receives() && !foreign);
         let answer = match request {
             None => None,
             Some(Request::Special(special, mode)) => self.special(special, mode),
@@ -172,7 +172,7 @@ impl Motor {
             Disturbance::Restart => {
                 self.let_go(STATUS_DISABLED);
                 self.registers.restart();
-                self.told = MitCommand::default();
+                self.commanded = MitCommand::default();
                 self.powered = Some(self.now);
             }
         }
@@ -205,7 +205,7 @@ impl Motor {
     }
 
     /// It has started up.
-    fn hears(&self) -> bool {
+    fn receives(&self) -> bool {
         self.powered.is_some_and(|powered| self.now.since_s(powered) >= self.parameters.boot_s)
     }
 
@@ -245,7 +245,7 @@ impl Motor {
             return None;
         }
         self.fed = self.now;
-        self.told = MitCommand::decode(bytes, &self.ranges());
+        self.commanded = MitCommand::decode(bytes, &self.ranges());
         Some(self.feedback())
     }
 
@@ -290,7 +290,7 @@ impl Motor {
 
     /// The torque at the link of `kp (p - q) + kd (v - w) + t`, taken at the end of the step: stable for any gains.
     fn spring_nm(&self, dt_s: f64) -> f64 {
-        let command = &self.told;
+        let command = &self.commanded;
         let sign = self.parameters.sign;
         let (kp, kd) = (command.stiffness_nm_rad, command.damping_nm_s_rad);
         let (q_rad, w_rad_s) = (self.motor_rad(0.0), self.mechanics.plant.velocity_rad_s * sign);

@@ -31,7 +31,7 @@ impl Consumers {
     }
 
     /// Notes a heartbeat.
-    pub(crate) fn heard(&mut self, now: Nanos, node: u8) {
+    pub(crate) fn received(&mut self, now: Nanos, node: u8) {
         for consumer in self.0.iter_mut().filter(|consumer| consumer.node == node && consumer.limit_s > 0.0) {
             consumer.newest = Some(now);
         }

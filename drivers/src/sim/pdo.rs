@@ -7,7 +7,7 @@ use crate::codec::object::{
     PDO_COB_ID, PDO_EVENT_TIMER, PDO_INHIBIT, PDO_SYNC_START, PDO_TYPE, RPDO_COMMUNICATION, RPDO_MAPPING,
     TPDO_COMMUNICATION, TPDO_MAPPING,
 };
-use crate::codec::{Address, PdoEntry, words};
+use crate::codec::{Address, PdoEntry, error_text};
 use crate::frame::{CanFrame, CanId};
 use crate::servo::Nanos;
 
@@ -218,12 +218,12 @@ pub(crate) fn check_write(dictionary: &Dictionary, address: Address, value: i64)
     let exists = cob_id & INVALID == 0;
     match (mapping, address.sub) {
         (false, PDO_COB_ID) => check_cob_id(cob_id, value),
-        (false, PDO_TYPE) if (241..=253).contains(&value) => Err(words::ABORT_RANGE),
+        (false, PDO_TYPE) if (241..=253).contains(&value) => Err(error_text::ABORT_RANGE),
         (false, PDO_TYPE | PDO_EVENT_TIMER) => Ok(()),
-        (_, _) if exists => Err(words::ABORT_DEVICE_STATE),
+        (_, _) if exists => Err(error_text::ABORT_DEVICE_STATE),
         (false, _) => Ok(()),
         (true, 0) => check_count(dictionary, address.index, transmit, value),
-        (true, _) if dictionary.get(address.index, 0) != 0 => Err(words::ABORT_ACCESS),
+        (true, _) if dictionary.get(address.index, 0) != 0 => Err(error_text::ABORT_ACCESS),
         (true, _) => slot(dictionary, value, transmit).map(|_| ()),
     }
 }
@@ -242,12 +242,12 @@ fn check_cob_id(old: i64, new: i64) -> Result<(), AbortCode> {
     const IDENTIFIER: i64 = 0x1FFF_FFFF;
     let id = new & IDENTIFIER;
     if old & INVALID == 0 && new & INVALID == 0 && id != old & IDENTIFIER {
-        return Err(words::ABORT_DEVICE_STATE);
+        return Err(error_text::ABORT_DEVICE_STATE);
     }
     let extended = new & 0x2000_0000 != 0;
     // CiA 301 table 42: NMT, SYNC, EMCY, TIME, SDO and heartbeat identifiers are not for PDOs.
     let restricted = matches!(id, 0x000..=0x0FF | 0x100..=0x180 | 0x580..=0x5FF | 0x600..=0x67F | 0x6E0..);
-    if new & INVALID == 0 && (extended || restricted) { Err(words::ABORT_RANGE) } else { Ok(()) }
+    if new & INVALID == 0 && (extended || restricted) { Err(error_text::ABORT_RANGE) } else { Ok(()) }
 }
 
 /// A mapping becomes valid when all its entries are, and fit a frame.
@@ -256,12 +256,12 @@ fn check_count(dictionary: &Dictionary, index: u16, transmit: bool, count: i64) 
     for sub in (1..=MAPPED_MAX).take_while(|sub| i64::from(*sub) <= count) {
         bits += u32::from(slot(dictionary, dictionary.get(index, sub), transmit)?.kind.bits());
     }
-    if bits > FRAME_BITS { Err(words::ABORT_PDO_LENGTH) } else { Ok(()) }
+    if bits > FRAME_BITS { Err(error_text::ABORT_PDO_LENGTH) } else { Ok(()) }
 }
 
 /// The object that a mapping entry names, when a PDO of this direction may carry it in this width.
 fn slot(dictionary: &Dictionary, entry: i64, transmit: bool) -> Result<Slot, AbortCode> {
-    let entry = PdoEntry::decode(u32::try_from(entry).map_err(|_| words::ABORT_NOT_MAPPABLE)?);
+    let entry = PdoEntry::decode(u32::try_from(entry).map_err(|_| error_text::ABORT_NOT_MAPPABLE)?);
     let dummy = match (entry.address.index, entry.address.sub) {
         (0x0005, 0) => Some(Kind::U8),
         (0x0006, 0) => Some(Kind::U16),
@@ -275,7 +275,7 @@ fn slot(dictionary: &Dictionary, entry: i64, transmit: bool) -> Result<Slot, Abo
         (spec.kind, if transmit { spec.in_tpdo } else { spec.in_rpdo })
     };
     if !allowed || kind.bits() != entry.bits {
-        return Err(words::ABORT_NOT_MAPPABLE);
+        return Err(error_text::ABORT_NOT_MAPPABLE);
     }
     Ok(Slot { address: entry.address, kind, dummy: dummy.is_some() })
 }

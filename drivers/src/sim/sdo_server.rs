@@ -4,7 +4,7 @@
 //! Source: CiA 301 section 7.2.4.
 use super::dictionary::{AbortCode, Bytes};
 use crate::codec::canopen::{COB_SDO_REQUEST, node_of};
-use crate::codec::{Address, SdoBytes, SdoRequest, SdoResponse, SegmentBytes, words};
+use crate::codec::{Address, SdoBytes, SdoRequest, SdoResponse, SegmentBytes, error_text};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 
@@ -69,7 +69,7 @@ impl SdoServer {
                 [_, low, high, sub, ..] => Address::new(u16::from_le_bytes([low, high]), sub),
                 _ => Address::new(0, 0),
             };
-            return Some(SdoResponse::Abort(address, words::ABORT_COMMAND));
+            return Some(SdoResponse::Abort(address, error_text::ABORT_COMMAND));
         };
         self.respond(now, request, objects)
     }
@@ -80,7 +80,7 @@ impl SdoServer {
         let read = self.upload.take_if(|upload| late(upload.newest)).map(|upload| upload.address);
         let written =
             self.download.take_if(|download| late(download.newest)).map(|download| download.address);
-        Some(SdoResponse::Abort(read.or(written)?, words::ABORT_TIMEOUT))
+        Some(SdoResponse::Abort(read.or(written)?, error_text::ABORT_TIMEOUT))
     }
 
     /// Forgets the transfer in flight.
@@ -138,11 +138,13 @@ impl SdoServer {
         objects: &mut impl Objects,
     ) -> SdoResponse {
         // An object that is not there is refused at once; all else is judged by the whole value.
-        if let Err(code @ (words::ABORT_NO_OBJECT | words::ABORT_NO_SUBINDEX)) = objects.read(address) {
+        if let Err(code @ (error_text::ABORT_NO_OBJECT | error_text::ABORT_NO_SUBINDEX)) =
+            objects.read(address)
+        {
             return SdoResponse::Abort(address, code);
         }
         if size.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > WRITTEN_MAX)) {
-            return SdoResponse::Abort(address, words::ABORT_TOO_LONG);
+            return SdoResponse::Abort(address, error_text::ABORT_TOO_LONG);
         }
         self.download = Some(Download { address, bytes: Bytes::new(), size, toggle: false, newest: now });
         SdoResponse::Written(address)
@@ -156,14 +158,14 @@ impl SdoServer {
     ) -> SdoResponse {
         let (toggle, bytes, last) = segment;
         let Some(mut download) = self.download.take() else {
-            return SdoResponse::Abort(Address::new(0, 0), words::ABORT_COMMAND);
+            return SdoResponse::Abort(Address::new(0, 0), error_text::ABORT_COMMAND);
         };
         let address = download.address;
         if toggle != download.toggle {
-            return SdoResponse::Abort(address, words::ABORT_TOGGLE);
+            return SdoResponse::Abort(address, error_text::ABORT_TOGGLE);
         }
         if !download.bytes.extend(bytes.as_slice()) || download.bytes.as_slice().len() > WRITTEN_MAX {
-            return SdoResponse::Abort(address, words::ABORT_TOO_LONG);
+            return SdoResponse::Abort(address, error_text::ABORT_TOO_LONG);
         }
         if !last {
             (download.toggle, download.newest) = (!toggle, now);
@@ -172,7 +174,7 @@ impl SdoServer {
         }
         let value = download.bytes.as_slice();
         if download.size.is_some_and(|size| usize::try_from(size) != Ok(value.len())) {
-            return SdoResponse::Abort(address, words::ABORT_LENGTH);
+            return SdoResponse::Abort(address, error_text::ABORT_LENGTH);
         }
         match objects.write(address, value, true) {
             Ok(()) => SdoResponse::SegmentWritten { toggle },
@@ -182,10 +184,10 @@ impl SdoServer {
 
     fn next_segment(&mut self, now: Nanos, toggle: bool) -> SdoResponse {
         let Some(mut upload) = self.upload.take() else {
-            return SdoResponse::Abort(Address::new(0, 0), words::ABORT_COMMAND);
+            return SdoResponse::Abort(Address::new(0, 0), error_text::ABORT_COMMAND);
         };
         if toggle != upload.toggle {
-            return SdoResponse::Abort(upload.address, words::ABORT_TOGGLE);
+            return SdoResponse::Abort(upload.address, error_text::ABORT_TOGGLE);
         }
         let rest = upload.value.as_slice().get(upload.sent..).unwrap_or(&[]);
         let bytes = SegmentBytes::from_slice(rest);

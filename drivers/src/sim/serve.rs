@@ -2,8 +2,8 @@
 //!
 //! System calls are what a simulator costs on a slow machine, so there are no others in a cycle but one look at the
 //! clock. Orders come as lines on the standard input; answers and faults that begin or end go to the standard output.
-use super::faults::Order;
-use super::wired::WiredRig;
+use super::faults::SimulatorCommand;
+use super::linked::LinkedSimulator;
 use crate::frame::{BATCH_MAX, CanFrame, FrameBatch};
 use crate::link::{CanLink, LinkFault};
 use crate::servo::Nanos;
@@ -41,14 +41,14 @@ struct Port {
     retried: Instant,
     /// Frames that the link did not take.
     lost: u64,
-    told: u64,
+    reported: u64,
 }
 
 /// Counts of a whole run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Served {
     /// Frames heard.
-    pub heard: u64,
+    pub received: u64,
     /// Frames sent.
     pub sent: u64,
     /// Frames that a link did not take.
@@ -61,35 +61,36 @@ pub struct Served {
 /// When the operating system does not let it wait. Interfaces that vanish are waited for.
 pub fn serve(
     links: Vec<Box<dyn CanLink>>,
-    rig: WiredRig,
-    input: Option<&mut dyn Orders>,
+    simulator: LinkedSimulator,
+    input: Option<&mut dyn CommandSource>,
     stop: &AtomicBool,
 ) -> Result<Served, ServeError> {
     let began = Instant::now();
-    let joints = rig.rig.joints();
+    let joints = simulator.simulator.joints();
     let ports: Vec<Port> = links
         .into_iter()
-        .map(|link| Port { link, ready: false, gone: false, retried: began, lost: 0, told: 0 })
+        .map(|link| Port { link, ready: false, gone: false, retried: began, lost: 0, reported: 0 })
         .collect();
     let out = vec![Vec::with_capacity(BATCH_MAX); ports.len()];
     let batch = FrameBatch::new();
     let turned = Nanos(0);
-    let mut server = Server { began, joints, ports, rig, turned, out, batch, served: Served::default() };
+    let mut server =
+        Server { began, joints, ports, simulator, turned, out, batch, served: Served::default() };
     let mut input = input;
     while !stop.load(Ordering::Relaxed) {
-        let orders_wait = server.wait(input.as_deref())?;
-        server.turn();
-        if orders_wait && input.as_deref_mut().is_some_and(|input| !server.take_orders(input)) {
+        let commands_wait = server.wait(input.as_deref())?;
+        server.run_cycle();
+        if commands_wait && input.as_deref_mut().is_some_and(|input| !server.take_commands(input)) {
             input = None;
         }
-        server.tell_events();
+        server.report_events();
     }
     server.buses_in_words().iter().for_each(|line| tracing::info!("{line}"));
     Ok(server.served)
 }
 
 /// Where orders come from.
-pub trait Orders: AsFd {
+pub trait CommandSource: AsFd {
     /// Reads what is there, after the descriptor polled readable; 0 at the end.
     ///
     /// # Errors
@@ -105,7 +106,7 @@ struct Server {
     began: Instant,
     joints: Vec<String>,
     ports: Vec<Port>,
-    rig: WiredRig,
+    simulator: LinkedSimulator,
     turned: Nanos,
     out: Vec<Vec<CanFrame>>,
     batch: FrameBatch,
@@ -120,8 +121,8 @@ impl Server {
     }
 
     /// Sleeps until frames or orders come, or something is due. True when orders wait.
-    fn wait(&mut self, input: Option<&dyn Orders>) -> Result<bool, ServeError> {
-        let rest = match self.rig.next_due() {
+    fn wait(&mut self, input: Option<&dyn CommandSource>) -> Result<bool, ServeError> {
+        let rest = match self.simulator.next_due() {
             Some(due) => {
                 // A modelled bus ends a frame every 100 us; to wake up for each would take a slow machine whole.
                 let due = due.0.max(self.turned.0.saturating_add(LEAST_PAUSE_NS));
@@ -145,7 +146,7 @@ impl Server {
             Err(errno) => return Err(ServeError::Wait(errno.into())),
         }
         let mut answers = fds.iter().map(|fd| !fd.revents().is_empty());
-        let orders_wait = input.is_some() && answers.next().unwrap_or(false);
+        let commands_wait = input.is_some() && answers.next().unwrap_or(false);
         let mut ready = Vec::with_capacity(self.ports.len());
         for port in &self.ports {
             ready.push(port.link.readiness().is_none() || answers.next().unwrap_or(false));
@@ -153,16 +154,16 @@ impl Server {
         for (port, ready) in self.ports.iter_mut().zip(ready) {
             port.ready = ready;
         }
-        Ok(orders_wait)
+        Ok(commands_wait)
     }
 
     /// One wake-up: time passes, frames are taken, answers leave.
-    fn turn(&mut self) {
+    fn run_cycle(&mut self) {
         let now = self.now();
         self.turned = now;
-        self.rig.advance(now, &mut self.out);
+        self.simulator.advance(now, &mut self.out);
         for at in 0..self.ports.len() {
-            self.listen(now, at);
+            self.observe(now, at);
         }
         for (port, frames) in self.ports.iter_mut().zip(&mut self.out) {
             self.served.sent += port.send(frames);
@@ -172,7 +173,7 @@ impl Server {
     }
 
     /// Takes what has come on a bus.
-    fn listen(&mut self, now: Nanos, at: usize) {
+    fn observe(&mut self, now: Nanos, at: usize) {
         let Some(port) = self.ports.get_mut(at) else { return };
         if port.gone {
             port.retry();
@@ -186,8 +187,8 @@ impl Server {
                 port.gone = true;
             }
             let frames = self.batch.frames();
-            self.served.heard += frames.len() as u64;
-            self.rig.receive(now, at, frames, &mut self.out);
+            self.served.received += frames.len() as u64;
+            self.simulator.receive(now, at, frames, &mut self.out);
             if fault.is_some() || frames.len() < BATCH_MAX {
                 return;
             }
@@ -195,7 +196,7 @@ impl Server {
     }
 
     /// Carries out the orders that wait; false when no more can come.
-    fn take_orders(&mut self, input: &mut dyn Orders) -> bool {
+    fn take_commands(&mut self, input: &mut dyn CommandSource) -> bool {
         let mut bytes = [0; LINE_MAX];
         let goes_on = match input.read(&mut bytes) {
             Ok(0) => false,
@@ -219,20 +220,20 @@ impl Server {
     }
 
     fn carry_out(&mut self, line: &str) {
-        match Order::parse(line, &self.joints) {
+        match SimulatorCommand::parse(line, &self.joints) {
             Err(error) => say(&format!("error: {error}")),
-            Ok(Order::Fault(order)) => {
-                self.rig.rig.order(self.now(), order);
+            Ok(SimulatorCommand::Fault(order)) => {
+                self.simulator.simulator.request(self.now(), order);
                 let joint = self.joints.get(order.joint).map_or("?", String::as_str);
                 say(&format!("ok: {} of {joint} is ordered", order.kind));
             }
-            Ok(Order::Clear(joint)) => {
-                self.rig.rig.clear(joint);
+            Ok(SimulatorCommand::Clear(joint)) => {
+                self.simulator.simulator.clear(joint);
                 say("ok: cleared");
             }
-            Ok(Order::Status) => {
+            Ok(SimulatorCommand::Status) => {
                 for (joint, name) in self.joints.iter().enumerate() {
-                    let Some(drive) = self.rig.rig.drive(joint) else { continue };
+                    let Some(drive) = self.simulator.simulator.drive(joint) else { continue };
                     let (position_rad, velocity_rad_s) = (drive.position_rad(), drive.velocity_rad_s());
                     say(&format!(
                         "status joint={name} node={} position_rad={position_rad} \
@@ -250,12 +251,13 @@ impl Server {
     /// What the modelled buses have carried; nothing of virtual ones.
     fn buses_in_words(&self) -> Vec<String> {
         let now = self.now();
-        let wires = self.ports.iter().enumerate().filter_map(|(at, port)| Some((port, self.rig.wire(at)?)));
+        let wires =
+            self.ports.iter().enumerate().filter_map(|(at, port)| Some((port, self.simulator.wire(at)?)));
         wires.map(|(port, wire)| wire.in_words(&port.link.describe(), now)).collect()
     }
 
-    fn tell_events(&mut self) {
-        for event in self.rig.rig.take_events() {
+    fn report_events(&mut self) {
+        for event in self.simulator.simulator.take_events() {
             let what = if event.began { "begins" } else { "ends" };
             say(&format!("fault {what}: {} of {}", event.kind, event.joint));
         }
@@ -280,12 +282,12 @@ impl Port {
 
     /// Says, at most once a second, that frames were lost. Returns how many.
     fn complain(&mut self) -> u64 {
-        let new = self.lost - self.told;
+        let new = self.lost - self.reported;
         if new == 0 || self.retried.elapsed() < RETRY {
             return 0;
         }
         self.retried = Instant::now();
-        self.told = self.lost;
+        self.reported = self.lost;
         tracing::warn!("{} did not take {new} frames", self.link.describe());
         new
     }
@@ -317,7 +319,7 @@ impl AsFd for StandardInput {
     }
 }
 
-impl Orders for StandardInput {
+impl CommandSource for StandardInput {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         Ok(rustix::io::read(rustix::stdio::stdin(), into)?)
     }

@@ -42,7 +42,7 @@ pub struct Delivered {
 
 /// What a wire has seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct WireFacts {
+pub struct WireCounters {
     /// Frames delivered.
     pub delivered: u64,
     /// Frames lost because their queue was full, the master's.
@@ -86,7 +86,7 @@ pub struct Wire {
     free_at: Nanos,
     window: (Nanos, u64),
     began: Option<Nanos>,
-    facts: WireFacts,
+    counters: WireCounters,
 }
 
 impl Wire {
@@ -104,14 +104,14 @@ impl Wire {
             free_at: Nanos(0),
             window: (Nanos(0), 0),
             began: None,
-            facts: WireFacts::default(),
+            counters: WireCounters::default(),
         })
     }
 
     /// What it has seen so far.
     #[must_use]
-    pub fn facts(&self) -> WireFacts {
-        self.facts
+    pub fn counters(&self) -> WireCounters {
+        self.counters
     }
 
     /// Frames that wait now: on the master's side, and in the drives' mailboxes.
@@ -126,16 +126,16 @@ impl Wire {
         let began = self.began.unwrap_or(now);
         #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
         let share = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
-        let all = share(self.facts.busy_ns, now.0.saturating_sub(began.0));
-        (all, share(self.facts.fullest_window_ns, WINDOW_NS))
+        let all = share(self.counters.busy_ns, now.0.saturating_sub(began.0));
+        (all, share(self.counters.fullest_window_ns, WINDOW_NS))
     }
 
     /// What it has seen, as one line of `key=value`.
     #[must_use]
     pub fn in_words(&self, bus: &str, now: Nanos) -> String {
         let (load, fullest) = self.load_percent(now);
-        let WireFacts { delivered, lost_from_master, lost_from_drives, longest_queue, .. } = self.facts;
-        let longest_wait_us = self.facts.longest_wait_ns / 1000;
+        let WireCounters { delivered, lost_from_master, lost_from_drives, longest_queue, .. } = self.counters;
+        let longest_wait_us = self.counters.longest_wait_ns / 1000;
         format!(
             "bus {bus:?} load_percent={load:.1} fullest_100ms_percent={fullest:.1} delivered={delivered} \
              lost_from_master={lost_from_master} lost_from_drives={lost_from_drives} longest_queue={longest_queue} \
@@ -149,11 +149,11 @@ impl Wire {
         match sender {
             Sender::Master if self.master.len() < self.queue_max => {
                 self.master.push_back(waiting);
-                self.facts.longest_queue = self.facts.longest_queue.max(self.master.len());
+                self.counters.longest_queue = self.counters.longest_queue.max(self.master.len());
                 true
             }
             Sender::Master => {
-                self.facts.lost_from_master += 1;
+                self.counters.lost_from_master += 1;
                 false
             }
             Sender::Drive => {
@@ -162,7 +162,7 @@ impl Wire {
                 if fits {
                     self.drives.push(waiting);
                 } else {
-                    self.facts.lost_from_drives += 1;
+                    self.counters.lost_from_drives += 1;
                 }
                 fits
             }
@@ -175,9 +175,9 @@ impl Wire {
         self.begin(until);
         let passing = self.passing.take_if(|passing| passing.ends <= until)?;
         self.free_at = passing.ends;
-        self.facts.delivered += 1;
+        self.counters.delivered += 1;
         let waited_ns = passing.ends.0.saturating_sub(passing.since.0);
-        self.facts.longest_wait_ns = self.facts.longest_wait_ns.max(waited_ns);
+        self.counters.longest_wait_ns = self.counters.longest_wait_ns.max(waited_ns);
         Some(Delivered { at: passing.ends, sender: passing.sender, frame: passing.frame })
     }
 
@@ -217,10 +217,10 @@ impl Wire {
 
     fn count(&mut self, start: Nanos, takes_ns: u64) {
         self.began.get_or_insert(start);
-        self.facts.busy_ns += takes_ns;
+        self.counters.busy_ns += takes_ns;
         let (opened, busy_ns) = &mut self.window;
         if start.0.saturating_sub(opened.0) >= WINDOW_NS {
-            self.facts.fullest_window_ns = self.facts.fullest_window_ns.max(*busy_ns);
+            self.counters.fullest_window_ns = self.counters.fullest_window_ns.max(*busy_ns);
             (*opened, *busy_ns) = (start, 0);
         }
         *busy_ns += takes_ns;

@@ -2,7 +2,7 @@
 use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, SWITCH_ON_DISABLED, frame, hex, settings};
 use taustream_arm::Reaction;
 use taustream_drivers::bring_up::explain_refusal;
-use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
 /// Every frame that node 1 is sent from the first look to NMT start, written out from can-protocols 1.2 to 1.5.
 const BRING_UP_OF_NODE_1: &str = "
@@ -190,13 +190,13 @@ fn bring_up_of_a_node_that_answers_for_another_leaves_it_absent_and_the_other_wh
     assert_eq!(bench.states(), [DriveState::Disabled, DriveState::Absent, DriveState::Disabled]);
     let words = bench.driver.explain(bench.status(1).error_code);
     assert!(words.contains("does not answer"), "{words}");
-    let at = |bench: &Bench, joint: usize| bench.heard[joint].map(|(_, counts)| counts);
+    let at = |bench: &Bench, joint: usize| bench.last_received[joint].map(|(_, counts)| counts);
     assert_eq!(at(&bench, 0), Some(bench.drives[0].position), "the position is another node's");
     assert!(
         bench.drives[1].seen.iter().all(|f| f.id().raw() != 0),
         "a node that never answered was reset or started"
     );
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     bench.steps(500);
     assert_eq!(bench.status(1).state, DriveState::Absent);
     assert_eq!(bench.drives[1].status, SWITCH_ON_DISABLED);
@@ -211,12 +211,12 @@ fn starting_over_asks_before_it_changes_anything() {
     for (joint, command) in bench.commands.iter_mut().enumerate().take(2) {
         command.position_rad = bench.driver.status(joint).position_rad;
     }
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     bench.until(DriveState::Enabled, 500);
     // While the bus was away one drive was switched off by its own watchdog; the other holds.
     bench.drives[1].status = SWITCH_ON_DISABLED;
-    bench.drives.iter_mut().for_each(|drive| drive.obeys = false);
-    bench.wish = DriveWish::Disabled;
+    bench.drives.iter_mut().for_each(|drive| drive.responds = false);
+    bench.drive_target = DriveTarget::Disabled;
     bench.driver.start_over();
     assert_eq!(bench.states(), [DriveState::Absent, DriveState::Absent]);
     assert!(
@@ -229,7 +229,7 @@ fn starting_over_asks_before_it_changes_anything() {
             |f: &taustream_drivers::CanFrame| f.id().raw() == 0x77F || f.data().first() == Some(&0x40);
         assert!(bench.sent.iter().all(is_question), "in cycle {}: {:?}", bench.ms, bench.sent);
     }
-    bench.drives[1].obeys = true;
+    bench.drives[1].responds = true;
     bench.steps(2_000);
     assert_eq!(bench.states(), [DriveState::EnergisedUnowned, DriveState::Disabled]);
     assert_eq!(bench.drives[0].status & 0x6F, 0x27, "the drive that holds was touched");
@@ -283,7 +283,7 @@ fn bring_up_of_a_node_that_never_answers_sends_three_requests_in_a_round_and_no_
 }
 
 #[test]
-fn listen_finds_an_energised_drive_and_leaves_it_untouched() {
+fn observing_finds_an_energised_drive_and_leaves_it_untouched() {
     for status in [ENABLED, ENABLED | FOLLOWS, QUICK_STOP, 0x021F] {
         let mut bench = Bench::new(2);
         (bench.drives[0].status, bench.drives[0].nmt) = (status, 0x05);
@@ -298,12 +298,12 @@ fn listen_finds_an_energised_drive_and_leaves_it_untouched() {
 
         // The same wish that the others follow does not reach it.
         bench.hold();
-        bench.wish = DriveWish::Enabled;
+        bench.drive_target = DriveTarget::Enabled;
         bench.steps(200);
         assert!(only_read(&bench), "only read");
 
         // The emergency does, at once and by SDO, because nobody knows its process data.
-        bench.wish = DriveWish::TorqueOff;
+        bench.drive_target = DriveTarget::TorqueOff;
         bench.step();
         assert!(
             bench.sent.iter().any(|f| hex(f) == "601 2B 40 60 00 00 00 00 00"),
@@ -313,7 +313,7 @@ fn listen_finds_an_energised_drive_and_leaves_it_untouched() {
 }
 
 #[test]
-fn listen_holds_back_the_reset_while_another_master_sends_sync() {
+fn observing_delays_the_reset_while_another_master_sends_sync() {
     let mut bench = Bench::new(1);
     for _ in 0..1_000 {
         bench.decode(&frame(0x080, &[]));
@@ -325,7 +325,7 @@ fn listen_holds_back_the_reset_while_another_master_sends_sync() {
 }
 
 #[test]
-fn listen_wakes_a_node_in_nmt_stopped_without_a_reset() {
+fn observing_starts_a_node_in_nmt_stopped_without_a_reset() {
     let mut bench = Bench::new(1);
     bench.drives[0].nmt = 0x04;
     bench.steps(50);

@@ -1,5 +1,5 @@
 //! Counts and angles: the one formula that turns setpoints into what a drive is told.
-use super::Draw;
+use super::SeededRng;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, rad_from_counts};
 use taustream_drivers::codec::cia402_words::interpolation_period;
@@ -48,14 +48,14 @@ fn encoding_at_the_ends_of_i32_saturates() {
 #[test]
 fn encoding_there_and_back_gives_the_same_counts() {
     for seed in 0..20_000 {
-        let mut draw = Draw::from_seed(seed);
-        let sign = if draw.chance(0.5) { 1.0 } else { -1.0 };
-        let any = servo(sign, draw.within(1.0, 200.0), draw.within(500.0, 2e6), draw.within(-7.0, 7.0));
-        let counts = i32::from(draw.word() >> 2) * (1 << 15) + i32::from(draw.word()) - (1 << 28);
+        let mut rng = SeededRng::from_seed(seed);
+        let sign = if rng.chance(0.5) { 1.0 } else { -1.0 };
+        let any = servo(sign, rng.within(1.0, 200.0), rng.within(500.0, 2e6), rng.within(-7.0, 7.0));
+        let counts = i32::from(rng.word() >> 2) * (1 << 15) + i32::from(rng.word()) - (1 << 28);
         let rad = rad_from_counts(&any, counts);
         assert_eq!(counts_from_rad(&any, rad), counts, "seed {seed}");
         let step_rad = TAU / (any.gear_ratio * any.counts_per_rev);
-        let angle = draw.within(-7.0, 7.0);
+        let angle = rng.within(-7.0, 7.0);
         let error = (rad_from_counts(&any, counts_from_rad(&any, angle)) - angle).abs();
         assert!(error <= 0.5 * step_rad * (1.0 + 1e-6) + 1e-14, "seed {seed}: off by {error:e} rad");
     }

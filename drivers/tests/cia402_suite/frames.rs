@@ -1,10 +1,10 @@
 //! CANopen frames against bytes written out from can-protocols 1.1 and 1.2, and decoders against anything.
-use super::{Draw, frame, hex};
+use super::{SeededRng, frame, hex};
 use taustream_drivers::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState, PdoEntry, decode_sync, sync};
 use taustream_drivers::codec::cia402::{DriveStep, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo};
+use taustream_drivers::codec::error_text;
 use taustream_drivers::codec::object::{self, Address};
 use taustream_drivers::codec::sdo::{SdoBytes, SdoRequest, SdoResponse, SegmentBytes};
-use taustream_drivers::codec::words;
 use taustream_drivers::{CanFrame, CanId};
 
 #[test]
@@ -138,7 +138,7 @@ fn words_exist_for_every_code_of_the_tables() {
         0x0800_0021,
         0x0800_0022,
     ];
-    let mut seen: Vec<&str> = aborts.iter().map(|code| words::sdo_abort(*code)).collect();
+    let mut seen: Vec<&str> = aborts.iter().map(|code| error_text::sdo_abort(*code)).collect();
     assert!(seen.iter().all(|sentence| !sentence.contains("does not list")));
     seen.sort_unstable();
     seen.dedup();
@@ -148,7 +148,7 @@ fn words_exist_for_every_code_of_the_tables() {
         0x8120, 0x8130, 0x8140, 0x8210, 0x8220, 0x8250, 0x8611, 0x8612,
     ];
     for code in emergencies {
-        assert!(!words::emcy(code).contains("does not list"), "{code:#06x}");
+        assert!(!error_text::emcy(code).contains("does not list"), "{code:#06x}");
     }
 }
 
@@ -156,8 +156,8 @@ fn words_exist_for_every_code_of_the_tables() {
 fn decoders_take_any_frame_and_give_back_only_what_they_can_encode() {
     let mut decoded = 0;
     for seed in 0..200_000 {
-        let mut draw = Draw::from_seed(seed);
-        let any = draw.frame();
+        let mut rng = SeededRng::from_seed(seed);
+        let any = rng.frame();
         if let Some((node, request)) = SdoRequest::decode(&any) {
             assert_eq!(SdoRequest::decode(&request.encode(node)), Some((node, request)), "seed {seed}");
             decoded += 1;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::{
-    CanFrame, CanId, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
+    CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 
 mod bring_up;
@@ -31,12 +31,12 @@ pub(crate) struct Bench {
     pub(crate) drives: Vec<Scripted>,
     pub(crate) now: Nanos,
     pub(crate) ms: u64,
-    pub(crate) wish: DriveWish,
+    pub(crate) drive_target: DriveTarget,
     pub(crate) commands: [JointCommand; 8],
     /// Frames of the newest cycle.
     pub(crate) sent: Vec<CanFrame>,
     /// Statusword and position of the newest TPDO that the master was given, by drive.
-    pub(crate) heard: Vec<Option<(u16, i32)>>,
+    pub(crate) last_received: Vec<Option<(u16, i32)>>,
 }
 
 /// The settings of this suite with this many servos.
@@ -65,17 +65,17 @@ impl Bench {
             drives,
             now: Nanos(7_000_000_000),
             ms: 0,
-            wish: DriveWish::Disabled,
+            drive_target: DriveTarget::Disabled,
             commands: [JointCommand::default(); 8],
             sent: Vec::new(),
-            heard: vec![None; servos],
+            last_received: vec![None; servos],
         }
     }
 
     pub(crate) fn step(&mut self) {
         let mut batch = FrameBatch::new();
-        let Self { driver, now, wish, commands, .. } = self;
-        let calls = allocations(|| driver.encode(*now, *wish, commands, &mut batch));
+        let Self { driver, now, drive_target, commands, .. } = self;
+        let calls = allocations(|| driver.encode(*now, *drive_target, commands, &mut batch));
         assert_eq!(calls, 0, "encode allocated in cycle {}", self.ms);
         self.sent = batch.frames().to_vec();
         let mut replies = Vec::new();
@@ -87,8 +87,8 @@ impl Bench {
         }
         for reply in &replies {
             self.decode(reply);
-            for (heard, drive) in self.heard.iter_mut().zip(&self.drives) {
-                *heard = tpdo(reply, drive.id).or(*heard);
+            for (last_received, drive) in self.last_received.iter_mut().zip(&self.drives) {
+                *last_received = tpdo(reply, drive.id).or(*last_received);
             }
         }
         self.now.0 += 1_000_000;
@@ -142,7 +142,7 @@ impl Bench {
         let mut bench = Self::new(servos);
         bench.until(DriveState::Disabled, 2_000);
         bench.hold();
-        bench.wish = DriveWish::Enabled;
+        bench.drive_target = DriveTarget::Enabled;
         bench.step();
         bench.until(DriveState::Enabled, 100);
         bench
@@ -167,9 +167,9 @@ fn tpdo(frame: &CanFrame, node: u8) -> Option<(u16, i32)> {
 }
 
 /// Random numbers from a numbered seed (splitmix64).
-pub(crate) struct Draw(u64);
+pub(crate) struct SeededRng(u64);
 
-impl Draw {
+impl SeededRng {
     pub(crate) fn from_seed(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x5DEE_CE66)
     }

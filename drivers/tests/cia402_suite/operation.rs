@@ -3,7 +3,7 @@ use super::{
     Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, frame, hex, settings,
 };
 use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, CountScale, counts_from_rad};
-use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
 #[test]
 fn cycle_starts_with_sync_then_setpoints_in_joint_order() {
@@ -29,7 +29,7 @@ fn enabling_climbs_one_confirmed_rung_after_the_other() {
     bench.until(DriveState::Disabled, 2_000);
     assert_eq!(bench.rpdo(0), Some((0x0000, 1_000)), "at rest: voltage off, target where the drive stands");
     bench.hold();
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     let mut words = Vec::new();
     for _ in 0..20 {
         bench.step();
@@ -44,11 +44,11 @@ fn enabling_climbs_one_confirmed_rung_after_the_other() {
 #[test]
 fn enabling_is_not_reported_before_the_drive_follows() {
     let mut bench = Bench::enabled(1);
-    bench.drives[0].obeys = false;
-    bench.wish = DriveWish::Disabled;
+    bench.drives[0].responds = false;
+    bench.drive_target = DriveTarget::Disabled;
     bench.drives[0].status = SWITCH_ON_DISABLED;
     bench.steps(10);
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     for status in [READY, SWITCHED_ON, ENABLED] {
         bench.drives[0].status = status;
         bench.steps(10);
@@ -65,7 +65,7 @@ fn enabling_far_from_the_command_is_refused_until_cleared() {
     bench.until(DriveState::Disabled, 2_000);
     bench.hold();
     bench.commands[0].position_rad += 0.06;
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     for _ in 0..100 {
         bench.step();
         assert_ne!(bench.rpdo(0).unwrap().0, 0x000F);
@@ -73,11 +73,11 @@ fn enabling_far_from_the_command_is_refused_until_cleared() {
     assert_eq!(bench.status(0).state, DriveState::Fault);
     assert!(bench.driver.explain(bench.status(0).error_code).contains("too far"));
 
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     bench.driver.clear_faults();
     bench.steps(5);
     bench.hold();
-    bench.wish = DriveWish::Enabled;
+    bench.drive_target = DriveTarget::Enabled;
     bench.step();
     bench.until(DriveState::Enabled, 100);
 }
@@ -87,8 +87,8 @@ fn enabling_a_drive_that_does_not_confirm_times_out() {
     let mut bench = Bench::new(1);
     bench.until(DriveState::Disabled, 2_000);
     bench.hold();
-    bench.drives[0].obeys = false;
-    bench.wish = DriveWish::Enabled;
+    bench.drives[0].responds = false;
+    bench.drive_target = DriveTarget::Enabled;
     bench.steps(4_000);
     assert_eq!(bench.status(0).state, DriveState::Enabling);
     bench.steps(1_500);
@@ -128,7 +128,7 @@ fn enabled_drives_get_the_encoded_commands_and_keep_the_last_when_one_is_no_numb
 #[test]
 fn disabling_steps_down_in_order() {
     let mut bench = Bench::enabled(1);
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     let mut words = Vec::new();
     for _ in 0..20 {
         bench.step();
@@ -144,10 +144,10 @@ fn torque_off_reaches_every_operational_drive_in_the_next_cycle_from_any_state()
     let mut bench = Bench::enabled(6);
     let words = [SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED | FOLLOWS, QUICK_STOP, FAULT];
     for (drive, status) in bench.drives.iter_mut().zip(words) {
-        (drive.obeys, drive.status) = (false, status);
+        (drive.responds, drive.status) = (false, status);
     }
     bench.steps(3);
-    bench.wish = DriveWish::TorqueOff;
+    bench.drive_target = DriveTarget::TorqueOff;
     for cycle in 0..50 {
         bench.step();
         for joint in 0..6 {
@@ -163,20 +163,20 @@ fn torque_off_during_configuration_interrupts_it_and_configuration_goes_on_after
     let mut bench = Bench::new(1);
     bench.steps(130);
     assert_eq!(bench.status(0).state, DriveState::Configuring);
-    bench.wish = DriveWish::TorqueOff;
+    bench.drive_target = DriveTarget::TorqueOff;
     bench.step();
     assert!(bench.sent.iter().any(|f| hex(f) == "601 2B 40 60 00 00 00 00 00"));
     bench.until(DriveState::Disabled, 2_000);
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     bench.steps(10);
     assert_eq!(bench.status(0).state, DriveState::Disabled);
 }
 
 #[test]
-fn drop_out_of_a_drive_shows_and_is_never_energised_again_by_the_standing_wish() {
+fn drop_out_of_a_drive_shows_and_is_never_energised_again_by_the_unchanged_target() {
     for status in [SWITCH_ON_DISABLED, READY, SWITCHED_ON, QUICK_STOP] {
         let mut bench = Bench::enabled(2);
-        bench.drives[0].obeys = false;
+        bench.drives[0].responds = false;
         bench.drives[0].status = status;
         bench.steps(2);
         let expected = if status == QUICK_STOP { DriveState::Fault } else { DriveState::Disabled };
@@ -196,7 +196,7 @@ fn drop_out_of_a_drive_shows_and_is_never_energised_again_by_the_standing_wish()
 #[test]
 fn enabled_drive_that_does_not_follow_is_a_fault_but_stays_energised() {
     let mut bench = Bench::enabled(1);
-    bench.drives[0].obeys = false;
+    bench.drives[0].responds = false;
     bench.drives[0].status = ENABLED;
     bench.steps(6);
     assert_eq!(bench.status(0).state, DriveState::Fault);
@@ -214,7 +214,7 @@ fn fault_reports_its_emergency_code_and_is_reset_by_one_edge() {
     assert_eq!(bench.driver.explain(0x8611), "0x8611 following error too large");
     assert_eq!(bench.rpdo(0).unwrap().0, 0x0000);
 
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     bench.steps(5);
     bench.driver.clear_faults();
     let mut words = Vec::new();
@@ -238,7 +238,7 @@ fn fault_without_an_emergency_message_is_asked_for_its_code() {
 
 /// Whoever reports the fault does so in the first cycle of it: by then the code must have been read.
 #[test]
-fn fault_found_at_first_listen_has_its_code_from_the_first_cycle_on() {
+fn fault_found_at_first_feedback_has_its_code_from_the_first_cycle_on() {
     let mut bench = Bench::new(2);
     bench.drives[0].status = FAULT;
     let mut cycles_in_fault = 0;
@@ -252,9 +252,9 @@ fn fault_found_at_first_listen_has_its_code_from_the_first_cycle_on() {
     assert!(cycles_in_fault > 100, "seen in fault for {cycles_in_fault} cycles");
     assert_eq!(bench.status(1).state, DriveState::Disabled);
     let seen: Vec<String> = bench.drives[0].seen.iter().map(hex).collect();
-    let asked: Vec<usize> = (0..seen.len()).filter(|at| seen[*at].starts_with("601 40 3F 60")).collect();
+    let requested: Vec<usize> = (0..seen.len()).filter(|at| seen[*at].starts_with("601 40 3F 60")).collect();
     let reset = seen.iter().position(|line| line == "000 82 01").unwrap();
-    assert!(asked.len() == 1 && asked[0] < reset, "asked at {asked:?}, reset at {reset}");
+    assert!(requested.len() == 1 && requested[0] < reset, "asked at {requested:?}, reset at {reset}");
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn fault_found_without_an_error_code_object_does_not_hold_up_bring_up() {
 }
 
 #[test]
-fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_told_where_to_go() {
+fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_commanded() {
     let mut bench = Bench::enabled(2);
     bench.drives[0].silent = true;
     bench.steps(300);
@@ -285,7 +285,7 @@ fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_told_where_to_go() {
     assert_eq!(bench.rpdo(0), Some((0x000F, wanted)));
 
     // Disabled by wish: voltage off is sent, then the node is absent, and it is taken again when it returns.
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     bench.steps(6_000);
     assert_eq!(bench.status(0).state, DriveState::Absent);
     bench.drives[0].silent = false;
@@ -316,7 +316,7 @@ fn restart_of_a_drive_in_use_is_a_fault_and_is_configured_again_only_when_disabl
     assert_eq!(bench.status(0).state, DriveState::Fault);
     assert!(bench.driver.explain(bench.status(0).error_code).contains("restarted"));
     assert_eq!(bench.drives[0].seen.len(), seen, "nothing is sent to a drive whose mapping is gone");
-    bench.wish = DriveWish::Disabled;
+    bench.drive_target = DriveTarget::Disabled;
     bench.until(DriveState::Disabled, 2_000);
 }
 

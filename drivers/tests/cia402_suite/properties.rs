@@ -1,14 +1,14 @@
 //! What must hold whatever the drives say: random statusword walks, random frames.
-use super::{Bench, Draw, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON};
+use super::{Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, SeededRng};
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad};
-use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
 /// What one setpoint is judged by.
 #[derive(Clone, Copy)]
 struct Setpoint {
-    wish: DriveWish,
+    drive_target: DriveTarget,
     /// The newest statusword and position that the master was given.
-    heard: (u16, i32),
+    last_received: (u16, i32),
     /// The encoded command; none when it was no number.
     command: Option<i32>,
     /// Most counts between command and position for energising.
@@ -20,16 +20,16 @@ struct Setpoint {
 }
 
 /// The rules for what may be sent to a drive; the first broken one.
-fn judge(s: Setpoint) -> Result<(), &'static str> {
-    let state = s.heard.0 & 0x6F;
+fn check_value(s: Setpoint) -> Result<(), &'static str> {
+    let state = s.last_received.0 & 0x6F;
     if ![0x00, 0x02, 0x06, 0x07, 0x0F, 0x80].contains(&s.control) {
         return Err("a controlword that the table does not have");
     }
-    if s.wish == DriveWish::TorqueOff && s.control != 0x00 && s.control != 0x80 {
+    if s.drive_target == DriveTarget::TorqueOff && s.control != 0x00 && s.control != 0x80 {
         return Err("torque off was wished");
     }
     if s.control == 0x0F {
-        if s.wish != DriveWish::Enabled {
+        if s.drive_target != DriveTarget::Enabled {
             return Err("enable without the wish");
         }
         if state != 0x23 && state != 0x27 {
@@ -38,19 +38,19 @@ fn judge(s: Setpoint) -> Result<(), &'static str> {
         if s.target != s.command.unwrap_or(s.before) {
             return Err("an energised target that is not the command");
         }
-        let far = s.command.is_none_or(|command| command.abs_diff(s.heard.1) > s.near.unsigned_abs());
+        let far = s.command.is_none_or(|command| command.abs_diff(s.last_received.1) > s.near.unsigned_abs());
         if state == 0x23 && far {
             return Err("energised far from the command");
         }
-    } else if s.target != s.heard.1 && Some(s.target) != s.command && s.target != s.before {
+    } else if s.target != s.last_received.1 && Some(s.target) != s.command && s.target != s.before {
         return Err("a target that is neither command nor position");
     }
     Ok(())
 }
 
 const GOOD: Setpoint = Setpoint {
-    wish: DriveWish::Enabled,
-    heard: (SWITCHED_ON, 100),
+    drive_target: DriveTarget::Enabled,
+    last_received: (SWITCHED_ON, 100),
     command: Some(110),
     near: 50,
     before: 90,
@@ -59,37 +59,37 @@ const GOOD: Setpoint = Setpoint {
 };
 
 #[test]
-fn judge_of_setpoints_finds_every_planted_fault() {
-    assert_eq!(judge(GOOD), Ok(()));
+fn check_of_setpoints_finds_every_planted_fault() {
+    assert_eq!(check_value(GOOD), Ok(()));
     let planted = [
-        Setpoint { heard: (READY, 100), ..GOOD },
-        Setpoint { heard: (FAULT, 100), ..GOOD },
-        Setpoint { wish: DriveWish::Disabled, ..GOOD },
-        Setpoint { wish: DriveWish::TorqueOff, ..GOOD },
-        Setpoint { wish: DriveWish::TorqueOff, control: 0x02, ..GOOD },
+        Setpoint { last_received: (READY, 100), ..GOOD },
+        Setpoint { last_received: (FAULT, 100), ..GOOD },
+        Setpoint { drive_target: DriveTarget::Disabled, ..GOOD },
+        Setpoint { drive_target: DriveTarget::TorqueOff, ..GOOD },
+        Setpoint { drive_target: DriveTarget::TorqueOff, control: 0x02, ..GOOD },
         Setpoint { control: 0x1F, ..GOOD },
         Setpoint { target: 111, ..GOOD },
-        Setpoint { heard: (SWITCHED_ON, 161), ..GOOD },
+        Setpoint { last_received: (SWITCHED_ON, 161), ..GOOD },
         Setpoint { command: None, ..GOOD },
         Setpoint { control: 0x06, target: 7, ..GOOD },
     ];
     for (number, setpoint) in planted.into_iter().enumerate() {
-        assert!(judge(setpoint).is_err(), "planted fault {number} passed");
+        assert!(check_value(setpoint).is_err(), "planted fault {number} passed");
     }
 }
 
 #[test]
-fn random_statuswords_wishes_and_commands_never_break_the_rules_of_setpoints() {
+fn random_statuswords_targets_and_commands_never_break_the_rules_of_setpoints() {
     let (mut judged, mut enables, mut reached) = (0, 0, 0);
     for seed in 0..400 {
-        let mut draw = Draw::from_seed(seed);
+        let mut rng = SeededRng::from_seed(seed);
         let mut bench = Bench::new(2);
         bench.until(DriveState::Disabled, 2_000);
         bench.hold();
         let mut before: Vec<i32> = (0..2).map(|drive| bench.rpdo(drive).unwrap().1).collect();
         for cycle in 0..400 {
-            stir(&mut bench, &mut draw);
-            let heard = bench.heard.clone();
+            stir(&mut bench, &mut rng);
+            let last_received = bench.last_received.clone();
             bench.step();
             reached += usize::from(bench.status(0).state == DriveState::Enabled);
             for drive in 0..2 {
@@ -99,11 +99,21 @@ fn random_statuswords_wishes_and_commands_never_break_the_rules_of_setpoints() {
                 let command = position_rad.is_finite().then(|| counts_from_rad(&scale, position_rad));
                 // 0.05 rad, the shipped position_jump_rad_max, and one count for rounding.
                 let near = counts_from_rad(&scale, scale.zero_offset_rad + 0.05).abs() + 1;
-                let Some(heard) = heard[drive] else { panic!("setpoints before feedback") };
-                let (wish, before_it) = (bench.wish, before[drive]);
-                let setpoint = Setpoint { wish, heard, command, near, before: before_it, control, target };
-                if let Err(rule) = judge(setpoint) {
-                    panic!("seed {seed}, cycle {cycle}, drive {drive}: {rule}: {control:#06x} to {heard:?}");
+                let Some(last_received) = last_received[drive] else { panic!("setpoints before feedback") };
+                let (drive_target, before_it) = (bench.drive_target, before[drive]);
+                let setpoint = Setpoint {
+                    drive_target,
+                    last_received,
+                    command,
+                    near,
+                    before: before_it,
+                    control,
+                    target,
+                };
+                if let Err(rule) = check_value(setpoint) {
+                    panic!(
+                        "seed {seed}, cycle {cycle}, drive {drive}: {rule}: {control:#06x} to {last_received:?}"
+                    );
                 }
                 before[drive] = target;
                 judged += 1;
@@ -115,46 +125,47 @@ fn random_statuswords_wishes_and_commands_never_break_the_rules_of_setpoints() {
 }
 
 /// Changes something of the world, seldom enough that sequences get somewhere.
-fn stir(bench: &mut Bench, draw: &mut Draw) {
+fn stir(bench: &mut Bench, rng: &mut SeededRng) {
     let words =
         [SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED, ENABLED | FOLLOWS, QUICK_STOP, FAULT, 0x021F];
     for drive in &mut bench.drives {
-        if draw.chance(0.02) {
-            drive.obeys = draw.chance(0.7);
-            drive.status = if draw.chance(0.9) { words[draw.below(8)] } else { draw.word() };
+        if rng.chance(0.02) {
+            drive.responds = rng.chance(0.7);
+            drive.status = if rng.chance(0.9) { words[rng.below(8)] } else { rng.word() };
         }
-        if draw.chance(0.01) {
-            drive.silent = draw.chance(0.2);
+        if rng.chance(0.01) {
+            drive.silent = rng.chance(0.2);
         }
-        drive.position = drive.position.wrapping_add(i32::from(draw.word() >> 5) - 1_024);
+        drive.position = drive.position.wrapping_add(i32::from(rng.word() >> 5) - 1_024);
     }
-    if draw.chance(0.05) {
-        bench.wish = [DriveWish::Disabled, DriveWish::Enabled, DriveWish::Enabled, DriveWish::TorqueOff]
-            [draw.below(4)];
+    if rng.chance(0.05) {
+        bench.drive_target =
+            [DriveTarget::Disabled, DriveTarget::Enabled, DriveTarget::Enabled, DriveTarget::TorqueOff]
+                [rng.below(4)];
     }
-    if draw.chance(0.02) {
+    if rng.chance(0.02) {
         bench.driver.clear_faults();
     }
-    if draw.chance(0.1) {
+    if rng.chance(0.1) {
         bench.hold();
     }
-    let command = &mut bench.commands[draw.below(2)];
-    if draw.chance(0.05) {
-        command.position_rad = [f64::NAN, 1e9, f64::NEG_INFINITY, 0.3][draw.below(4)];
+    let command = &mut bench.commands[rng.below(2)];
+    if rng.chance(0.05) {
+        command.position_rad = [f64::NAN, 1e9, f64::NEG_INFINITY, 0.3][rng.below(4)];
     } else {
-        command.position_rad += draw.within(-0.01, 0.01);
+        command.position_rad += rng.within(-0.01, 0.01);
     }
 }
 
 #[test]
 fn random_frames_in_any_stage_never_panic_nor_break_the_frame_rules_and_the_master_recovers() {
     for seed in 0..150 {
-        let mut draw = Draw::from_seed(seed);
+        let mut rng = SeededRng::from_seed(seed);
         let mut bench = Bench::new(3);
-        bench.steps(draw.below(400) as u64);
+        bench.steps(rng.below(400) as u64);
         for _ in 0..300 {
-            for _ in 0..draw.below(8) {
-                let any = draw.frame();
+            for _ in 0..rng.below(8) {
+                let any = rng.frame();
                 bench.decode(&any);
             }
             bench.step();

@@ -36,7 +36,7 @@ pub(crate) struct Scripted {
     /// Sends and takes nothing.
     pub(crate) silent: bool,
     /// Follows the controlword through the state machine; otherwise `status` is the test's.
-    pub(crate) obeys: bool,
+    pub(crate) responds: bool,
     /// Answers reads of four-byte objects by segments.
     pub(crate) segments: bool,
     /// Requests for this object are answered under the name of the next one.
@@ -73,7 +73,7 @@ impl Scripted {
             objects,
             refused: BTreeMap::new(),
             silent: false,
-            obeys: true,
+            responds: true,
             segments: false,
             misnamed: None,
             answers_as: None,
@@ -153,8 +153,8 @@ impl Scripted {
     fn sync(&mut self, out: &mut Vec<CanFrame>) {
         if let Some((control, target)) = self.latched.take() {
             self.control = control;
-            if self.obeys {
-                self.obey(control);
+            if self.responds {
+                self.apply(control);
             }
             if self.status & 0x6F == 0x27 {
                 self.target = target;
@@ -164,7 +164,7 @@ impl Scripted {
         out.push(frame(self.mine(0x180), &[a, b, c, d, e, f]));
     }
 
-    fn obey(&mut self, control: u16) {
+    fn apply(&mut self, control: u16) {
         let rising = control & 0x80 != 0 && !self.reset_seen;
         self.reset_seen = control & 0x80 != 0;
         self.status = match (self.status & 0x6F, control & 0x8F) {
@@ -206,7 +206,7 @@ impl Scripted {
             0x23 | 0x27 | 0x2B | 0x2F => {
                 match (index, sub) {
                     (0x6060, 0) => drop(self.objects.insert((0x6061, 0), (1, number))),
-                    (0x6040, 0) if self.obeys => self.obey(u16::try_from(number).unwrap()),
+                    (0x6040, 0) if self.responds => self.apply(u16::try_from(number).unwrap()),
                     (0x1017, 0) => self.heartbeat_ms = u64::from(number),
                     _ => {}
                 }

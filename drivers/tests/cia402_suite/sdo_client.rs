@@ -30,8 +30,8 @@ fn segmented_read_collects_the_segments_with_alternating_toggle() {
     for (toggle, bytes, last) in
         [(false, &b"taustre"[..], false), (true, b"am driv", false), (false, b"es", true)]
     {
-        let ask = if toggle { "601 70" } else { "601 60" };
-        assert!(sent(&mut client, 1).starts_with(ask));
+        let request = if toggle { "601 70" } else { "601 60" };
+        assert!(sent(&mut client, 1).starts_with(request));
         assert_eq!(sent(&mut client, 2), "", "one request in flight");
         client.accept(segment(toggle, bytes, last));
     }

@@ -2,7 +2,7 @@
 use super::{Arm, edited, motor_of, pos_vel};
 use taustream_arm::BusKind;
 use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
-use taustream_drivers::{CanFrame, DriveState, DriveWish};
+use taustream_drivers::{CanFrame, DriveState, DriveTarget};
 
 /// Everything that motor 1 is sent, without repetitions of the same frame.
 fn requests(arm: &mut Arm, cycles: u32) -> Vec<Request> {
@@ -94,7 +94,7 @@ fn motor_that_scales_otherwise_is_refused_with_register_and_value() {
         assert_eq!(arm.status(1).state, DriveState::Disabled, "its neighbours come up");
         assert!(arm.status(2).position_rad.is_nan(), "nobody knows what it says");
         // A wish to enable does not move a refused motor.
-        arm.wish = DriveWish::Enabled;
+        arm.drive_target = DriveTarget::Enabled;
         arm.steps(500);
         assert_eq!((arm.status(2).state, arm.nibble(2)), (DriveState::Refused, 0));
     }
@@ -106,7 +106,7 @@ fn motor_that_does_not_take_what_is_written_is_refused_and_taken_once_it_does() 
     arm.fault(3, "kind=refuse,value=0x08000022");
     arm.until_one(3, DriveState::Refused);
     assert!(arm.why(3).contains("register 9 (TIMEOUT) of the motor holds 0 "), "{}", arm.why(3));
-    arm.rig.clear(None);
+    arm.simulator.clear(None);
     arm.steps(50);
     assert_eq!(arm.status(3).state, DriveState::Refused, "nothing is tried again by itself");
     arm.clear_faults();
@@ -120,10 +120,10 @@ fn motor_that_somebody_else_has_energised_is_left_alone_until_torque_off() {
     let mut out = [Vec::new()];
     let enable = Request::Special(Special::Enable, 0).encode(3, Wire::Classic);
     arm.now.0 += 100_000_000;
-    arm.rig.advance(arm.now, &mut out);
+    arm.simulator.advance(arm.now, &mut out);
     arm.now.0 += 100_000_000;
-    arm.rig.advance(arm.now, &mut out);
-    arm.rig.receive(arm.now, 0, &[enable], &mut out);
+    arm.simulator.advance(arm.now, &mut out);
+    arm.simulator.receive(arm.now, 0, &[enable], &mut out);
     assert_eq!(arm.nibble(2), 1);
     arm.until_one(2, DriveState::EnergisedUnowned);
     for _ in 0..2_000 {
@@ -136,10 +136,10 @@ fn motor_that_somebody_else_has_energised_is_left_alone_until_torque_off() {
         }
     }
     assert_eq!((arm.status(2).state, arm.nibble(2)), (DriveState::EnergisedUnowned, 1));
-    arm.wish = DriveWish::TorqueOff;
+    arm.drive_target = DriveTarget::TorqueOff;
     arm.step();
     assert_eq!(arm.nibble(2), 0, "the emergency reaches it in the same cycle");
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::Disabled);
 }
 
@@ -165,16 +165,16 @@ fn absent_motor_is_asked_ten_times_a_second_and_no_more() {
     let mut arm = Arm::new();
     arm.fault(4, "kind=silence");
     arm.steps(2_000);
-    let asked: usize = (0..1_000)
+    let requested: usize = (0..1_000)
         .map(|_| {
             arm.step();
             arm.sent.iter().filter(|frame| Request::is_to(frame, 5)).count()
         })
         .sum();
-    assert!((9..=11).contains(&asked), "{asked} requests a second");
+    assert!((9..=11).contains(&requested), "{requested} requests a second");
     assert_eq!(arm.status(4).state, DriveState::Absent);
     assert!(arm.why(4).contains("does not answer"), "{}", arm.why(4));
-    arm.rig.clear(None);
+    arm.simulator.clear(None);
     arm.until(DriveState::Disabled);
 }
 
@@ -188,7 +188,7 @@ fn motors_on_an_fd_bus_are_spoken_to_in_fd_frames_with_bit_rate_switch() {
     let fd8 = |frame: &CanFrame| frame.is_fd() && frame.data().len() == 8;
     assert!(arm.sent.iter().all(fd8) && arm.arriving.iter().all(fd8), "both ways");
     // A classic motor does not hear them.
-    let mut deaf = Arm::with(settings, |setup| motor_of(setup).wire = Wire::Classic);
-    deaf.steps(500);
-    assert_eq!(deaf.states(), [DriveState::Absent; 6]);
+    let mut other_format = Arm::with(settings, |setup| motor_of(setup).wire = Wire::Classic);
+    other_format.steps(500);
+    assert_eq!(other_format.states(), [DriveState::Absent; 6]);
 }

@@ -1,10 +1,10 @@
 //! What goes wrong with a motor in use, and that nothing comes back by itself.
 use super::{Arm, JOINTS, START_RAD, edited, file};
 use taustream_arm::Settings;
-use taustream_drivers::{DriveState, DriveWish, ServoDriver};
+use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
 #[test]
-fn error_of_a_motor_is_told_in_words_and_cleared_only_on_command() {
+fn error_of_a_motor_has_text_and_is_cleared_only_on_command() {
     for (code, words) in [
         ("0x8", "over-voltage"),
         ("0xA", "over-current"),
@@ -19,7 +19,7 @@ fn error_of_a_motor_is_told_in_words_and_cleared_only_on_command() {
             .filter(|joint| *joint != 2)
             .all(|joint| arm.status(joint).state == DriveState::Enabled);
         assert!(others, "{:?}", arm.states());
-        arm.rig.clear(None);
+        arm.simulator.clear(None);
         arm.steps(1_000);
         assert_eq!(arm.status(2).state, DriveState::Fault, "it stays");
         arm.clear_faults();
@@ -30,7 +30,7 @@ fn error_of_a_motor_is_told_in_words_and_cleared_only_on_command() {
             (DriveState::Disabled, 0),
             "and is not energised by itself"
         );
-        arm.wish = DriveWish::Disabled;
+        arm.drive_target = DriveTarget::Disabled;
         arm.step();
         arm.enable();
     }
@@ -42,8 +42,8 @@ fn motor_that_restarts_in_use_is_noticed_and_configured_anew() {
     arm.fault(4, "kind=restart");
     arm.until_one(4, DriveState::Fault);
     assert!(arm.why(4).contains("let go by itself, or restarted"), "{}", arm.why(4));
-    arm.rig.clear(None);
-    arm.wish = DriveWish::Disabled;
+    arm.simulator.clear(None);
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.enable();
 }
@@ -58,18 +58,18 @@ fn motor_that_restarts_while_it_is_off_is_noticed_before_it_is_energised() {
     arm.steps(100);
     assert_eq!(arm.status(4).state, DriveState::Disabled);
     arm.hold();
-    arm.wish = DriveWish::Enabled;
+    arm.drive_target = DriveTarget::Enabled;
     arm.until_one(4, DriveState::Fault);
     assert!(arm.why(4).contains("has restarted"), "{}", arm.why(4));
     assert_eq!(arm.nibble(4), 0);
-    arm.rig.clear(None);
-    arm.wish = DriveWish::Disabled;
+    arm.simulator.clear(None);
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.enable();
 }
 
 #[test]
-fn silent_motor_keeps_its_commands_until_disabled_and_is_taken_again_from_the_start() {
+fn motor_without_feedback_keeps_its_commands_until_disabled_and_is_configured_anew() {
     let mut arm = Arm::enabled(edited(&[]));
     arm.fault(1, "kind=silence");
     arm.steps(100);
@@ -79,11 +79,11 @@ fn silent_motor_keeps_its_commands_until_disabled_and_is_taken_again_from_the_st
     assert!(arm.why(1).contains("fell silent"), "{}", arm.why(1));
     arm.step();
     assert_eq!(arm.under(2).len(), 1, "it may still listen");
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.steps(1_000);
     assert_eq!(arm.status(1).state, DriveState::Absent);
     assert_eq!(arm.nibble(1), 0xD, "it has let go by itself");
-    arm.rig.clear(None);
+    arm.simulator.clear(None);
     arm.until_one(1, DriveState::Fault);
     assert!(arm.why(1).contains("no command came"), "{}", arm.why(1));
     arm.clear_faults();
@@ -98,7 +98,7 @@ fn gap_beyond_the_watchdog_is_a_fault_of_every_motor() {
     arm.steps(3);
     assert_eq!(arm.states(), [DriveState::Fault; JOINTS]);
     assert!(arm.why(0).contains("no command came for longer than its TIMEOUT"), "{}", arm.why(0));
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.clear_faults();
     arm.enable();
@@ -130,7 +130,7 @@ fn lossy_wire_only_delays_bring_up() {
         arm.fault(joint, "kind=drop,value=0.2");
     }
     arm.until(DriveState::Disabled);
-    arm.rig.clear(None);
+    arm.simulator.clear(None);
     arm.enable();
 }
 
@@ -140,7 +140,7 @@ fn bus_that_starts_over_looks_again_before_it_says_anything() {
     let mut arm = Arm::enabled(edited(&[]));
     arm.driver.start_over();
     assert_eq!(arm.states(), [DriveState::Absent; JOINTS]);
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::EnergisedUnowned);
     // Nobody commands them now: their own watchdogs let go, and that is told before anything is cleared.
     arm.until(DriveState::Fault);
@@ -198,8 +198,8 @@ fn bus_of_two_protocols_comes_up_follows_and_sends_one_sync_a_cycle() {
     arm.until_one(0, DriveState::Fault);
     assert_eq!(arm.status(5).state, DriveState::Enabled);
     assert!(arm.why(0).contains("0x3210") && arm.why(2).contains("over-current"));
-    arm.wish = DriveWish::Disabled;
-    arm.rig.clear(None);
+    arm.drive_target = DriveTarget::Disabled;
+    arm.simulator.clear(None);
     arm.steps(500);
     arm.clear_faults();
     arm.until(DriveState::Disabled);

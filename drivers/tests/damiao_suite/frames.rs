@@ -92,10 +92,10 @@ fn decoded_values_lie_at_most_one_step_below_what_was_encoded() {
             velocity_rad_s: command.velocity_rad_s,
             torque_nm: command.torque_nm,
         };
-        let heard = MitState::decode(state.encode(&DM4310), &DM4310);
-        let differs = (heard.position_rad - back.position_rad).abs()
-            + (heard.velocity_rad_s - back.velocity_rad_s).abs()
-            + (heard.torque_nm - back.torque_nm).abs();
+        let received = MitState::decode(state.encode(&DM4310), &DM4310);
+        let differs = (received.position_rad - back.position_rad).abs()
+            + (received.velocity_rad_s - back.velocity_rad_s).abs()
+            + (received.torque_nm - back.torque_nm).abs();
         assert!(differs < 1e-12, "seed {seed}: commands and answers pack alike");
     }
 }
@@ -110,7 +110,7 @@ fn command_with_everything_at_its_end_is_no_special_command() {
 }
 
 #[test]
-fn feedback_and_register_answers_are_told_apart() {
+fn feedback_and_register_answers_are_distinguished() {
     let feedback = Feedback {
         status: 0xD,
         state: [0x80, 0x12, 0x34, 0x56, 0x78],

@@ -123,8 +123,8 @@ fn frame_that_differs_by_one_digit_is_noticed() {
             (_, "A") => "5",
             _ => "A",
         };
-        let doctored = format!("{}{digit}{}", &line[..at], &line[at + 1..]);
-        assert!(compare(&doctored).is_err(), "not noticed: {doctored}");
+        let corrupted = format!("{}{digit}{}", &line[..at], &line[at + 1..]);
+        assert!(compare(&corrupted).is_err(), "not noticed: {corrupted}");
     }
     assert_eq!(tried.len(), 12);
 }

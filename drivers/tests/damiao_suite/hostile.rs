@@ -3,7 +3,7 @@ use super::{Arm, JOINTS, edited};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use taustream_drivers::codec::damiao_frames::{Reply, Request, Special, Wire};
 use taustream_drivers::sim::SimulatedServo;
-use taustream_drivers::{CanFrame, CanId, DriveState, DriveWish};
+use taustream_drivers::{CanFrame, CanId, DriveState, DriveTarget};
 
 /// Frames that are often nearly right: identifiers of the protocol, its first bytes, any length, classic or FD.
 fn frames() -> impl Strategy<Value = CanFrame> {
@@ -52,10 +52,10 @@ proptest! {
 
     /// Not one frame of a stranger energises a motor that the wish keeps off.
     #[test]
-    fn master_energises_nothing_whatever_it_hears(heard in proptest::collection::vec(frames(), 1..400)) {
+    fn master_energises_nothing_whatever_it_receives(received in proptest::collection::vec(frames(), 1..400)) {
         let mut arm = Arm::new();
         arm.until(DriveState::Disabled);
-        for frame in heard {
+        for frame in received {
             arm.arriving.push(frame);
             arm.step();
             for servo in &arm.settings.servos {
@@ -74,13 +74,13 @@ proptest! {
 
     /// The simulated motors take anything, stay finite, and inside their torque.
     #[test]
-    fn simulated_motors_survive_any_master(heard in proptest::collection::vec(frames(), 1..400)) {
+    fn simulated_motors_survive_any_master(received in proptest::collection::vec(frames(), 1..400)) {
         let mut arm = Arm::enabled(edited(&[]));
-        for frame in heard {
+        for frame in received {
             let mut out = [Vec::new()];
             arm.now.0 += 1_000_000;
-            arm.rig.advance(arm.now, &mut out);
-            arm.rig.receive(arm.now, 0, &[frame], &mut out);
+            arm.simulator.advance(arm.now, &mut out);
+            arm.simulator.receive(arm.now, 0, &[frame], &mut out);
             for joint in 0..JOINTS {
                 let SimulatedServo::Damiao(motor) = arm.servo(joint) else { panic!("joint {joint} is no motor") };
                 assert!(motor.position_rad().is_finite() && motor.velocity_rad_s().abs() < 100.0);
@@ -111,7 +111,7 @@ fn forged_feedback_never_makes_the_master_energise() {
             state != DriveState::Enabled && state != DriveState::Enabling,
             "status {status:X}: {state:?}"
         );
-        arm.wish = DriveWish::TorqueOff;
+        arm.drive_target = DriveTarget::TorqueOff;
         arm.step();
         assert!(
             arm.sent.iter().any(|f| Request::decode(f, 3) == Some(Request::Special(Special::Disable, 0)))

@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
 use taustream_drivers::drivers::BusDriver;
 use taustream_drivers::sim::settings::{DriveSetup, drives};
-use taustream_drivers::sim::{FaultOrder, Rig, ServoParameters, SimulatedServo};
+use taustream_drivers::sim::{FaultRequest, ServoParameters, ServoSimulator, SimulatedServo};
 use taustream_drivers::{
-    CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus, drivers,
+    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus, drivers,
 };
 
 mod bring_up;
@@ -21,10 +21,10 @@ pub(crate) const START_RAD: [f64; JOINTS] = [0.1, -1.2, 1.0, -0.5, 0.3, -0.2];
 
 pub(crate) struct Arm {
     pub(crate) driver: BusDriver,
-    pub(crate) rig: Rig,
+    pub(crate) simulator: ServoSimulator,
     pub(crate) settings: Settings,
     pub(crate) now: Nanos,
-    pub(crate) wish: DriveWish,
+    pub(crate) drive_target: DriveTarget,
     pub(crate) commands: [JointCommand; 8],
     /// Frames of the newest cycle.
     pub(crate) sent: Vec<CanFrame>,
@@ -67,10 +67,10 @@ impl Arm {
         setups.iter_mut().for_each(change);
         Self {
             driver: drivers::of_bus(&settings, 0).unwrap(),
-            rig: Rig::new(setups, 1, 1),
+            simulator: ServoSimulator::new(setups, 1, 1),
             settings,
             now: Nanos(1_000_000_000),
-            wish: DriveWish::Disabled,
+            drive_target: DriveTarget::Disabled,
             commands: [JointCommand::default(); 8],
             sent: Vec::new(),
             arriving: Vec::new(),
@@ -84,14 +84,14 @@ impl Arm {
 
     pub(crate) fn step(&mut self) {
         let mut batch = FrameBatch::new();
-        self.driver.encode(self.now, self.wish, &self.commands, &mut batch);
+        self.driver.encode(self.now, self.drive_target, &self.commands, &mut batch);
         self.sent = batch.frames().to_vec();
         for frame in self.arriving.drain(..) {
             self.driver.decode(self.now, &frame);
         }
         let mut out = [Vec::new()];
-        self.rig.advance(self.now, &mut out);
-        self.rig.receive(self.now, 0, &self.sent, &mut out);
+        self.simulator.advance(self.now, &mut out);
+        self.simulator.receive(self.now, 0, &self.sent, &mut out);
         self.arriving.append(&mut out[0]);
         self.now.0 += 1_000_000;
     }
@@ -151,7 +151,7 @@ impl Arm {
         // As in the streamer: a while of feedback before anything is energised.
         self.steps(50);
         self.hold();
-        self.wish = DriveWish::Enabled;
+        self.drive_target = DriveTarget::Enabled;
         self.step();
         self.until(DriveState::Enabled);
     }
@@ -168,13 +168,13 @@ impl Arm {
 
     /// Orders a fault of a joint from now on.
     pub(crate) fn fault(&mut self, joint: usize, spec: &str) {
-        let names = self.rig.joints();
+        let names = self.simulator.joints();
         let text = format!("joint={},{spec}", names[joint]);
-        self.rig.order(self.now, FaultOrder::parse(&text, &names).unwrap());
+        self.simulator.request(self.now, FaultRequest::parse(&text, &names).unwrap());
     }
 
     pub(crate) fn servo(&self, joint: usize) -> &SimulatedServo {
-        self.rig.drive(joint).unwrap()
+        self.simulator.drive(joint).unwrap()
     }
 
     /// Status nibble of a simulated motor.

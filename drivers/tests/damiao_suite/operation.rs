@@ -2,7 +2,7 @@
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
 use taustream_drivers::codec::damiao_frames::{Request, Special};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
-use taustream_drivers::{DriveState, DriveWish, JointCommand, ServoDriver, ZeroRefused};
+use taustream_drivers::{DriveState, DriveTarget, JointCommand, ServoDriver, ZeroRefused};
 
 /// What a motor of the arm is commanded in the newest cycle, decoded with its ranges.
 fn mit(arm: &Arm, joint: usize) -> Option<MitCommand> {
@@ -22,7 +22,7 @@ fn gains_rise_from_nothing_in_proportion_over_the_ramp() {
     arm.until(DriveState::Disabled);
     arm.steps(50);
     arm.hold();
-    arm.wish = DriveWish::Enabled;
+    arm.drive_target = DriveTarget::Enabled;
     let mut ramp: Vec<f64> = Vec::new();
     for _ in 0..400 {
         arm.step();
@@ -60,10 +60,10 @@ fn old_command_with_full_gains_is_not_taken_up_when_the_motor_is_energised() {
     let ranges = MitRanges::symmetric(12.5, 45.0, 54.0);
     let frame = Request::Mit(there.encode(&ranges).unwrap()).encode(1, Default::default());
     let mut out = [Vec::new()];
-    arm.rig.receive(arm.now, 0, &[frame], &mut out);
+    arm.simulator.receive(arm.now, 0, &[frame], &mut out);
     let before_rad = arm.servo(0).position_rad();
     arm.hold();
-    arm.wish = DriveWish::Enabled;
+    arm.drive_target = DriveTarget::Enabled;
     for _ in 0..400 {
         arm.step();
         let moved_rad = (arm.servo(0).position_rad() - before_rad).abs();
@@ -160,7 +160,7 @@ fn command_far_from_the_joint_energises_nothing() {
     arm.steps(50);
     arm.hold();
     arm.commands[2].position_rad += 0.06;
-    arm.wish = DriveWish::Enabled;
+    arm.drive_target = DriveTarget::Enabled;
     arm.until_one(2, DriveState::Fault);
     assert!(arm.why(2).contains("too far from the measured position"), "{}", arm.why(2));
     assert_eq!(arm.nibble(2), 0);
@@ -169,7 +169,7 @@ fn command_far_from_the_joint_energises_nothing() {
 #[test]
 fn disabling_lets_go_and_torque_off_does_so_in_the_same_cycle_from_every_state() {
     let mut arm = Arm::enabled(edited(&[]));
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.until(DriveState::Disabled);
     assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0));
@@ -178,19 +178,19 @@ fn disabling_lets_go_and_torque_off_does_so_in_the_same_cycle_from_every_state()
         arm.until(DriveState::Disabled);
         arm.steps(50);
         arm.hold();
-        arm.wish = DriveWish::Enabled;
+        arm.drive_target = DriveTarget::Enabled;
         arm.steps(cycles);
-        arm.wish = DriveWish::TorqueOff;
+        arm.drive_target = DriveTarget::TorqueOff;
         arm.step();
         let off = Request::Special(Special::Disable, 0);
         for servo in &arm.settings.servos {
-            let told = arm.sent.iter().any(|frame| Request::decode(frame, servo.node_id) == Some(off));
-            assert!(told, "{cycles} cycles after enable: node {} is not told", servo.node_id);
+            let commanded = arm.sent.iter().any(|frame| Request::decode(frame, servo.node_id) == Some(off));
+            assert!(commanded, "{cycles} cycles after enable: node {} is not told", servo.node_id);
         }
         arm.steps(5);
         assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0), "{cycles} cycles after enable");
         // The wish that comes back does not energise anything by itself.
-        arm.wish = DriveWish::Enabled;
+        arm.drive_target = DriveTarget::Enabled;
         arm.steps(300);
         assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0), "{cycles} cycles after enable");
     }
@@ -207,7 +207,7 @@ fn motors_let_go_when_commands_stop_and_fall_without_a_brake() {
     arm.until(DriveState::Disabled);
     arm.steps(20_000);
     arm.hold();
-    arm.wish = DriveWish::Enabled;
+    arm.drive_target = DriveTarget::Enabled;
     arm.step();
     arm.until(DriveState::Enabled);
     let lift_rad = arm.commands[1].position_rad;
@@ -218,20 +218,20 @@ fn motors_let_go_when_commands_stop_and_fall_without_a_brake() {
     }
     arm.commands[1].velocity_rad_s = 0.0;
     arm.steps(500);
-    let held_rad = arm.servo(1).position_rad();
+    let hold_position_rad = arm.servo(1).position_rad();
     // The streamer is gone: only time passes.
     let mut out = [Vec::new()];
     let mut fell_after_ms = None;
     for ms in 1..=2_000_u32 {
         arm.now.0 += 1_000_000;
-        arm.rig.advance(arm.now, &mut out);
+        arm.simulator.advance(arm.now, &mut out);
         if fell_after_ms.is_none() && arm.nibble(1) == 0xD {
             fell_after_ms = Some(ms);
         }
     }
     assert!(matches!(fell_after_ms, Some(99..=102)), "TIMEOUT is 100 ms: {fell_after_ms:?}");
     assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0xD));
-    let fell_rad = (arm.servo(1).position_rad() - held_rad).abs();
+    let fell_rad = (arm.servo(1).position_rad() - hold_position_rad).abs();
     assert!(fell_rad > 0.2, "a limp joint falls: {fell_rad} rad");
 }
 
@@ -240,7 +240,7 @@ fn zero_is_set_only_when_the_motor_rests_configured_and_off() {
     let mut arm = Arm::enabled(edited(&[]));
     assert_eq!(arm.driver.set_zero(2), Err(ZeroRefused::NotReady));
     assert_eq!(arm.driver.set_zero(7), Err(ZeroRefused::NoSuchJoint));
-    arm.wish = DriveWish::Disabled;
+    arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.until(DriveState::Disabled);
     // Until the brake has closed the joint sinks.

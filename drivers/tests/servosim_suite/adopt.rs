@@ -4,7 +4,7 @@ use taustream_arm::{Reaction, Settings};
 use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::sim::PowerState;
-use taustream_drivers::{CanFrame, DriveState, DriveWish, ServoDriver};
+use taustream_drivers::{CanFrame, DriveState, DriveTarget, ServoDriver};
 
 /// Two encoder counts: what a drive steers to may not move by more.
 const STILL_RAD: f64 = 1e-6;
@@ -24,7 +24,7 @@ fn orphaned(reaction: Reaction, ms: u64) -> Arm {
     let mut arm = Arm::with(settings(reaction));
     arm.enable();
     arm.move_and_measure(0.26);
-    assert!(arm.rig.drive(1).unwrap().velocity_rad_s().abs() > 1.0, "it was not moving");
+    assert!(arm.simulator.drive(1).unwrap().velocity_rad_s().abs() > 1.0, "it was not moving");
     arm.alone(ms);
     arm
 }
@@ -48,7 +48,7 @@ fn only_reads(frames: &[CanFrame]) -> bool {
 /// What each drive steers to, and where its joint is.
 fn standing(arm: &Arm) -> [(f64, f64); 6] {
     std::array::from_fn(|joint| {
-        let servo = arm.rig.drive(joint).unwrap();
+        let servo = arm.simulator.drive(joint).unwrap();
         (servo.as_cia402().unwrap().reference_rad(), servo.position_rad())
     })
 }
@@ -71,24 +71,28 @@ fn drives_that_hold_are_adopted_by_reading_and_kept_without_a_jump() {
         (3_000, PowerState::QuickStopActive),
     ] {
         let mut arm = orphaned(Reaction::Hold, ms);
-        assert_eq!(arm.rig.drive(1).unwrap().as_cia402().unwrap().power_state(), state, "{ms} ms after");
+        assert_eq!(
+            arm.simulator.drive(1).unwrap().as_cia402().unwrap().power_state(),
+            state,
+            "{ms} ms after"
+        );
         let settings = arm.settings.clone();
         restart_as(&mut arm, &settings);
         let mut cycles = 0;
         while arm.states() != [DriveState::Adopted; 6] {
-            arm.cycle(DriveWish::Disabled);
+            arm.cycle(DriveTarget::Disabled);
             assert!(only_reads(&arm.sent), "{ms} ms: {:?}", arm.sent);
             cycles += 1;
             assert!(cycles < 3_000, "{ms} ms: {:?}", arm.states());
         }
         // The joints' own loops come to rest after the targets do.
         for _ in 0..500 {
-            arm.cycle(DriveWish::Disabled);
+            arm.cycle(DriveTarget::Disabled);
             assert!(only_reads(&arm.sent), "{ms} ms: {:?}", arm.sent);
         }
         let rest = standing(&arm);
         for cycle in 0..600 {
-            arm.cycle(DriveWish::Keep);
+            arm.cycle(DriveTarget::Keep);
             for frame in &arm.sent {
                 let data = frame.data();
                 match frame.id().raw() {
@@ -103,34 +107,36 @@ fn drives_that_hold_are_adopted_by_reading_and_kept_without_a_jump() {
         }
         for joint in 0..6 {
             let status = arm.status(joint);
-            assert!((status.held_rad - status.position_rad).abs() < 0.01, "joint {joint}: {status:?}");
-            arm.commands[joint].position_rad = status.held_rad;
+            assert!(
+                (status.hold_position_rad - status.position_rad).abs() < 0.01,
+                "joint {joint}: {status:?}"
+            );
+            arm.commands[joint].position_rad = status.hold_position_rad;
         }
-        arm.reach(DriveWish::Enabled, DriveState::Enabled);
+        arm.reach(DriveTarget::Enabled, DriveState::Enabled);
         assert_still(&arm, &rest, &format!("{ms} ms, taken over"));
         let worst_rad = arm.move_and_measure(1.0);
         assert!(worst_rad.iter().all(|worst| *worst < 0.006), "{ms} ms: {worst_rad:?}");
-        arm.reach(DriveWish::Disabled, DriveState::Disabled);
+        arm.reach(DriveTarget::Disabled, DriveState::Disabled);
     }
 }
 
 /// Goal: torque that nobody kept is given up in order, from either hold, when the operator says so.
 #[test]
-fn adopted_drives_are_de_energised_on_the_wish() {
+fn adopted_drives_are_de_energised_on_request() {
     for ms in [40, 3_000] {
-        for wish in [DriveWish::Disabled, DriveWish::TorqueOff] {
+        for drive_target in [DriveTarget::Disabled, DriveTarget::TorqueOff] {
             let mut arm = orphaned(Reaction::Hold, ms);
             let settings = arm.settings.clone();
             restart_as(&mut arm, &settings);
-            arm.reach(DriveWish::Disabled, DriveState::Adopted);
+            arm.reach(DriveTarget::Disabled, DriveState::Adopted);
             for _ in 0..300 {
-                arm.cycle(DriveWish::Keep);
+                arm.cycle(DriveTarget::Keep);
             }
-            arm.reach(wish, DriveState::Disabled);
-            assert!(
-                (0..6)
-                    .all(|joint| arm.rig.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0)
-            );
+            arm.reach(drive_target, DriveState::Disabled);
+            assert!((0..6).all(
+                |joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0
+            ));
         }
     }
 }
@@ -146,13 +152,13 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
         let rest = standing(&arm);
         restart_as(&mut arm, &foreign);
         for _ in 0..3_000 {
-            arm.cycle(DriveWish::Disabled);
+            arm.cycle(DriveTarget::Disabled);
             assert!(only_reads(&arm.sent), "{object}: {:?}", arm.sent);
         }
         // Nor does a wish to keep, or to enable, touch it.
-        for wish in [DriveWish::Keep, DriveWish::Enabled, DriveWish::Disabled] {
+        for drive_target in [DriveTarget::Keep, DriveTarget::Enabled, DriveTarget::Disabled] {
             for _ in 0..200 {
-                arm.cycle(wish);
+                arm.cycle(drive_target);
                 assert!(only_reads(&arm.sent), "{object}: {:?}", arm.sent);
             }
         }
@@ -162,14 +168,16 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
         assert!(words.contains(object) && words.contains("torque-off"), "{words}");
         assert_still(&arm, &rest, object);
         for _ in 0..500 {
-            arm.cycle(DriveWish::TorqueOff);
+            arm.cycle(DriveTarget::TorqueOff);
         }
         assert!(
-            (0..6).all(|joint| arm.rig.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0),
+            (0..6).all(
+                |joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0
+            ),
             "{object}"
         );
         // Then they are anybody's, and come up as after power-up.
-        arm.reach(DriveWish::Disabled, DriveState::Disabled);
+        arm.reach(DriveTarget::Disabled, DriveState::Disabled);
     }
 }
 
@@ -179,9 +187,9 @@ fn taking_over_that_is_called_off_leaves_the_drives_holding() {
     let mut arm = orphaned(Reaction::Hold, 3_000);
     let settings = arm.settings.clone();
     restart_as(&mut arm, &settings);
-    arm.reach(DriveWish::Disabled, DriveState::Adopted);
+    arm.reach(DriveTarget::Disabled, DriveState::Adopted);
     for _ in 0..300 {
-        arm.cycle(DriveWish::Keep);
+        arm.cycle(DriveTarget::Keep);
     }
     let rest = standing(&arm);
     // A command that lies far from the hold is not followed.
@@ -189,18 +197,18 @@ fn taking_over_that_is_called_off_leaves_the_drives_holding() {
         command.position_rad = 3.0;
     }
     for _ in 0..100 {
-        arm.cycle(DriveWish::Enabled);
+        arm.cycle(DriveTarget::Enabled);
     }
     for joint in 0..6 {
         let status = arm.status(joint);
         assert!(arm.driver.explain(status.error_code).contains("too far"), "joint {joint}: {status:?}");
     }
     for _ in 0..300 {
-        arm.cycle(DriveWish::Keep);
+        arm.cycle(DriveTarget::Keep);
     }
     assert_still(&arm, &rest, "called off");
     assert!(
-        (0..6).all(|joint| arm.rig.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 != 0),
+        (0..6).all(|joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 != 0),
         "one let go"
     );
 }

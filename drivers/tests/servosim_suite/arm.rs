@@ -3,9 +3,9 @@ use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::sim::settings::drives;
-use taustream_drivers::sim::{FaultOrder, Rig};
+use taustream_drivers::sim::{FaultRequest, ServoSimulator};
 use taustream_drivers::{
-    CanFrame, DriveState, DriveWish, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
+    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -14,7 +14,7 @@ const START_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 /// The shipped arm, its drives and its master.
 pub(super) struct Arm {
     pub(super) settings: Settings,
-    pub(super) rig: Rig,
+    pub(super) simulator: ServoSimulator,
     pub(super) driver: Cia402Driver,
     pub(super) now: Nanos,
     pub(super) commands: [JointCommand; 8],
@@ -36,35 +36,35 @@ impl Arm {
 
     pub(super) fn with(settings: Settings) -> Self {
         let setups = drives(&settings, Some(&START_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
-        let rig = Rig::new(setups, 1, 1);
+        let simulator = ServoSimulator::new(setups, 1, 1);
         let driver = Cia402Driver::new(&settings, 0).unwrap();
         let out = vec![Vec::new()];
         let mut commands = [JointCommand::default(); 8];
         for (command, start_rad) in commands.iter_mut().zip(START_RAD) {
             command.position_rad = start_rad;
         }
-        Self { settings, rig, driver, now: Nanos(1_000_000_000), commands, out, sent: Vec::new() }
+        Self { settings, simulator, driver, now: Nanos(1_000_000_000), commands, out, sent: Vec::new() }
     }
 
     /// The master is gone for this long.
     pub(super) fn alone(&mut self, ms: u64) {
         for _ in 0..ms {
             self.now.0 += PERIOD_NS;
-            self.rig.advance(self.now, &mut self.out);
+            self.simulator.advance(self.now, &mut self.out);
             self.out[0].clear();
         }
     }
 
     /// One cycle: the answers of the last one are taken, then SYNC and setpoints go out and are answered.
-    pub(super) fn cycle(&mut self, wish: DriveWish) {
+    pub(super) fn cycle(&mut self, drive_target: DriveTarget) {
         self.now.0 += PERIOD_NS;
-        self.rig.advance(self.now, &mut self.out);
+        self.simulator.advance(self.now, &mut self.out);
         for frame in self.out[0].drain(..) {
             self.driver.decode(self.now, &frame);
         }
         let mut batch = FrameBatch::new();
-        self.driver.encode(self.now, wish, &self.commands, &mut batch);
-        self.rig.receive(self.now, 0, batch.frames(), &mut self.out);
+        self.driver.encode(self.now, drive_target, &self.commands, &mut batch);
+        self.simulator.receive(self.now, 0, batch.frames(), &mut self.out);
         self.sent = batch.frames().to_vec();
     }
 
@@ -77,9 +77,9 @@ impl Arm {
     }
 
     /// Cycles until every drive is in a state.
-    pub(super) fn reach(&mut self, wish: DriveWish, state: DriveState) {
+    pub(super) fn reach(&mut self, drive_target: DriveTarget, state: DriveState) {
         for _ in 0..10_000 {
-            self.cycle(wish);
+            self.cycle(drive_target);
             if self.states() == [state; 6] {
                 return;
             }
@@ -88,11 +88,11 @@ impl Arm {
     }
 
     pub(super) fn enable(&mut self) {
-        self.reach(DriveWish::Disabled, DriveState::Disabled);
+        self.reach(DriveTarget::Disabled, DriveState::Disabled);
         for joint in 0..6 {
             self.commands[joint].position_rad = self.status(joint).position_rad;
         }
-        self.reach(DriveWish::Enabled, DriveState::Enabled);
+        self.reach(DriveTarget::Enabled, DriveState::Enabled);
     }
 
     /// The worst |measured - commanded two cycles ago| while moving all joints along a raised cosine.
@@ -107,7 +107,7 @@ impl Arm {
                 // Half a radian there and back: peaks of 1.5 rad/s and 9 rad/s^2.
                 self.commands[joint].position_rad = base_rad[joint] + 0.25 * (1.0 - (6.0 * t_s).cos());
             }
-            self.cycle(DriveWish::Enabled);
+            self.cycle(DriveTarget::Enabled);
             due_rad.rotate_left(1);
             due_rad[2] = std::array::from_fn(|joint| self.commands[joint].position_rad);
             for joint in 0..6 {
@@ -126,8 +126,11 @@ fn six_drives_come_up_follow_a_motion_and_are_disabled_in_order() {
     let mut arm = Arm::new();
     arm.enable();
     for joint in 0..6 {
-        let held_rad = arm.rig.drive(joint).unwrap().position_rad();
-        assert!((held_rad - START_RAD[joint]).abs() < 0.01, "joint {joint} sagged to {held_rad}");
+        let hold_position_rad = arm.simulator.drive(joint).unwrap().position_rad();
+        assert!(
+            (hold_position_rad - START_RAD[joint]).abs() < 0.01,
+            "joint {joint} sagged to {hold_position_rad}"
+        );
     }
     let worst_rad = arm.move_and_measure(3.0);
     println!("worst tracking errors {worst_rad:.6?} rad");
@@ -136,7 +139,7 @@ fn six_drives_come_up_follow_a_motion_and_are_disabled_in_order() {
         // A joint that does not move at all would have been 0.5 rad off.
         assert!(worst_rad > 1e-9);
     }
-    arm.reach(DriveWish::Disabled, DriveState::Disabled);
+    arm.reach(DriveTarget::Disabled, DriveState::Disabled);
     for joint in 0..6 {
         assert_eq!(arm.status(joint).error_code, 0, "joint {joint}");
     }
@@ -155,9 +158,9 @@ fn faults_on_request_reach_the_master_as_what_they_are() {
     {
         let mut arm = Arm::new();
         arm.enable();
-        let names = arm.rig.joints();
-        let order = FaultOrder::parse(&format!("joint=elbow,after=moving,at_s=0.25,kind={kind}"), &names);
-        arm.rig.order(arm.now, order.unwrap_or_else(|error| panic!("{kind}: {error}")));
+        let names = arm.simulator.joints();
+        let order = FaultRequest::parse(&format!("joint=elbow,after=moving,at_s=0.25,kind={kind}"), &names);
+        arm.simulator.request(arm.now, order.unwrap_or_else(|error| panic!("{kind}: {error}")));
         let mut found_at = None;
         let mut last_rad = arm.status(2).position_rad;
         for tick in 0..1500 {
@@ -165,7 +168,7 @@ fn faults_on_request_reach_the_master_as_what_they_are() {
             for joint in 0..6 {
                 arm.commands[joint].position_rad = START_RAD[joint] + 0.4 * (1.0 - (5.0 * t_s).cos());
             }
-            arm.cycle(DriveWish::Enabled);
+            arm.cycle(DriveTarget::Enabled);
             let status = arm.status(2);
             let found = match kind {
                 "silence" | "drop,value=1" => silent(status, arm.now),
@@ -193,9 +196,9 @@ fn faults_on_request_reach_the_master_as_what_they_are() {
 fn delayed_drive_answers_late_and_recovers_when_cleared() {
     let mut arm = Arm::new();
     arm.enable();
-    let names = arm.rig.joints();
-    let order = FaultOrder::parse("joint=2,kind=delay,value=7", &names).unwrap();
-    arm.rig.order(arm.now, order);
+    let names = arm.simulator.joints();
+    let order = FaultRequest::parse("joint=2,kind=delay,value=7", &names).unwrap();
+    arm.simulator.request(arm.now, order);
     let base_rad = arm.commands[1].position_rad;
     let mut lag_rad = 0.0_f64;
     for tick in 0..400 {
@@ -203,15 +206,15 @@ fn delayed_drive_answers_late_and_recovers_when_cleared() {
         for joint in 0..6 {
             arm.commands[joint].position_rad = START_RAD[joint] + t_s;
         }
-        arm.cycle(DriveWish::Enabled);
+        arm.cycle(DriveTarget::Enabled);
         // At 1 rad/s a millisecond is a milliradian.
         lag_rad = base_rad + t_s - arm.status(1).position_rad;
     }
     assert!((0.007..0.013).contains(&lag_rad), "lags {lag_rad} rad at 1 rad/s");
-    arm.rig.clear(Some(1));
-    arm.cycle(DriveWish::Enabled);
+    arm.simulator.clear(Some(1));
+    arm.cycle(DriveTarget::Enabled);
     for _ in 0..300 {
-        arm.cycle(DriveWish::Enabled);
+        arm.cycle(DriveTarget::Enabled);
     }
     let still_rad = (arm.commands[1].position_rad - arm.status(1).position_rad).abs();
     assert!(still_rad < 0.003, "still {still_rad} rad behind");
@@ -223,21 +226,21 @@ fn master_that_vanishes_leaves_the_arm_stopped_and_held() {
     let mut arm = Arm::new();
     arm.enable();
     arm.move_and_measure(0.26);
-    assert!(arm.rig.drive(1).unwrap().velocity_rad_s().abs() > 1.0);
+    assert!(arm.simulator.drive(1).unwrap().velocity_rad_s().abs() > 1.0);
     let watchdog_ms = u64::from(arm.settings.cycle.drive_watchdog_ms);
     for _ in 0..watchdog_ms + 400 {
         arm.now.0 += PERIOD_NS;
-        arm.rig.advance(arm.now, &mut arm.out);
+        arm.simulator.advance(arm.now, &mut arm.out);
     }
     let fault_frame = arm.out[0].iter().any(|f| f.id().raw() == 0x082 && f.data()[..2] == [0x50, 0x82]);
     assert!(fault_frame, "no EMCY 0x8250 of node 2");
-    let rest_rad: Vec<f64> = (0..6).map(|joint| arm.rig.drive(joint).unwrap().position_rad()).collect();
+    let rest_rad: Vec<f64> = (0..6).map(|joint| arm.simulator.drive(joint).unwrap().position_rad()).collect();
     for _ in 0..1000 {
         arm.now.0 += PERIOD_NS;
-        arm.rig.advance(arm.now, &mut arm.out);
+        arm.simulator.advance(arm.now, &mut arm.out);
     }
     for joint in 0..6 {
-        let drive = arm.rig.drive(joint).unwrap();
+        let drive = arm.simulator.drive(joint).unwrap();
         assert!((drive.position_rad() - rest_rad[joint]).abs() < 1e-9, "joint {joint} still moves");
         assert_eq!(drive.as_cia402().unwrap().statusword() & 0x4F, 0x08, "joint {joint} is not in fault");
     }

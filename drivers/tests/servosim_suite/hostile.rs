@@ -4,7 +4,7 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptes
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{FaultOrder, Order, ServoParameters};
+use taustream_drivers::sim::{FaultRequest, ServoParameters, SimulatorCommand};
 use taustream_drivers::{CanFrame, CanId};
 
 fn joints() -> Vec<String> {
@@ -66,14 +66,14 @@ proptest! {
     }
 
     #[test]
-    fn random_orders_never_panic(text in "(fault |clear )?[a-z_=,0-9.x-]{0,60}") {
-        let _understood = Order::parse(&text, &joints());
-        let _understood = FaultOrder::parse(&text, &joints());
+    fn random_fault_requests_never_panic(text in "(fault |clear )?[a-z_=,0-9.x-]{0,60}") {
+        let _understood = SimulatorCommand::parse(&text, &joints());
+        let _understood = FaultRequest::parse(&text, &joints());
     }
 }
 
 #[test]
-fn bad_orders_get_a_sentence_that_names_the_offender() {
+fn bad_fault_requests_get_a_message_that_names_the_offender() {
     for (text, words) in [
         ("", "no part of a fault"),
         ("joint=1", "kind is missing"),
@@ -97,13 +97,16 @@ fn bad_orders_get_a_sentence_that_names_the_offender() {
         ("joint=1,kind=fault,value=0x12345", "an EMCY code"),
         ("joint=1,kind=fault,value=0", "an EMCY code"),
     ] {
-        let error = FaultOrder::parse(text, &joints()).expect_err(text).to_string();
+        let error = FaultRequest::parse(text, &joints()).expect_err(text).to_string();
         assert!(error.contains(words), "{text}: {error}");
     }
     for line in ["explode", "clear all", "clear joint=9", "status now", "fault"] {
-        assert!(Order::parse(line, &joints()).is_err(), "{line}");
+        assert!(SimulatorCommand::parse(line, &joints()).is_err(), "{line}");
     }
-    assert_eq!(Order::parse(" clear joint=elbow\n", &joints()), Ok(Order::Clear(Some(1))));
+    assert_eq!(
+        SimulatorCommand::parse(" clear joint=elbow\n", &joints()),
+        Ok(SimulatorCommand::Clear(Some(1)))
+    );
 }
 
 /// The shipped settings with another [simulator] section.

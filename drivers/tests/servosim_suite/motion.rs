@@ -7,15 +7,15 @@ use taustream_drivers::sim::{Disturbance, DriveParameters, PlantParameters, Powe
 fn drive_that_is_enabled_follows_a_motion_within_a_milliradian() {
     let mut bench = enabled(parameters());
     let mut worst_rad = 0.0_f64;
-    let mut aims_rad = [START_RAD; 2];
+    let mut targets_rad = [START_RAD; 2];
     for tick in 0..3000 {
         let t_s = f64::from(tick) * 1e-3;
         // Peaks of 2.5 rad/s and 5 rad/s^2.
-        let aim_rad = START_RAD + 1.25 * (1.0 - (2.0 * t_s).cos());
-        let (_, measured) = bench.cycle(0x0F, counts(aim_rad));
+        let requested_rad = START_RAD + 1.25 * (1.0 - (2.0 * t_s).cos());
+        let (_, measured) = bench.cycle(0x0F, counts(requested_rad));
         // Sent in this cycle, latched at the next SYNC, reached one interpolation period later.
-        let due_rad = aims_rad[0];
-        aims_rad = [aims_rad[1], aim_rad];
+        let due_rad = targets_rad[0];
+        targets_rad = [targets_rad[1], requested_rad];
         let measured_rad = f64::from(measured) / COUNTS_PER_RAD + ZERO_RAD;
         worst_rad = worst_rad.max((measured_rad - due_rad).abs());
     }
@@ -137,13 +137,13 @@ fn limp_joint_falls_under_gravity_and_a_braked_one_does_not() {
         for _ in 0..300 {
             bench.cycle(0x0F, counts(START_RAD));
         }
-        let held_rad = bench.drive.position_rad();
-        assert!((held_rad - START_RAD).abs() < 0.005, "does not hold: {held_rad}");
+        let hold_position_rad = bench.drive.position_rad();
+        assert!((hold_position_rad - START_RAD).abs() < 0.005, "does not hold: {hold_position_rad}");
         bench.cycle(0x00, counts(START_RAD)); // Disable voltage.
         for _ in 0..500 {
             bench.cycle(0x00, counts(START_RAD));
         }
-        let fallen_rad = bench.drive.position_rad() - held_rad;
+        let fallen_rad = bench.drive.position_rad() - hold_position_rad;
         // Even a brake lets it sag while it closes: 20 ms at about 18 rad/s^2.
         assert_eq!(fallen_rad > 0.5, falls, "brake {brake}: moved by {fallen_rad} rad");
         assert!(falls || fallen_rad.abs() < 0.006, "brake slipped by {fallen_rad} rad");

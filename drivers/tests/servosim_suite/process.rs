@@ -56,7 +56,7 @@ impl Process {
         line.trim_end().to_owned()
     }
 
-    fn order(&mut self, line: &str) -> String {
+    fn request(&mut self, line: &str) -> String {
         writeln!(self.child.stdin.as_mut().unwrap(), "{line}").unwrap();
         self.line()
     }
@@ -106,18 +106,18 @@ fn bad_usage_ends_with_2_and_one_sentence() {
 }
 
 #[test]
-fn orders_are_acknowledged_and_their_end_does_not_end_the_simulator() {
+fn fault_requests_are_acknowledged_and_their_end_does_not_end_the_simulator() {
     let runtime = Runtime::new("orders");
     let mut process = Process::start(&runtime, &["--start-rad", "0.5,-1.57,1.57,-1.57,-1.57,0"]);
     assert_eq!(
-        process.order("fault joint=elbow,kind=delay,value=3,after=moving"),
+        process.request("fault joint=elbow,kind=delay,value=3,after=moving"),
         "ok: delay of 3.0 ms of elbow is ordered"
     );
-    assert!(process.order("fault joint=elbow").starts_with("error: kind is missing"));
-    assert!(process.order("dance").starts_with("error: unknown order \"dance\""));
-    assert!(process.order(&"x".repeat(5000)).starts_with("error: a line of 5001 bytes"));
-    assert_eq!(process.order("clear"), "ok: cleared");
-    let status = process.order("status");
+    assert!(process.request("fault joint=elbow").starts_with("error: kind is missing"));
+    assert!(process.request("dance").starts_with("error: unknown order \"dance\""));
+    assert!(process.request(&"x".repeat(5000)).starts_with("error: a line of 5001 bytes"));
+    assert_eq!(process.request("clear"), "ok: cleared");
+    let status = process.request("status");
     assert!(
         status.starts_with("status joint=shoulder_pan node=1 position_rad=0.5 velocity_rad_s=0 "),
         "{status}"
@@ -126,7 +126,7 @@ fn orders_are_acknowledged_and_their_end_does_not_end_the_simulator() {
         assert!(process.line().starts_with("status joint="));
     }
     assert_eq!(process.line(), "ok: status");
-    assert_eq!(process.order("fault joint=1,kind=warning"), "ok: warning of shoulder_pan is ordered");
+    assert_eq!(process.request("fault joint=1,kind=warning"), "ok: warning of shoulder_pan is ordered");
     assert_eq!(process.line(), "fault begins: warning of shoulder_pan");
     drop(process.child.stdin.take());
     std::thread::sleep(std::time::Duration::from_millis(50));

@@ -4,9 +4,9 @@
 use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Stroke, Trajectory};
 
 /// A small reproducible source of numbers (splitmix64), so that a failing seed can be run again anywhere.
-pub(crate) struct Draw(u64);
+pub(crate) struct SeededRng(u64);
 
-impl Draw {
+impl SeededRng {
     /// The same seed gives the same numbers.
     pub(crate) fn from_seed(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x2545_f491_4f6c_dd1d).wrapping_add(0x1234_5678))
@@ -73,17 +73,17 @@ pub(crate) fn ur5_limits() -> [JointLimits; MAX_JOINTS] {
 }
 
 /// Limits that differ from joint to joint and from seed to seed.
-pub(crate) fn random_limits(draw: &mut Draw) -> [JointLimits; MAX_JOINTS] {
+pub(crate) fn random_limits(rng: &mut SeededRng) -> [JointLimits; MAX_JOINTS] {
     [(); MAX_JOINTS].map(|()| {
         let motion = LimitSet {
-            velocity_rad_s: draw.within(0.5, 3.5),
-            acceleration_rad_s2: draw.within(1.0, 20.0),
-            jerk_rad_s3: draw.within(5.0, 300.0),
+            velocity_rad_s: rng.within(0.5, 3.5),
+            acceleration_rad_s2: rng.within(1.0, 20.0),
+            jerk_rad_s3: rng.within(5.0, 300.0),
         };
         let stop = LimitSet {
             velocity_rad_s: motion.velocity_rad_s,
-            acceleration_rad_s2: motion.acceleration_rad_s2 * draw.within(1.2, 3.0),
-            jerk_rad_s3: motion.jerk_rad_s3 * draw.within(1.5, 6.0),
+            acceleration_rad_s2: motion.acceleration_rad_s2 * rng.within(1.2, 3.0),
+            jerk_rad_s3: motion.jerk_rad_s3 * rng.within(1.5, 6.0),
         };
         JointLimits { position_rad: [-20.0, 20.0], motion, stop }
     })

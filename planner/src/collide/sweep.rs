@@ -3,7 +3,7 @@
 //! At the middle of an interval the exact distance of a pair is compared with how far its points can move until
 //! the interval's ends ([`World::moves_m`]). A pair whose distance is larger is settled for the whole interval; the
 //! others are handed to the two halves. Nothing that happens between samples can be missed.
-use crate::work::Work;
+use crate::budget::Budget;
 use crate::world::{Pair, Snapshot, World};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 
@@ -70,7 +70,7 @@ impl SweepRules {
     pub const PROOF: Self =
         Self { extra_m: 0.0, resolution_m: 1e-6, checks_max: 400_000, bracket_m: 1e-3, first_contact: true };
     /// For the way out of the margin, which begins at its edge: as fine as the proof.
-    pub const WAY_OUT: Self = Self {
+    pub const MARGIN_EXIT: Self = Self {
         extra_m: 0.0,
         resolution_m: 1e-6,
         checks_max: 20_000,
@@ -122,13 +122,13 @@ pub fn sweep(
     motion: &dyn Motion,
     [from, to]: [f64; 2],
     rules: &SweepRules,
-    work: &Work,
+    budget: &Budget,
 ) -> Result<Clearance, Blocked> {
     let mut state = State {
         world,
         motion,
         rules,
-        work,
+        budget,
         snapshot: Snapshot::default(),
         moves_m: Vec::new(),
         active: (0..world.pairs().len()).collect(),
@@ -152,7 +152,7 @@ struct State<'a> {
     world: &'a World<'a>,
     motion: &'a dyn Motion,
     rules: &'a SweepRules,
-    work: &'a Work<'a>,
+    budget: &'a Budget<'a>,
     snapshot: Snapshot,
     moves_m: Vec<[f64; MAX_JOINTS + 1]>,
     /// A stack of the pairs that are not settled, one range an open interval.
@@ -167,7 +167,7 @@ impl State<'_> {
         open: std::ops::Range<usize>,
         depth: u32,
     ) -> Result<(), Blocked> {
-        if self.found.checks >= self.rules.checks_max || self.work.is_over_after(open.len()) {
+        if self.found.checks >= self.rules.checks_max || self.budget.is_over_after(open.len()) {
             return Err(self.blocked(from, None));
         }
         self.found.checks += 1;

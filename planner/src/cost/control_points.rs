@@ -96,21 +96,21 @@ impl<'a> ControlPointCost<'a> {
     #[must_use]
     pub fn rate(&self, x: &[f64]) -> Option<PaperCost> {
         let corners = self.corners(x)?;
-        let Some(sifted) = self.fast.as_ref().and_then(|fast| fast.sift(&corners)) else {
+        let Some(prefiltered) = self.fast.as_ref().and_then(|fast| fast.prefilter(&corners)) else {
             return self.rate_poses(&corners);
         };
         let mut sum = Sum::new(&self.model, self.robot, &self.spheres);
-        for (segment, step) in sifted.suspects {
+        for (segment, step) in prefiltered.suspects {
             let pose = self.pose(corners.get(segment..segment + 2)?, step);
             sum.penalise(&self.robot.chain.frames(&pose)[..=self.robot.chain.joints()]);
         }
-        let ways = corners.windows(2).map(|pair| match pair {
+        let travels = corners.windows(2).map(|pair| match pair {
             [from, to] => from.iter().zip(to).map(|(p, q)| (q - p).abs()).sum(),
             _ => 0.0,
         });
-        sum.cost.path_length_m = sifted.length_m;
+        sum.cost.path_length_m = prefiltered.length_m;
         // Joints go one way within a segment.
-        sum.cost.joint_travel_rad = ways.sum();
+        sum.cost.joint_travel_rad = travels.sum();
         sum.cost.poses = self.phases.len() * (corners.len() - 1) + 1;
         Some(sum.finish())
     }

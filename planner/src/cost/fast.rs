@@ -5,7 +5,7 @@
 use super::flat::Flat;
 use super::level::Level;
 use super::margin::Limits;
-use super::sieve::{Angles, CELL, Cells, PADDING, Pass, Passed, Sweep};
+use super::prefilter::{Angles, CELL, Cells, PADDING, Pass, Passed, Sweep};
 use super::skeleton::Skeleton;
 use super::{CostModel, Point};
 use crate::optimize::Reading;
@@ -14,7 +14,7 @@ use taustream_motion::chain::Chain;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Longest way of an angle in half turns that the kernel takes.
-const WAY_MAX: f32 = 64.0;
+const DISTANCE_MAX: f32 = 64.0;
 
 /// The constants of one problem.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub(super) struct Fast {
 
 /// What the kernel says about a motion.
 #[derive(Clone, Debug)]
-pub(super) struct Sifted {
+pub(super) struct Prefiltered {
     /// Length of the tip's path.
     pub(super) length_m: f64,
     /// The poses that are not surely free, in order: segment and step. The last segment's step behind its last one is
@@ -60,10 +60,10 @@ impl Fast {
     }
 
     /// Looks through a motion; `None` when its angles are beyond all measure.
-    pub(super) fn sift(&self, corners: &[JointArray]) -> Option<Sifted> {
+    pub(super) fn prefilter(&self, corners: &[JointArray]) -> Option<Prefiltered> {
         let angles = self.motion_angles(corners)?;
         let limits = Limits::new(&self.flat, &angles, self.sums);
-        Some(self.sift_within(&angles, &self.sweeps(corners), &limits))
+        Some(self.prefilter_within(&angles, &self.sweeps(corners), &limits))
     }
 
     /// How far each segment moves anything at most.
@@ -71,15 +71,18 @@ impl Fast {
     fn sweeps(&self, corners: &[JointArray]) -> Vec<Sweep> {
         let sweep = |pair: &[JointArray]| {
             let [from, to] = pair else { return f64::INFINITY };
-            let ways = from.iter().zip(to).map(|(p, q)| (q - p).abs());
-            ways.zip(self.flat.bones()).map(|(way, bone)| way * bone.reach_m).sum()
+            let travels = from.iter().zip(to).map(|(p, q)| (q - p).abs());
+            travels
+                .zip(self.flat.link_segments())
+                .map(|(travel, link_segment)| travel * link_segment.reach_m)
+                .sum()
         };
         // A cell is called far on the strength of it.
         corners.windows(2).map(|pair| (sweep(pair) * (1.0 + 1e-6)) as f32).collect()
     }
 
     /// Looks through a motion with given limits.
-    fn sift_within(&self, angles: &[Angles], sweeps: &[Sweep], limits: &Limits) -> Sifted {
+    fn prefilter_within(&self, angles: &[Angles], sweeps: &[Sweep], limits: &Limits) -> Prefiltered {
         let row = self.phases.len();
         let mut slack = vec![0.0_f32; row * angles.len()];
         let (flat, phases) = (&self.flat, self.phases.as_slice());
@@ -96,7 +99,7 @@ impl Fast {
                 suspects.extend(steps.map(|(step, _)| (segment, step)));
             }
         }
-        Sifted { length_m, suspects }
+        Prefiltered { length_m, suspects }
     }
 
     fn motion_angles(&self, corners: &[JointArray]) -> Option<Vec<Angles>> {
@@ -107,18 +110,20 @@ impl Fast {
     /// Start and way of every angle that the kernel uses, in half turns.
     fn angles(&self, from_rad: &JointArray, to_rad: &JointArray) -> Option<Angles> {
         let mut angles = [[0.0; 2]; MAX_JOINTS];
-        let (mut start, mut way) = (0.0, 0.0);
+        let (mut start, mut travel) = (0.0, 0.0);
         let joints = from_rad.iter().zip(to_rad).enumerate();
-        for ((bone, slot), (joint, (from, to))) in self.flat.bones().zip(&mut angles).zip(joints) {
-            if bone.group == joint {
-                (start, way) = (0.0, 0.0);
+        for ((link_segment, slot), (joint, (from, to))) in
+            self.flat.link_segments().zip(&mut angles).zip(joints)
+        {
+            if link_segment.group == joint {
+                (start, travel) = (0.0, 0.0);
             }
-            start += (from + bone.offset_rad) / PI;
-            way += (to - from) / PI;
+            start += (from + link_segment.offset_rad) / PI;
+            travel += (to - from) / PI;
             #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-            let pair = [within_one(start) as f32, way as f32];
+            let pair = [within_one(start) as f32, travel as f32];
             *slot = pair;
-            if pair[1].abs() > WAY_MAX {
+            if pair[1].abs() > DISTANCE_MAX {
                 return None;
             }
         }
@@ -151,7 +156,7 @@ fn within_one(half_turns: f64) -> f64 {
 #[cfg(test)]
 impl Fast {
     /// A planted fault: the kernel's numbers against the plain limits.
-    pub(super) fn sift_without_margin(&self, corners: &[JointArray]) -> Sifted {
+    pub(super) fn prefilter_without_margin(&self, corners: &[JointArray]) -> Prefiltered {
         let angles = self.motion_angles(corners).expect("angles of an arm");
         let mut limits = Limits::new(&self.flat, &angles, self.sums);
         for (limit, sphere) in limits.spheres.iter_mut().zip(&self.flat.spheres) {
@@ -161,6 +166,6 @@ impl Fast {
             limit.free_from = free_from;
             limit.distance = free_from.sqrt();
         }
-        self.sift_within(&angles, &self.sweeps(corners), &limits)
+        self.prefilter_within(&angles, &self.sweeps(corners), &limits)
     }
 }

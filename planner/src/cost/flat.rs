@@ -1,11 +1,11 @@
 //! The constants of the kernel: a skeleton, spheres and links rounded to f32, and which steps can be left out.
 use super::Point;
-use super::skeleton::{Bone, NOTHING, Skeleton};
+use super::skeleton::{LinkSegment, NOTHING, Skeleton};
 use nalgebra::Vector3;
 
 /// One joint, as the kernel needs it.
 #[derive(Clone, Debug)]
-pub(super) struct FlatBone {
+pub(super) struct FlatSegment {
     /// Added to the joint's position.
     pub(super) offset_rad: f64,
     /// The first joint of the parallel ones up to here: the angles from there on add up.
@@ -52,9 +52,9 @@ pub(super) struct FlatSphere {
 #[derive(Clone, Debug)]
 pub(super) struct Flat {
     /// The first joint, whose turn moves the spheres instead of the arm.
-    pub(super) first: FlatBone,
+    pub(super) first: FlatSegment,
     /// The other joints.
-    pub(super) others: Vec<FlatBone>,
+    pub(super) others: Vec<FlatSegment>,
     /// The base frame's origin, seen from the first joint.
     pub(super) base: [f32; 3],
     /// True when the base frame's origin lies on the first joint's axis.
@@ -81,7 +81,7 @@ impl Flat {
         const CLEAR_M: f64 = 1e-6;
         let (base_m, reach_m) = (skeleton.base_m(), skeleton.reach_m());
         let base_is_on_axis = is_on_axis(&base_m);
-        let first_m = skeleton.bones.first()?.origin_m;
+        let first_m = skeleton.link_segments.first()?.origin_m;
         let still = (base_is_on_axis && is_on_axis(&first_m)).then_some((base_m, first_m));
         let sphere = |(center, radius_m): &(Point, f64)| {
             let center_m = skeleton.root.inverse_transform_point(center);
@@ -99,7 +99,7 @@ impl Flat {
         if !stands_still {
             spheres.iter_mut().for_each(|s| s.still_m = None);
         }
-        let mut others = flat_bones(skeleton);
+        let mut others = flat_segments(skeleton);
         let first = others.remove(0);
         let links = flat_links(skeleton, stands_still);
         let size_m = spheres.iter().map(|s| s.away_m + s.limit_m).fold(reach_m, f64::max);
@@ -110,7 +110,7 @@ impl Flat {
 
 impl Flat {
     /// Every joint, base to tip.
-    pub(super) fn bones(&self) -> impl Iterator<Item = &FlatBone> {
+    pub(super) fn link_segments(&self) -> impl Iterator<Item = &FlatSegment> {
         std::iter::once(&self.first).chain(&self.others)
     }
 }
@@ -125,54 +125,54 @@ fn is_on_axis(v: &Vector3<f64>) -> bool {
     v.x == 0.0 && v.y == 0.0
 }
 
-fn flat_bones(skeleton: &Skeleton) -> Vec<FlatBone> {
+fn flat_segments(skeleton: &Skeleton) -> Vec<FlatSegment> {
     let mut group = 0;
-    let mut bones = Vec::with_capacity(skeleton.bones.len());
-    for (i, bone) in skeleton.bones.iter().enumerate() {
+    let mut link_segments = Vec::with_capacity(skeleton.link_segments.len());
+    for (i, link_segment) in skeleton.link_segments.iter().enumerate() {
         // The first joint turns the spheres and not the arm, so that a group begins behind it, too.
-        let begins = i < 2 || skeleton.bones.get(i - 1).is_none_or(|b| b.tilt.is_some());
+        let begins = i < 2 || skeleton.link_segments.get(i - 1).is_none_or(|b| b.tilt.is_some());
         group = if begins { i } else { group };
-        let is_shared = (bone.next_m - bone.origin_m).norm() < NOTHING;
-        bones.push(FlatBone {
-            offset_rad: bone.offset_rad,
+        let is_shared = (link_segment.next_m - link_segment.origin_m).norm() < NOTHING;
+        link_segments.push(FlatSegment {
+            offset_rad: link_segment.offset_rad,
             group,
-            origin: narrow(&bone.origin_m),
-            next: (!is_shared).then(|| narrow(&bone.next_m)),
-            swings: !(is_on_axis(&bone.origin_m) && is_on_axis(&bone.next_m)),
+            origin: narrow(&link_segment.origin_m),
+            next: (!is_shared).then(|| narrow(&link_segment.next_m)),
+            swings: !(is_on_axis(&link_segment.origin_m) && is_on_axis(&link_segment.next_m)),
             turns: false,
             #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-            tilt: bone.tilt.map(|[cos, sin]| [cos as f32, sin as f32]),
+            tilt: link_segment.tilt.map(|[cos, sin]| [cos as f32, sin as f32]),
             wants: [false; 2],
-            reach_m: skeleton.bones.iter().skip(i).map(Bone::length_m).sum(),
+            reach_m: skeleton.link_segments.iter().skip(i).map(LinkSegment::length_m).sum(),
         });
     }
     // From the tip back: what is asked of the directions behind each joint.
     let (mut wants_xy, mut wants_z) = (false, false);
-    for bone in bones.iter_mut().rev() {
-        bone.wants = [wants_xy, wants_z];
-        if let Some([cos, sin]) = bone.tilt {
+    for link_segment in link_segments.iter_mut().rev() {
+        link_segment.wants = [wants_xy, wants_z];
+        if let Some([cos, sin]) = link_segment.tilt {
             let (y, z) =
                 (wants_xy || (wants_z && sin != 0.0), wants_z && cos != 0.0 || wants_xy && sin != 0.0);
-            bone.turns = y;
+            link_segment.turns = y;
             (wants_xy, wants_z) = (y, z);
         }
-        bone.turns |= bone.swings;
-        wants_xy |= bone.swings;
-        wants_z |= bone.origin[2] != 0.0 || bone.next.is_some_and(|n| n[2] != 0.0);
+        link_segment.turns |= link_segment.swings;
+        wants_xy |= link_segment.swings;
+        wants_z |= link_segment.origin[2] != 0.0 || link_segment.next.is_some_and(|n| n[2] != 0.0);
     }
-    bones
+    link_segments
 }
 
 fn flat_links(skeleton: &Skeleton, stands_still: bool) -> Vec<FlatLink> {
     let mut links = Vec::new();
     let (mut before_m, mut tilt) = (-skeleton.base_m(), None);
-    for (from, bone) in skeleton.bones.iter().enumerate() {
+    for (from, link_segment) in skeleton.link_segments.iter().enumerate() {
         // From the origin in front of the joint to the joint, seen from the joint, and on to the origin behind it.
         let [cos, sin] = tilt.unwrap_or([1.0, 0.0]);
         let (y, z) = (before_m.y, before_m.z);
         let first_m = Vector3::new(before_m.x, cos * y + sin * z, cos * z - sin * y);
-        let is_rigid = off_axis_m(&first_m) < NOTHING || is_on_axis(&bone.origin_m);
-        let length_m = (first_m + bone.origin_m).norm();
+        let is_rigid = off_axis_m(&first_m) < NOTHING || is_on_axis(&link_segment.origin_m);
+        let length_m = (first_m + link_segment.origin_m).norm();
         let is_point = is_rigid && length_m < NOTHING;
         let is_seen = !is_point && (from > 0 || !stands_still);
         if is_seen {
@@ -180,7 +180,7 @@ fn flat_links(skeleton: &Skeleton, stands_still: bool) -> Vec<FlatLink> {
             let per_length2 = is_rigid.then(|| (1.0 / (length_m * length_m)) as f32);
             links.push(FlatLink { from, per_length2: per_length2.filter(|p| p.is_finite()) });
         }
-        (before_m, tilt) = (bone.next_m - bone.origin_m, bone.tilt);
+        (before_m, tilt) = (link_segment.next_m - link_segment.origin_m, link_segment.tilt);
     }
     links
 }

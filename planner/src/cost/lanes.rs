@@ -147,7 +147,7 @@ impl<S: Simd> Lanes<S> {
 mod tests {
     use super::*;
     use crate::cost::level::Level;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
     use pulp::WithSimd;
 
     /// Sine and cosine of pi t for a slice.
@@ -169,10 +169,10 @@ mod tests {
 
     #[test]
     fn sine_and_cosine_of_every_level_are_within_their_bound() {
-        let mut draw = Draw::new(1, 0);
+        let mut rng = SeededRng::new(1, 0);
         #[expect(clippy::cast_possible_truncation, reason = "any f32 will do")]
         let t: Vec<f32> = (0..400_000)
-            .map(|i| if i % 2 == 0 { draw.within(-1.0, 1.0) } else { draw.within(-130.0, 130.0) } as f32)
+            .map(|i| if i % 2 == 0 { rng.within(-1.0, 1.0) } else { rng.within(-130.0, 130.0) } as f32)
             .collect();
         for level in Level::available() {
             let (mut sin, mut cos) = (vec![9.0; t.len()], vec![9.0; t.len()]);

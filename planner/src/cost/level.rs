@@ -55,8 +55,8 @@ impl Level {
 
     /// Runs work on this level.
     #[inline]
-    pub(super) fn run<W: WithSimd>(self, work: W) -> W::Output {
-        self.0.dispatch(work)
+    pub(super) fn run<W: WithSimd>(self, budget: W) -> W::Output {
+        self.0.dispatch(budget)
     }
 }
 

@@ -22,7 +22,7 @@
 //! that count as nothing below 1e-12 and for the yardstick's own rounding. As printed, distances are summed, and first
 //! order has to do in step 4: each link may add 2 e + 8 e + 16 u rho.
 use super::flat::Flat;
-use super::sieve::Angles;
+use super::prefilter::Angles;
 
 /// Unit of f32's rounding.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -54,7 +54,7 @@ impl Limits {
     #[expect(clippy::cast_possible_truncation, reason = "rounded up, or counted")]
     pub(super) fn new(flat: &Flat, angles: &[Angles], sums: bool) -> Self {
         let turns = wrong_turns(flat, angles);
-        let joints = flat.bones().count() as f64;
+        let joints = flat.link_segments().count() as f64;
         let limit = |sphere: &super::flat::FlatSphere| {
             let rho_m = flat.reach_m + sphere.away_m;
             let e_m = rho_m * (turns + 6.0 * (joints + 1.0) * U);
@@ -76,11 +76,11 @@ impl Limits {
 
 /// Sum of the a over the joints (rad).
 fn wrong_turns(flat: &Flat, angles: &[Angles]) -> f64 {
-    let joints = 0..flat.bones().count();
+    let joints = 0..flat.link_segments().count();
     let turn = |joint: usize| {
-        let ways = angles.iter().map(|segment| f64::from(segment[joint][1]).abs());
-        let way = ways.fold(0.0, f64::max);
-        std::f64::consts::SQRT_2 * std::f64::consts::PI * U * (2.0 + 4.0 * way) + 56.0 * U
+        let travels = angles.iter().map(|segment| f64::from(segment[joint][1]).abs());
+        let travel = travels.fold(0.0, f64::max);
+        std::f64::consts::SQRT_2 * std::f64::consts::PI * U * (2.0 + 4.0 * travel) + 56.0 * U
     };
     joints.map(turn).sum()
 }

@@ -12,7 +12,7 @@ mod lanes;
 mod level;
 mod margin;
 mod phases;
-mod sieve;
+mod prefilter;
 mod skeleton;
 #[cfg(test)]
 mod soundness;

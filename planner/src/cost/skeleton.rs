@@ -13,7 +13,7 @@ pub(super) const NOTHING: f64 = 1e-12;
 
 /// One joint.
 #[derive(Clone, Debug)]
-pub(super) struct Bone {
+pub(super) struct LinkSegment {
     /// Added to the joint's position.
     pub(super) offset_rad: f64,
     /// The origin of the frame behind the joint, seen from the joint when it has turned.
@@ -24,7 +24,7 @@ pub(super) struct Bone {
     pub(super) tilt: Option<[f64; 2]>,
 }
 
-impl Bone {
+impl LinkSegment {
     /// The longer one of its shifts.
     pub(super) fn length_m(&self) -> f64 {
         self.next_m.norm().max(self.origin_m.norm())
@@ -37,7 +37,7 @@ pub(super) struct Skeleton {
     /// The first joint, seen from the base.
     pub(super) root: Pose,
     /// The joints, base to tip.
-    pub(super) bones: Vec<Bone>,
+    pub(super) link_segments: Vec<LinkSegment>,
 }
 
 impl Skeleton {
@@ -53,7 +53,7 @@ impl Skeleton {
         };
         let root = joints.first().map_or_else(Pose::identity, |j| j.pre * upright(j));
         let mut carried_rad = 0.0;
-        let mut bones = Vec::with_capacity(joints.len());
+        let mut link_segments = Vec::with_capacity(joints.len());
         for (i, joint) in joints.iter().enumerate() {
             let own = upright(joint).inverse() * joint.post;
             let between = joints.get(i + 1).map(|next| own * next.pre * upright(next));
@@ -64,7 +64,7 @@ impl Skeleton {
             let next_m = between.map_or(origin_m, |b| seen(b.translation.vector));
             let tilt = [tilt_rad.cos(), tilt_rad.sin()].map(|x| if x.abs() < NOTHING { 0.0 } else { x });
             let tilt = (tilt[1] != 0.0 || tilt[0] < 0.0).then_some(tilt);
-            bones.push(Bone {
+            link_segments.push(LinkSegment {
                 offset_rad: joint.offset_rad + carried_rad + before_rad,
                 origin_m,
                 next_m,
@@ -72,7 +72,7 @@ impl Skeleton {
             });
             carried_rad = behind_rad;
         }
-        Self { root, bones }
+        Self { root, link_segments }
     }
 
     /// The base frame's origin, seen from the first joint.
@@ -83,7 +83,7 @@ impl Skeleton {
 
     /// Furthest that anything of the arm can be from the first joint, or the base frame.
     pub(super) fn reach_m(&self) -> f64 {
-        self.bones.iter().map(Bone::length_m).sum::<f64>() + self.base_m().norm()
+        self.link_segments.iter().map(LinkSegment::length_m).sum::<f64>() + self.base_m().norm()
     }
 }
 
@@ -102,7 +102,7 @@ fn zxz(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::cost::soundness::any_chain;
-    use crate::draw::Draw;
+    use crate::rng::SeededRng;
     use taustream_motion::{JointArray, MAX_JOINTS};
 
     /// Goal: the skeleton's frames' origins are the chain's.
@@ -111,24 +111,25 @@ mod tests {
     fn skeleton_of_any_chain_puts_every_origin_where_the_chain_does() {
         let mut parallel = 0;
         for seed in 0..2_000 {
-            let mut draw = Draw::new(seed, 0);
-            let count = 1 + draw.index(MAX_JOINTS);
-            let chain = any_chain(&mut draw, count);
+            let mut rng = SeededRng::new(seed, 0);
+            let count = 1 + rng.index(MAX_JOINTS);
+            let chain = any_chain(&mut rng, count);
             let skeleton = Skeleton::new(&chain);
-            let q: JointArray = std::array::from_fn(|_| draw.within(-3.2, 3.2));
+            let q: JointArray = std::array::from_fn(|_| rng.within(-3.2, 3.2));
             let frames = chain.frames(&q);
             let mut at = skeleton.root;
-            for (i, bone) in skeleton.bones.iter().enumerate() {
-                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), q[i] + bone.offset_rad);
+            for (i, link_segment) in skeleton.link_segments.iter().enumerate() {
+                let turn =
+                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), q[i] + link_segment.offset_rad);
                 at *= turn;
-                let gap_m = (at * Point3::from(bone.origin_m)
+                let gap_m = (at * Point3::from(link_segment.origin_m)
                     - Point3::from(frames[i + 1].translation.vector))
                 .norm();
                 assert!(gap_m < 1e-11, "seed {seed}, frame {}: {gap_m:e} m apart", i + 1);
-                at *= nalgebra::Translation3::from(bone.next_m);
-                let [cos, sin] = bone.tilt.unwrap_or([1.0, 0.0]);
+                at *= nalgebra::Translation3::from(link_segment.next_m);
+                let [cos, sin] = link_segment.tilt.unwrap_or([1.0, 0.0]);
                 at *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), sin.atan2(cos));
-                parallel += u32::from(bone.tilt.is_none());
+                parallel += u32::from(link_segment.tilt.is_none());
             }
             assert!(
                 (at.translation.vector - skeleton.root.translation.vector).norm()

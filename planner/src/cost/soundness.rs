@@ -3,8 +3,8 @@ use super::fast::Fast;
 use super::level::Level;
 use super::phases::phases;
 use super::{CostModel, Point, distance_to_segment_m, origin};
-use crate::draw::Draw;
 use crate::optimize::Reading;
+use crate::rng::SeededRng;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use std::path::Path;
 use taustream_arm::Robot;
@@ -12,40 +12,40 @@ use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// A chain of any axes and shifts, some of them of nothing, some parallel or opposite.
-pub(super) fn any_chain(draw: &mut Draw, count: usize) -> Chain {
+pub(super) fn any_chain(rng: &mut SeededRng, count: usize) -> Chain {
     let joints: Vec<ChainJoint> = (0..count)
         .map(|_| {
             let mut pose = || {
-                let mut shift = || if draw.unit() < 0.4 { 0.0 } else { draw.within(-0.4, 0.4) };
+                let mut shift = || if rng.unit() < 0.4 { 0.0 } else { rng.within(-0.4, 0.4) };
                 let shift = [shift(), shift(), shift()];
-                let turn = match draw.index(4) {
+                let turn = match rng.index(4) {
                     0 => [0.0; 3],
                     1 => [std::f64::consts::PI, 0.0, 0.0],
                     2 => [std::f64::consts::FRAC_PI_2, 0.0, 0.0],
-                    _ => [draw.within(-3.0, 3.0), draw.within(-3.0, 3.0), draw.within(-3.0, 3.0)],
+                    _ => [rng.within(-3.0, 3.0), rng.within(-3.0, 3.0), rng.within(-3.0, 3.0)],
                 };
                 Pose::from_parts(shift.into(), UnitQuaternion::from_euler_angles(turn[0], turn[1], turn[2]))
             };
             let (pre, post) = (pose(), pose());
             let axes = [Vector3::z(), -Vector3::z(), Vector3::y(), Vector3::new(0.3, -0.5, 0.2)];
-            let axis = Unit::new_normalize(axes[draw.index(4)]);
-            ChainJoint { pre, axis, offset_rad: draw.within(-1.0, 1.0), post }
+            let axis = Unit::new_normalize(axes[rng.index(4)]);
+            ChainJoint { pre, axis, offset_rad: rng.within(-1.0, 1.0), post }
         })
         .collect();
     Chain::new(&joints).expect("1 to 8 joints")
 }
 
 /// Denavit-Hartenberg rows as arms have them: axes parallel or crossed, shifts along the axis or off it.
-fn any_rows(draw: &mut Draw, count: usize) -> Chain {
+fn any_rows(rng: &mut SeededRng, count: usize) -> Chain {
     let joints: Vec<ChainJoint> = (0..count)
         .map(|_| {
-            let mut length = || if draw.unit() < 0.4 { 0.0 } else { draw.within(-0.4, 0.4) };
+            let mut length = || if rng.unit() < 0.4 { 0.0 } else { rng.within(-0.4, 0.4) };
             let (a_m, d_m) = (length(), length());
-            let alpha_rad = [0.0, 0.5, -0.5, 1.0][draw.index(4)] * std::f64::consts::PI;
-            if draw.unit() < 0.5 {
-                ChainJoint::from_dh(a_m, alpha_rad, d_m, draw.within(-3.0, 3.0))
+            let alpha_rad = [0.0, 0.5, -0.5, 1.0][rng.index(4)] * std::f64::consts::PI;
+            if rng.unit() < 0.5 {
+                ChainJoint::from_dh(a_m, alpha_rad, d_m, rng.within(-3.0, 3.0))
             } else {
-                ChainJoint::from_mdh(a_m, alpha_rad, d_m, draw.within(-3.0, 3.0))
+                ChainJoint::from_mdh(a_m, alpha_rad, d_m, rng.within(-3.0, 3.0))
             }
         })
         .collect();
@@ -85,17 +85,17 @@ struct Try {
 impl Try {
     /// One sphere is touched by a hair (less than a micrometre deep) in one of the poses, one deeply in every other
     /// motion; the third is anywhere. Of every four motions one is read as printed.
-    fn draw(chain: &Chain, phases: &[f64], seed: u64) -> Self {
-        let mut draw = Draw::new(seed, 7);
+    fn random(chain: &Chain, phases: &[f64], seed: u64) -> Self {
+        let mut rng = SeededRng::new(seed, 7);
         let reading = if seed % 4 == 3 { Reading::Printed } else { Reading::Corrected };
         let model = CostModel { reading, ..CostModel::default() };
-        let mut pose = || -> JointArray { std::array::from_fn(|_| draw.within(-3.1, 3.1)) };
+        let mut pose = || -> JointArray { std::array::from_fn(|_| rng.within(-3.1, 3.1)) };
         let corners_rad = [pose(), pose()];
         let mut sphere = |depth_m: f64| {
-            let position = between(&corners_rad[0], &corners_rad[1], phases[draw.index(STEPS)]);
-            let frame = chain.frames(&position)[draw.index(chain.joints() + 1)];
-            let away = Vector3::new(draw.within(-1.0, 1.0), draw.within(-1.0, 1.0), draw.within(-1.0, 1.0));
-            let center = origin(&frame) + away * draw.within(0.15, 0.4);
+            let position = between(&corners_rad[0], &corners_rad[1], phases[rng.index(STEPS)]);
+            let frame = chain.frames(&position)[rng.index(chain.joints() + 1)];
+            let away = Vector3::new(rng.within(-1.0, 1.0), rng.within(-1.0, 1.0), rng.within(-1.0, 1.0));
+            let center = origin(&frame) + away * rng.within(0.15, 0.4);
             let touching_m = distance_m(chain, &position, &center, reading) + depth_m;
             (center, touching_m - model.expansion_m)
         };
@@ -122,7 +122,7 @@ struct Tally {
 fn tally(chain: &Chain, motions: std::ops::Range<u64>, level: Level, tally: &mut Tally) {
     let phases = phases(10, STEPS);
     for seed in motions {
-        let Try { corners_rad, spheres, model } = Try::draw(chain, &phases, seed);
+        let Try { corners_rad, spheres, model } = Try::random(chain, &phases, seed);
         let fast = Fast::new(chain, &spheres, &model, &phases).expect("an arm of some extent").on(level);
         let mut depths_m = Vec::with_capacity(STEPS + 1);
         for step in 0..=STEPS {
@@ -137,13 +137,13 @@ fn tally(chain: &Chain, motions: std::ops::Range<u64>, level: Level, tally: &mut
             let free = (0..=STEPS).filter(|step| !suspects.contains(&(0, *step)));
             free.filter(|step| depths_m[*step] > 0.0).count()
         };
-        let sifted = fast.sift(&corners_rad).expect("angles of an arm");
-        let bare = fast.sift_without_margin(&corners_rad);
+        let prefiltered = fast.prefilter(&corners_rad).expect("angles of an arm");
+        let bare = fast.prefilter_without_margin(&corners_rad);
         tally.poses += depths_m.len();
         tally.contacts += depths_m.iter().filter(|d| **d > 0.0).count();
         tally.grazes += depths_m.iter().filter(|d| **d > 0.0 && **d < 1e-6).count();
-        tally.needless += sifted.suspects.iter().filter(|(_, step)| depths_m[*step] <= 0.0).count();
-        tally.missed += missed(&sifted.suspects);
+        tally.needless += prefiltered.suspects.iter().filter(|(_, step)| depths_m[*step] <= 0.0).count();
+        tally.missed += missed(&prefiltered.suspects);
         tally.missed_without_margin += missed(&bare.suspects);
     }
 }
@@ -154,13 +154,13 @@ fn tally(chain: &Chain, motions: std::ops::Range<u64>, level: Level, tally: &mut
 #[test]
 fn fast_cost_never_calls_a_contact_free_in_a_million_configurations() {
     const MOTIONS: u64 = 2_000;
-    let mut draw = Draw::new(11, 0);
+    let mut rng = SeededRng::new(11, 0);
     let arms = [
         ("ur5", shipped("ur5")),
         ("piper", shipped("piper")),
-        ("rows", any_rows(&mut draw, 6)),
-        ("seven", any_rows(&mut draw, 7)),
-        ("eight, any axes", any_chain(&mut draw, MAX_JOINTS)),
+        ("rows", any_rows(&mut rng, 6)),
+        ("seven", any_rows(&mut rng, 7)),
+        ("eight, any axes", any_chain(&mut rng, MAX_JOINTS)),
     ];
     for level in Level::available() {
         let mut all = Tally::default();
@@ -196,11 +196,11 @@ fn fast_cost_looks_at_every_pose_once_for_any_number_of_waypoints() {
         let corners = [corners[0], corners[1], corners[0], corners[1]];
         for level in Level::available() {
             let fast = Fast::new(&chain, &spheres, &CostModel::default(), &phases).expect("fits").on(level);
-            let sifted = fast.sift(&corners).expect("angles of an arm");
+            let prefiltered = fast.prefilter(&corners).expect("angles of an arm");
             let mut all: Vec<(usize, usize)> =
                 (0..3).flat_map(|segment| (0..steps).map(move |step| (segment, step))).collect();
             all.push((2, steps));
-            assert_eq!(sifted.suspects, all, "{steps} waypoints, {}", level.name());
+            assert_eq!(prefiltered.suspects, all, "{steps} waypoints, {}", level.name());
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One search: its steps, its trace, and how it gets out of a trap.
 use super::Numbers;
-use crate::draw::Draw;
 use crate::optimize::Refusal;
+use crate::rng::SeededRng;
 use crate::tree::Space;
 use crate::world::{Pair, Snapshot};
 use std::collections::VecDeque;
@@ -29,13 +29,13 @@ pub fn forage(
     [start_rad, goal_rad]: [&JointArray; 2],
     numbers: &Numbers,
     checks_max: usize,
-    draw: &mut Draw,
+    rng: &mut SeededRng,
 ) -> Result<Foraged, Refusal> {
     numbers.check()?;
     let end = space.checks().saturating_add(checks_max);
     let mut forager = Forager::new(space, [*start_rad, *goal_rad], numbers);
     let path = loop {
-        if space.checks() >= end || space.work.is_over() {
+        if space.checks() >= end || space.budget.is_over() {
             break None;
         }
         if forager.arrives() {
@@ -43,7 +43,7 @@ pub fn forage(
             path.push(*goal_rad);
             break Some(path);
         }
-        forager.step(draw);
+        forager.step(rng);
         if forager.is_trapped() {
             forager.escape();
         }
@@ -74,13 +74,13 @@ struct Forager<'a> {
 
 impl<'a> Forager<'a> {
     fn new(space: &'a Space<'a>, [start_rad, goal_rad]: [JointArray; 2], numbers: &'a Numbers) -> Self {
-        let way_m = space.distance_m(&start_rad, &goal_rad).max(numbers.step_m);
+        let distance_m = space.distance_m(&start_rad, &goal_rad).max(numbers.step_m);
         Self {
             space,
             start_rad,
             goal_rad,
             numbers,
-            goal_width: 1.0 / (way_m * way_m),
+            goal_width: 1.0 / (distance_m * distance_m),
             trace: vec![start_rad],
             observed: VecDeque::from([start_rad]),
             forgotten: 0,
@@ -107,16 +107,16 @@ impl<'a> Forager<'a> {
     }
 
     /// To the cheapest of the candidates that are cheaper than here and whose edge is proven; or stays.
-    fn step(&mut self, draw: &mut Draw) {
+    fn step(&mut self, rng: &mut SeededRng) {
         let here = self.here();
         self.feel(&here);
         let cost_here = self.cost(&here);
         let mut candidates = Vec::with_capacity(self.numbers.bacteria);
         for _ in 0..self.numbers.bacteria {
-            if self.space.work.is_over_after(self.felt.len()) {
+            if self.space.budget.is_over_after(self.felt.len()) {
                 return;
             }
-            let pose = self.tumble(&here, draw);
+            let pose = self.tumble(&here, rng);
             let cost = self.cost(&pose);
             if cost < cost_here {
                 candidates.push((cost, pose));
@@ -136,11 +136,11 @@ impl<'a> Forager<'a> {
     }
 
     /// A pose one step away in a random direction, inside the position limits.
-    fn tumble(&self, here: &JointArray, draw: &mut Draw) -> JointArray {
+    fn tumble(&self, here: &JointArray, rng: &mut SeededRng) -> JointArray {
         let joints = self.space.world.joints();
         let mut pose = *here;
         let direction: [f64; MAX_JOINTS] =
-            std::array::from_fn(|j| if j < joints { draw.normal() } else { 0.0 });
+            std::array::from_fn(|j| if j < joints { rng.normal() } else { 0.0 });
         let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
         let step_m = if length > 0.0 { self.numbers.step_m / length } else { 0.0 };
         let weights_m = self.space.weights_m();
@@ -175,8 +175,8 @@ impl<'a> Forager<'a> {
         });
         let virtuals = self.found.virtuals.iter().skip(self.forgotten);
         let added = virtuals.map(|v| gaussian(numbers.virtual_obstacle, self.space.distance_m(pose, v)));
-        let way_m = self.space.distance_m(pose, &self.goal_rad);
-        pushed.sum::<f64>() + added.sum::<f64>() - gaussian([numbers.goal_depth, self.goal_width], way_m)
+        let distance_m = self.space.distance_m(pose, &self.goal_rad);
+        pushed.sum::<f64>() + added.sum::<f64>() - gaussian([numbers.goal_depth, self.goal_width], distance_m)
     }
 
     /// True when it has not got away by a step for long.
@@ -215,7 +215,7 @@ fn gaussian([height, width]: [f64; 2], away_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::work::Work;
+    use crate::budget::Budget;
     use crate::world::World;
     use std::path::Path;
     use taustream_arm::{Robot, Scene};
@@ -225,8 +225,8 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
         let robot = Robot::load(&file).unwrap();
         let world = World::new(&robot, &Scene::default()).unwrap();
-        let work = Work::unbounded();
-        let space = Space::new(&world, &work);
+        let budget = Budget::unbounded();
+        let space = Space::new(&world, &budget);
         let ends = [pose(0.0), pose(1.0)];
         check(&mut Forager::new(&space, ends, numbers), &space);
     }
@@ -245,11 +245,11 @@ mod tests {
     fn cost_is_the_goal_and_the_virtual_obstacles() {
         let numbers = Numbers { goal_depth: 20.0, virtual_obstacle: [3.0, 4.0], ..Numbers::ROBUST };
         with_forager(&numbers, |forager, space| {
-            let way_m = space.weights_m()[0];
+            let distance_m = space.weights_m()[0];
             let goal = -20.0 * (-0.25_f64).exp();
             assert!((forager.cost(&pose(0.5)) - goal).abs() < 1e-12);
             forager.found.virtuals.push(pose(0.25));
-            let added = 3.0 * (-4.0 * (0.25 * way_m).powi(2)).exp();
+            let added = 3.0 * (-4.0 * (0.25 * distance_m).powi(2)).exp();
             assert!((forager.cost(&pose(0.5)) - goal - added).abs() < 1e-12);
             forager.forgotten = 1;
             assert!((forager.cost(&pose(0.5)) - goal).abs() < 1e-12, "forgotten");
@@ -289,8 +289,8 @@ mod tests {
         let numbers = Numbers { observed: 3, step_m: 0.3, ..Numbers::ROBUST };
         with_forager(&numbers, |forager, space| {
             let metre_rad = 1.0 / space.weights_m()[0];
-            let mut walk = |ways_m: &[f64]| {
-                forager.observed = ways_m.iter().map(|m| pose(m * metre_rad)).collect();
+            let mut walk = |distances_m: &[f64]| {
+                forager.observed = distances_m.iter().map(|m| pose(m * metre_rad)).collect();
                 forager.is_trapped()
             };
             assert!(!walk(&[0.0, 0.0, 0.0]), "not observed for long enough");
@@ -302,11 +302,11 @@ mod tests {
     #[test]
     fn tumble_is_a_step_long_in_any_direction_and_stays_inside_the_ranges() {
         with_forager(&Numbers::ROBUST, |forager, space| {
-            let mut draw = Draw::new(5, 0);
+            let mut rng = SeededRng::new(5, 0);
             let here = pose(0.0);
             let mut sum = [0.0; MAX_JOINTS];
             for _ in 0..1_000 {
-                let there = forager.tumble(&here, &mut draw);
+                let there = forager.tumble(&here, &mut rng);
                 assert!((space.distance_m(&here, &there) - Numbers::ROBUST.step_m).abs() < 1e-12);
                 for (j, s) in sum.iter_mut().enumerate() {
                     *s += (there[j] - here[j]) * space.weights_m()[j] / Numbers::ROBUST.step_m;
@@ -316,7 +316,7 @@ mod tests {
             assert!(sum.iter().all(|s| s.abs() < 70.0), "{sum:?}");
             let edge = std::array::from_fn(|j| if j < 6 { 3.1 } else { 0.0 });
             let ranges = space.world.robot().joints.iter().map(|j| j.limits.position_rad);
-            let there = forager.tumble(&edge, &mut draw);
+            let there = forager.tumble(&edge, &mut rng);
             assert!(there.iter().zip(ranges).all(|(q, [low, high])| (low..=high).contains(q)));
         });
     }

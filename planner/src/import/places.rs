@@ -90,6 +90,6 @@ pub fn optimised_durations_s(
         watch: &mut watch,
     };
     let found = optimizer.minimise(&problem, run).map_err(|e| refused(e.to_string()))?;
-    let cost = problem.judge(&found.x)?;
+    let cost = problem.evaluate(&found.x)?;
     Ok((found.x, cost))
 }

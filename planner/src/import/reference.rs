@@ -14,10 +14,10 @@ use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 pub struct Reference {
     joints: usize,
     duration_s: f64,
-    shape: Shape,
+    shape: ReferenceShape,
 }
 
-enum Shape {
+enum ReferenceShape {
     /// Straight lines in time between rows.
     Rows { t_s: Vec<f64>, position_rad: Vec<JointArray> },
     /// One scalar profile from point to point, at rest at each.
@@ -58,7 +58,7 @@ impl Reference {
             return Err(ImportError::Still);
         }
         let duration_s = t_s.last().copied().unwrap_or(0.0);
-        Ok(Self { joints, duration_s, shape: Shape::Rows { t_s, position_rad } })
+        Ok(Self { joints, duration_s, shape: ReferenceShape::Rows { t_s, position_rad } })
     }
 
     /// A profile through way points.
@@ -81,10 +81,12 @@ impl Reference {
             return Err(ImportError::Durations { got: durations_s.len(), points: points_rad.len() });
         }
         let shape = match profile.scalar()? {
-            Some(profile) => Shape::Stops { t_s: t_s.clone(), points_rad: points_rad.to_vec(), profile },
+            Some(profile) => {
+                ReferenceShape::Stops { t_s: t_s.clone(), points_rad: points_rad.to_vec(), profile }
+            }
             None if profile == ViaProfile::BSpline7 => {
                 let points: Vec<Vec<f64>> = points_rad.iter().map(|p| p[..joints].to_vec()).collect();
-                Shape::Seventh(Spline::through(&points, durations_s)?)
+                ReferenceShape::Seventh(Spline::through(&points, durations_s)?)
             }
             None => {
                 let ends = if profile == ViaProfile::NotAKnot { Ends::NotAKnot } else { Ends::Clamped };
@@ -94,7 +96,7 @@ impl Reference {
                     CubicSpline::new(&knots, ends)
                 };
                 let splines = (0..joints).map(spline).collect::<Result<_, _>>()?;
-                Shape::Cubic { t_s: t_s.clone(), splines }
+                ReferenceShape::Cubic { t_s: t_s.clone(), splines }
             }
         };
         Ok(Self { joints, duration_s: t_s.last().copied().unwrap_or(0.0), shape })
@@ -117,18 +119,20 @@ impl Reference {
     pub fn at(&self, time_s: f64) -> JointArray {
         let time_s = time_s.clamp(0.0, self.duration_s);
         match &self.shape {
-            Shape::Rows { t_s, position_rad } => between(t_s, position_rad, time_s, |share| share),
-            Shape::Stops { t_s, points_rad, profile } => {
+            ReferenceShape::Rows { t_s, position_rad } => between(t_s, position_rad, time_s, |share| share),
+            ReferenceShape::Stops { t_s, points_rad, profile } => {
                 between(t_s, points_rad, time_s, |share| profile.at(share).value)
             }
-            Shape::Cubic { splines, .. } => {
+            ReferenceShape::Cubic { splines, .. } => {
                 let mut position_rad = [0.0; MAX_JOINTS];
                 for (slot, spline) in position_rad.iter_mut().zip(splines) {
                     *slot = spline.sample(time_s).value;
                 }
                 position_rad
             }
-            Shape::Seventh(spline) => std::array::from_fn(|joint| spline.at(joint, time_s, 0).unwrap_or(0.0)),
+            ReferenceShape::Seventh(spline) => {
+                std::array::from_fn(|joint| spline.at(joint, time_s, 0).unwrap_or(0.0))
+            }
         }
     }
 
@@ -136,8 +140,10 @@ impl Reference {
     #[must_use]
     pub fn joins_s(&self) -> Vec<f64> {
         match &self.shape {
-            Shape::Rows { t_s, .. } | Shape::Stops { t_s, .. } | Shape::Cubic { t_s, .. } => t_s.clone(),
-            Shape::Seventh(spline) => spline.joins_s(),
+            ReferenceShape::Rows { t_s, .. }
+            | ReferenceShape::Stops { t_s, .. }
+            | ReferenceShape::Cubic { t_s, .. } => t_s.clone(),
+            ReferenceShape::Seventh(spline) => spline.joins_s(),
         }
     }
 
@@ -145,12 +151,13 @@ impl Reference {
     #[must_use]
     pub fn moving_s(&self) -> f64 {
         match &self.shape {
-            Shape::Rows { t_s, position_rad: points } | Shape::Stops { t_s, points_rad: points, .. } => {
+            ReferenceShape::Rows { t_s, position_rad: points }
+            | ReferenceShape::Stops { t_s, points_rad: points, .. } => {
                 let pieces = t_s.windows(2).zip(points.windows(2));
                 let moves = pieces.filter(|(_, points)| points.first() != points.last());
                 moves.map(|(t, _)| if let [a, b] = t { b - a } else { 0.0 }).sum()
             }
-            Shape::Cubic { .. } | Shape::Seventh(_) => self.duration_s,
+            ReferenceShape::Cubic { .. } | ReferenceShape::Seventh(_) => self.duration_s,
         }
     }
 
@@ -158,8 +165,8 @@ impl Reference {
     #[must_use]
     pub fn bend_rad_s2(&self) -> JointArray {
         match &self.shape {
-            Shape::Rows { .. } => [0.0; MAX_JOINTS],
-            Shape::Stops { t_s, points_rad, profile } => {
+            ReferenceShape::Rows { .. } => [0.0; MAX_JOINTS],
+            ReferenceShape::Stops { t_s, points_rad, profile } => {
                 let c_a = profile.peaks().c_a;
                 let mut bend = [0.0; MAX_JOINTS];
                 for (t, points) in t_s.windows(2).zip(points_rad.windows(2)) {
@@ -170,10 +177,10 @@ impl Reference {
                 }
                 bend
             }
-            Shape::Cubic { splines, .. } => {
+            ReferenceShape::Cubic { splines, .. } => {
                 std::array::from_fn(|joint| splines.get(joint).map_or(0.0, CubicSpline::bend_max))
             }
-            Shape::Seventh(spline) => std::array::from_fn(|joint| spline.bound(joint, 2)),
+            ReferenceShape::Seventh(spline) => std::array::from_fn(|joint| spline.bound(joint, 2)),
         }
     }
 
@@ -181,10 +188,10 @@ impl Reference {
     #[must_use]
     pub fn end_speeds_rad_s(&self) -> [JointArray; 2] {
         match &self.shape {
-            Shape::Stops { .. } | Shape::Seventh(_) => [[0.0; MAX_JOINTS]; 2],
-            Shape::Cubic { splines, .. } => [0.0, self.duration_s]
+            ReferenceShape::Stops { .. } | ReferenceShape::Seventh(_) => [[0.0; MAX_JOINTS]; 2],
+            ReferenceShape::Cubic { splines, .. } => [0.0, self.duration_s]
                 .map(|t| std::array::from_fn(|j| splines.get(j).map_or(0.0, |s| s.sample(t).d1))),
-            Shape::Rows { t_s, position_rad } => {
+            ReferenceShape::Rows { t_s, position_rad } => {
                 let speed = |i: usize| -> JointArray {
                     let (Some([t0, t1]), Some([a, b])) = (t_s.get(i..i + 2), position_rad.get(i..i + 2))
                     else {
@@ -206,7 +213,7 @@ impl Reference {
         times: f64,
         tolerance_rad: f64,
     ) -> Option<(f64, usize, f64, f64)> {
-        let Shape::Rows { t_s, position_rad } = &self.shape else { return None };
+        let ReferenceShape::Rows { t_s, position_rad } = &self.shape else { return None };
         for (t, rows) in t_s.windows(2).zip(position_rad.windows(2)) {
             let ([t0, t1], [from, to]) = (t, rows) else { continue };
             for (joint, limits) in limits.iter().enumerate().take(self.joints) {
@@ -275,8 +282,8 @@ fn piece_s(
     peaks: &PeakConstants,
 ) -> f64 {
     let each = from.iter().zip(to).zip(limits).take(joints).map(|((a, b), limits)| {
-        let (way, m) = ((b - a).abs(), &limits.motion);
-        let [v, a, j] = [peaks.c_v * way, peaks.c_a * way, peaks.c_j * way];
+        let (distance, m) = ((b - a).abs(), &limits.motion);
+        let [v, a, j] = [peaks.c_v * distance, peaks.c_a * distance, peaks.c_j * distance];
         used(v, m.velocity_rad_s)
             .max(used(a, m.acceleration_rad_s2).sqrt())
             .max(used(j, m.jerk_rad_s3).cbrt())
@@ -304,12 +311,12 @@ impl Reference {
     pub fn peaks(&self, joint: usize) -> [f64; 3] {
         const SAMPLES: u32 = 64;
         match &self.shape {
-            Shape::Rows { .. } | Shape::Stops { .. } => [0.0; 3],
-            Shape::Cubic { splines, .. } => splines.get(joint).map_or([0.0; 3], |spline| {
+            ReferenceShape::Rows { .. } | ReferenceShape::Stops { .. } => [0.0; 3],
+            ReferenceShape::Cubic { splines, .. } => splines.get(joint).map_or([0.0; 3], |spline| {
                 let (peaks, d) = (spline.peaks(), self.duration_s);
                 [peaks.c_v / d, peaks.c_a / (d * d), peaks.c_j / (d * d * d)]
             }),
-            Shape::Seventh(spline) => {
+            ReferenceShape::Seventh(spline) => {
                 let mut peaks = [0.0_f64; 3];
                 for piece in spline.joins_s().windows(2) {
                     let [a, b] = piece else { continue };

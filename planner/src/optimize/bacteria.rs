@@ -135,7 +135,7 @@ pub(super) trait Heading {
 
 /// A unit vector: uniform in the cube, as the paper has it, then normalised.
 pub(super) fn tumble(session: &mut Session) -> Vec<f64> {
-    let direction = (0..session.dimensions()).map(|_| session.draw.within(-1.0, 1.0)).collect();
+    let direction = (0..session.dimensions()).map(|_| session.rng.within(-1.0, 1.0)).collect();
     normalised(direction)
 }
 
@@ -301,7 +301,7 @@ impl<H: Heading> Colony<'_, H> {
             Exempt::Best => best,
         };
         for (i, bacterium) in bacteria.iter_mut().enumerate() {
-            if Some(i) != exempt && session.draw.unit() < probability {
+            if Some(i) != exempt && session.rng.unit() < probability {
                 let x = session.random_point();
                 bacterium.at = session.weigh_one(x)?;
                 bacterium.memory = self.heading.born(&bacterium.at);

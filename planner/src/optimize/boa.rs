@@ -72,14 +72,14 @@ impl Optimizer for Boa {
 impl Boa {
     fn fly(&self, session: &mut Session, swarm: &[Agent], i: usize, c: f64) -> Vec<f64> {
         let fragrance = c * swarm[i].cost.abs().powf(self.exponent);
-        let is_to_best = session.draw.unit() < self.to_best;
-        let r = session.draw.unit();
+        let is_to_best = session.rng.unit() < self.to_best;
+        let r = session.rng.unit();
         let x = &swarm[i].x;
         let (there, here) = if is_to_best {
             (session.best().x.clone(), x)
         } else {
-            let j = session.draw.index(swarm.len());
-            let k = session.draw.index_except(swarm.len(), &[j]);
+            let j = session.rng.index(swarm.len());
+            let k = session.rng.index_except(swarm.len(), &[j]);
             (swarm[j].x.clone(), &swarm[k].x)
         };
         let flight = there.iter().zip(here).map(|(there, here)| (r * r * there - here) * fragrance);

@@ -62,7 +62,7 @@ impl Heading for Fly<'_> {
         let Flight { velocity, own_best } = &mut bacterium.memory;
         for (j, v) in velocity.iter_mut().enumerate() {
             let x = bacterium.at.x[j];
-            let (r1, r2) = (session.draw.unit(), session.draw.unit());
+            let (r1, r2) = (session.rng.unit(), session.rng.unit());
             *v = w * *v + c1 * r1 * (own_best.x[j] - x) + c2 * r2 * (session.best().x[j] - x);
         }
         if velocity.iter().all(|v| v.abs() == 0.0) {

@@ -52,7 +52,7 @@ impl Heading for Drift<'_> {
         let &BsoStep { inertia: w, pull: c, .. } = self.0;
         let (velocity, x) = (&mut bacterium.memory, &bacterium.at.x);
         for (j, v) in velocity.iter_mut().enumerate() {
-            let r = session.draw.unit();
+            let r = session.rng.unit();
             *v = w * *v + c * r * (session.best().x[j] - x[j]);
         }
         Some(x.iter().zip(velocity).map(|(x, v)| x + *v).collect())

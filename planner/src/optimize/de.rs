@@ -69,16 +69,16 @@ impl De {
     fn trial(&self, session: &mut Session, members: &[Agent], i: usize) -> Vec<f64> {
         let mut taken = vec![i];
         let mut other = |session: &mut Session| {
-            let index = session.draw.index_except(members.len(), &taken);
+            let index = session.rng.index_except(members.len(), &taken);
             let at = taken.partition_point(|t| *t < index);
             taken.insert(at, index);
             &members[index].x
         };
         let (a, b, c) = (other(session), other(session), other(session));
-        let certain = session.draw.index(session.dimensions());
+        let certain = session.rng.index(session.dimensions());
         let mut trial = members[i].x.clone();
         for (j, x) in trial.iter_mut().enumerate() {
-            if session.draw.unit() < self.crossover || j == certain {
+            if session.rng.unit() < self.crossover || j == certain {
                 *x = a[j] + self.factor * (b[j] - c[j]);
             }
         }

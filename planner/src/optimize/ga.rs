@@ -74,9 +74,9 @@ impl Ga {
         for (j, [low, high]) in session.bounds().iter().enumerate() {
             let (a, b) = (father.x[j].min(mother.x[j]), father.x[j].max(mother.x[j]));
             let beyond = self.blend * (b - a);
-            let mut x = session.draw.within(a - beyond, b + beyond);
-            if session.draw.unit() < chance {
-                x += deviation * (high - low) * session.draw.normal();
+            let mut x = session.rng.within(a - beyond, b + beyond);
+            if session.rng.unit() < chance {
+                x += deviation * (high - low) * session.rng.normal();
             }
             child.push(x);
         }
@@ -85,6 +85,6 @@ impl Ga {
 }
 
 fn tournament<'a>(session: &mut Session, people: &'a [Agent]) -> &'a Agent {
-    let (a, b) = (session.draw.index(people.len()), session.draw.index(people.len()));
+    let (a, b) = (session.rng.index(people.len()), session.rng.index(people.len()));
     if people[b].cost < people[a].cost { &people[b] } else { &people[a] }
 }

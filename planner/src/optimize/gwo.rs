@@ -65,7 +65,7 @@ fn hunt(session: &mut Session, wolf: &Agent, leaders: &[Agent], a: f64) -> Vec<f
     for (j, x) in moved.iter_mut().enumerate() {
         let mut sum = 0.0;
         for leader in leaders {
-            let (big_a, big_c) = (a * (2.0 * session.draw.unit() - 1.0), 2.0 * session.draw.unit());
+            let (big_a, big_c) = (a * (2.0 * session.rng.unit() - 1.0), 2.0 * session.rng.unit());
             sum += leader.x[j] - big_a * (big_c * leader.x[j] - *x).abs();
         }
         *x = sum / leaders.len() as f64;

@@ -82,7 +82,7 @@ impl Optimizer for Iepso {
                     Exchange::Signed => gap,
                     Exchange::Magnitude => gap.abs(),
                 };
-                c3 * session.draw.unit() * gap
+                c3 * session.rng.unit() * gap
             };
             for particle in &mut swarm {
                 particle.steer(session, w, pulls, exchange);

@@ -104,7 +104,7 @@ fn chaotic(session: &mut Session, population: usize) -> Vec<Vec<f64>> {
                 (link - 1.0 + BERNOULLI) / BERNOULLI
             };
             if !(link > 0.0 && link < 1.0) {
-                link = session.draw.unit();
+                link = session.rng.unit();
             }
             low + (high - low) * link
         };
@@ -130,8 +130,8 @@ impl Isma {
         let mut parents = Vec::new();
         let mut children = Vec::new();
         for (i, mould) in moulds.iter().enumerate() {
-            if session.draw.unit() < self.crossover {
-                let l = self.share(session.draw.unit());
+            if session.rng.unit() < self.crossover {
+                let l = self.share(session.rng.unit());
                 let pairs = || mould.x.iter().zip(&session.best().x);
                 children.push(pairs().map(|(x, b)| l * x + (1.0 - l) * b).collect());
                 children.push(pairs().map(|(x, b)| l * b + (1.0 - l) * x).collect());
@@ -162,8 +162,8 @@ impl Isma {
 
     /// The vertex of the parabolas through two random moulds and the best.
     fn vertex(&self, session: &mut Session, moulds: &[Agent]) -> Vec<f64> {
-        let i = session.draw.index(moulds.len());
-        let k = session.draw.index_except(moulds.len(), &[i]);
+        let i = session.rng.index(moulds.len());
+        let k = session.rng.index_except(moulds.len(), &[i]);
         let (x, y, z) = (&moulds[i], &moulds[k], session.best());
         let coordinates = x.x.iter().zip(&y.x).zip(&z.x);
         let vertex = |((&p, &q), &r): ((&f64, &f64), &f64)| {
@@ -182,9 +182,9 @@ impl Isma {
 /// One random coordinate moved against another mould and towards the best.
 fn bee(session: &mut Session, moulds: &[Agent], i: usize) -> Vec<f64> {
     let mut x = moulds[i].x.clone();
-    let j = session.draw.index(x.len());
-    let k = session.draw.index_except(moulds.len(), &[i]);
-    let (phi, omega) = (session.draw.within(-1.0, 1.0), session.draw.within(0.0, PULL_MAX));
+    let j = session.rng.index(x.len());
+    let k = session.rng.index_except(moulds.len(), &[i]);
+    let (phi, omega) = (session.rng.within(-1.0, 1.0), session.rng.within(0.0, PULL_MAX));
     x[j] += phi * (x[j] - moulds[k].x[j]) + omega * (session.best().x[j] - x[j]);
     x
 }

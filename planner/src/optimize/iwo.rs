@@ -99,7 +99,7 @@ impl Iwo {
             let share = if worst > best { (worst - weed.cost) / (worst - best) } else { 1.0 };
             for _ in 0..self.seeds_of(share) {
                 let sides = session.bounds().iter().map(|[low, high]| high - low);
-                let step = |(x, side): (&f64, f64)| x + deviation * side * session.draw.normal();
+                let step = |(x, side): (&f64, f64)| x + deviation * side * session.rng.normal();
                 seeds.push(weed.x.iter().zip(sides).map(step).collect());
             }
         }

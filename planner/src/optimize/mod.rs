@@ -42,7 +42,7 @@ pub use problem::{Parallel, Problem, Refusal};
 pub use pso::{Constants, Pso};
 pub use registry::{METHODS, Method, Reading, Setup, Unknown, by_name};
 pub use sampling::Sampling;
-pub use session::{Agent, End, Found, Progress, Run, Schedule, Session, WORTHLESS};
+pub use session::{Agent, End, Progress, Run, Schedule, Session, Solution, WORTHLESS};
 pub use sma::Sma;
 pub use ssa::Ssa;
 
@@ -68,7 +68,7 @@ pub trait Optimizer {
     /// # Errors
     /// When the method's numbers or the problem's box make no sense. A budget of nothing is no error: the answer is
     /// then empty and says that the budget ended it.
-    fn minimise<'a>(&self, problem: &'a dyn Problem, run: Run<'a>) -> Result<Found, Refusal> {
+    fn minimise<'a>(&self, problem: &'a dyn Problem, run: Run<'a>) -> Result<Solution, Refusal> {
         self.check()?;
         let mut session = Session::new(problem, run)?;
         let end = self.search(&mut session).err().unwrap_or(End::Done);

@@ -109,7 +109,7 @@ impl Particle {
     ) {
         for (j, v) in self.velocity.iter_mut().enumerate() {
             let (x, own, best) = (self.at.x[j], self.own_best.x[j], session.best().x[j]);
-            let (r1, r2) = (session.draw.unit(), session.draw.unit());
+            let (r1, r2) = (session.rng.unit(), session.rng.unit());
             *v = inertia * *v + c1 * r1 * (own - x) + c2 * r2 * (best - x) + exchange(session, best - own);
         }
     }

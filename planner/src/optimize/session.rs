@@ -1,6 +1,6 @@
 //! One run of an optimiser: the only way in which a method reaches its problem.
 use super::problem::{Problem, Refusal};
-use crate::draw::Draw;
+use crate::rng::SeededRng;
 
 /// The cost of a point whose cost is not finite: the largest number, so that methods which calculate with costs stay
 /// finite, and so that an objective that answers minus infinity cannot win.
@@ -47,7 +47,7 @@ pub enum End {
 
 /// What a run found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct Solution {
     /// The best point ever seen; empty when not one could be evaluated.
     pub x: Vec<f64>,
     /// Its cost, by [`Problem::exact_cost`] where the problem has one; [`WORTHLESS`] when no cost was finite.
@@ -113,7 +113,7 @@ pub(super) fn check_population(method: &'static str, population: usize) -> Resul
 /// One run: the problem behind a meter, and the stream of random choices.
 pub struct Session<'a> {
     /// Every random choice of the run comes from here.
-    pub draw: Draw,
+    pub rng: SeededRng,
     problem: &'a dyn Problem,
     run: Run<'a>,
     evaluations: usize,
@@ -130,8 +130,8 @@ impl<'a> Session<'a> {
     pub fn new(problem: &'a dyn Problem, run: Run<'a>) -> Result<Self, Refusal> {
         Refusal::check_box(problem.bounds())?;
         let best = Agent { x: Vec::new(), cost: WORTHLESS };
-        let draw = Draw::new(run.seed, 0);
-        Ok(Self { draw, problem, run, evaluations: 0, best, current: WORTHLESS, iteration: 0 })
+        let rng = SeededRng::new(run.seed, 0);
+        Ok(Self { rng, problem, run, evaluations: 0, best, current: WORTHLESS, iteration: 0 })
     }
 
     /// The box.
@@ -160,7 +160,7 @@ impl<'a> Session<'a> {
 
     /// A uniform random point.
     pub fn random_point(&mut self) -> Vec<f64> {
-        self.bounds().iter().map(|[low, high]| self.draw.within(*low, *high)).collect()
+        self.bounds().iter().map(|[low, high]| self.rng.within(*low, *high)).collect()
     }
 
     /// Guess number `i`, if there is one that fits.
@@ -244,12 +244,12 @@ impl<'a> Session<'a> {
     }
 
     /// What the run found, with the cost that the problem stands by.
-    pub(super) fn found(mut self, end: End) -> Found {
+    pub(super) fn found(mut self, end: End) -> Solution {
         if !self.best.x.is_empty() {
             self.best.cost = self.problem.exact_cost(&self.best.x).map_or(self.best.cost, worth);
         }
         let progress = self.progress();
-        Found { x: self.best.x, cost: self.best.cost, progress, end }
+        Solution { x: self.best.x, cost: self.best.cost, progress, end }
     }
 }
 

@@ -104,7 +104,7 @@ impl Sma {
         (mould, log): (&Agent, f64),
         pulse: Pulse,
     ) -> Vec<f64> {
-        if session.draw.unit() < self.restart {
+        if session.rng.unit() < self.restart {
             return self.start_anew(session);
         }
         let gap = (mould.cost - session.best().cost).abs();
@@ -114,14 +114,14 @@ impl Sma {
         };
         let mut moved = mould.x.clone();
         for (j, x) in moved.iter_mut().enumerate() {
-            if session.draw.unit() < p {
-                let (a, b) = (session.draw.index(moulds.len()), session.draw.index(moulds.len()));
-                let weight = 1.0 + session.draw.unit() * log;
-                let vb = session.draw.within(-pulse.approach, pulse.approach);
+            if session.rng.unit() < p {
+                let (a, b) = (session.rng.index(moulds.len()), session.rng.index(moulds.len()));
+                let weight = 1.0 + session.rng.unit() * log;
+                let vb = session.rng.within(-pulse.approach, pulse.approach);
                 *x = session.best().x[j] + vb * (weight * moulds[a].x[j] - moulds[b].x[j]);
             } else {
                 *x *= match pulse.shrink {
-                    Shrink::Within(bound) => session.draw.within(-bound, bound),
+                    Shrink::Within(bound) => session.rng.within(-bound, bound),
                     Shrink::By(factor) => factor,
                 };
             }
@@ -133,7 +133,7 @@ impl Sma {
         match self.reading {
             Reading::Corrected => session.random_point(),
             Reading::Printed => {
-                let share = session.draw.unit();
+                let share = session.rng.unit();
                 session.bounds().iter().map(|[low, high]| low + (high - low) * share).collect()
             }
         }

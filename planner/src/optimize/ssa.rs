@@ -87,7 +87,7 @@ impl Ssa {
     /// New places of producers and scroungers of a sorted flock.
     fn forage(&self, session: &mut Session, flock: &[Agent]) -> Result<Vec<Agent>, End> {
         let (producers, others) = flock.split_at(count(flock.len(), self.producers));
-        let alarm = session.draw.unit();
+        let alarm = session.rng.unit();
         let ranked = producers.iter().enumerate();
         let places = ranked.map(|(i, p)| self.produce(session, &p.x, alarm, (i + 1) as f64)).collect();
         let mut moved = session.weigh(places)?;
@@ -98,7 +98,7 @@ impl Ssa {
         for (i, sparrow) in others.iter().enumerate() {
             let rank = producers.len() + i + 1;
             places.push(if 2 * rank > flock.len() {
-                let (q, rank2) = (session.draw.normal(), (rank * rank) as f64);
+                let (q, rank2) = (session.rng.normal(), (rank * rank) as f64);
                 sparrow.x.iter().zip(&worst.x).map(|(x, w)| q * ((w - x) / rank2).exp()).collect()
             } else {
                 settle(session, &sparrow.x, &lead.x)
@@ -111,11 +111,11 @@ impl Ssa {
     fn produce(&self, session: &mut Session, x: &[f64], alarm: f64, rank: f64) -> Vec<f64> {
         if alarm < self.safety {
             // In (0, 1]: nobody divides by nothing.
-            let alpha = 1.0 - session.draw.unit();
+            let alpha = 1.0 - session.rng.unit();
             let shrink = (-rank / (alpha * self.schedule.iterations as f64)).exp();
             x.iter().map(|x| x * shrink).collect()
         } else {
-            let q = session.draw.normal();
+            let q = session.rng.normal();
             x.iter().map(|x| x + q).collect()
         }
     }
@@ -127,7 +127,7 @@ impl Ssa {
         let mut on_watch: Vec<usize> = Vec::new();
         let mut moved = Vec::new();
         for _ in 0..count(flock.len(), self.watch) {
-            let i = session.draw.index_except(flock.len(), &on_watch);
+            let i = session.rng.index_except(flock.len(), &on_watch);
             let at = on_watch.partition_point(|w| *w < i);
             on_watch.insert(at, i);
             moved.push((i, flee(session, &flock[i], &best, &worst)));
@@ -145,7 +145,7 @@ impl Ssa {
 /// Round a producer: its place and, for every coordinate alike, the mean of the distances with random signs.
 fn settle(session: &mut Session, x: &[f64], producer: &[f64]) -> Vec<f64> {
     let signed = |session: &mut Session, (x, p): (&f64, &f64)| {
-        let sign = if session.draw.unit() < 0.5 { -1.0 } else { 1.0 };
+        let sign = if session.rng.unit() < 0.5 { -1.0 } else { 1.0 };
         sign * (x - p).abs()
     };
     let sum: f64 = x.iter().zip(producer).map(|pair| signed(session, pair)).sum();
@@ -155,10 +155,10 @@ fn settle(session: &mut Session, x: &[f64], producer: &[f64]) -> Vec<f64> {
 fn flee(session: &mut Session, sparrow: &Agent, best: &Agent, worst: &Agent) -> Vec<f64> {
     let x = &sparrow.x;
     if sparrow.cost > best.cost {
-        let beta = session.draw.normal();
+        let beta = session.rng.normal();
         x.iter().zip(&best.x).map(|(x, b)| b + beta * (x - b).abs()).collect()
     } else {
-        let k = session.draw.within(-1.0, 1.0);
+        let k = session.rng.within(-1.0, 1.0);
         let gap = sparrow.cost - worst.cost + EPSILON;
         x.iter().zip(&worst.x).map(|(x, w)| x + k * (x - w).abs() / gap).collect()
     }

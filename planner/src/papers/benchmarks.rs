@@ -3,8 +3,8 @@
 //! Source: its table 1, whose text has lost roots, squares and signs; written here as their authors have them. F2 is
 //! the paper's, a sphere round -0.5: the floor of the classic Step function is lost, and with it the steps. F4's
 //! least cost is that of its best single coordinate, 418.982887272433799807913601398, times the dimension.
-use crate::draw::Draw;
 use crate::optimize::Problem;
+use crate::rng::SeededRng;
 use std::f64::consts::{E, PI, TAU};
 
 /// Which function.
@@ -147,10 +147,10 @@ impl Benchmark {
     /// the box's edge, so it is moved towards the centre only.
     #[must_use]
     pub fn shifted(function: Function, dimensions: usize, seed: u64) -> Self {
-        let mut draw = Draw::new(seed, 4);
+        let mut rng = SeededRng::new(seed, 4);
         let reach = SHIFT_MAX * function.half_side();
         let high = if function == Function::Schwefel { 0.0 } else { reach };
-        let shift = (0..dimensions).map(|_| draw.within(-reach, high)).collect();
+        let shift = (0..dimensions).map(|_| rng.within(-reach, high)).collect();
         Self { shift, ..Self::new(function, dimensions) }
     }
 

@@ -5,7 +5,7 @@
 //! 0.18 m round the arm, drawn again while an end pose is nearer than the radius and the expansion. The box of the
 //! centres is ours, for an arm of about a UR5's size.
 use crate::cost::{ControlPointCost, CostError, CostModel, paper_cost};
-use crate::draw::Draw;
+use crate::rng::SeededRng;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::f64::consts::PI;
 use std::path::PathBuf;
@@ -37,16 +37,16 @@ impl Case {
     /// The case of a seed; `None` when no draw leaves both end poses free, which only an arm much larger than its
     /// surroundings does.
     #[must_use]
-    pub fn draw(robot: &Robot, model: &CostModel, seed: u64) -> Option<Self> {
-        let mut draw = Draw::new(seed, 5);
+    pub fn random(robot: &Robot, model: &CostModel, seed: u64) -> Option<Self> {
+        let mut rng = SeededRng::new(seed, 5);
         let joints = robot.joints.len();
         let mut attempts = (0..ATTEMPTS_MAX).map(|_| {
             let mut pose = || -> JointArray {
-                std::array::from_fn(|j| if j < joints { draw.within(-PI, PI) } else { 0.0 })
+                std::array::from_fn(|j| if j < joints { rng.within(-PI, PI) } else { 0.0 })
             };
             let ends_rad = [pose(), pose()];
             let obstacles =
-                (0..SPHERES).map(|i| sphere(i, CENTRES_M.map(|[low, high]| draw.within(low, high))));
+                (0..SPHERES).map(|i| sphere(i, CENTRES_M.map(|[low, high]| rng.within(low, high))));
             let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: obstacles.collect() };
             Self { ends_rad, scene }
         });

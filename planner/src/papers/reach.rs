@@ -112,8 +112,8 @@ impl Reach<'_> {
     /// Time of the joint that has farthest to go.
     #[must_use]
     pub fn time_s(&self, angles_rad: &[f64]) -> f64 {
-        let ways = angles_rad.iter().zip(self.start_rad).zip(self.speeds_rad_s);
-        ways.map(|((angle, start), speed)| (angle - start).abs() / speed).fold(0.0, f64::max)
+        let distances = angles_rad.iter().zip(self.start_rad).zip(self.speeds_rad_s);
+        distances.map(|((angle, start), speed)| (angle - start).abs() / speed).fold(0.0, f64::max)
     }
 }
 

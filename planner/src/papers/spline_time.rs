@@ -90,7 +90,7 @@ impl SplineTime {
     ///
     /// # Errors
     /// When there is no such spline.
-    pub fn judge(&self, intervals_s: &[f64]) -> Result<SplineCost, SplineError> {
+    pub fn evaluate(&self, intervals_s: &[f64]) -> Result<SplineCost, SplineError> {
         let spline = Spline::through(&self.points_rad, intervals_s)?;
         let (time_s, jerk_rad_s3) = (spline.total_s(), impact(&spline));
         let (mut broken, mut excess) = (0, 0.0);
@@ -117,7 +117,7 @@ impl Problem for SplineTime {
     }
 
     fn cost(&self, x: &[f64]) -> f64 {
-        self.judge(x).map_or(f64::INFINITY, |judged| judged.cost)
+        self.evaluate(x).map_or(f64::INFINITY, |evaluated| evaluated.cost)
     }
 }
 

@@ -9,7 +9,7 @@
 //! of the base's height; the energy that joints spend is [`Cubics::work`].
 use super::quadrature::gauss;
 use super::two_link::{Moving, TwoLink};
-use crate::optimize::{Found, Optimizer, Problem, Progress, Reading, Refusal, Run};
+use crate::optimize::{Optimizer, Problem, Progress, Reading, Refusal, Run, Solution};
 
 /// Pieces of the rule of integration an interval.
 const PANELS: u32 = 6;
@@ -58,8 +58,8 @@ impl PieceEnergy {
     pub fn to_rest(&self) -> [f64; 2] {
         let t = self.piece_s;
         std::array::from_fn(|j| {
-            let (way, v) = (self.angles_rad[1][j] - self.angles_rad[0][j], self.speed_rad_s[j]);
-            (v * t - 2.0 * way) / (t * t * t)
+            let (distance, v) = (self.angles_rad[1][j] - self.angles_rad[0][j], self.speed_rad_s[j]);
+            (v * t - 2.0 * distance) / (t * t * t)
         })
     }
 }
@@ -110,7 +110,7 @@ pub struct CubicSearch<'a> {
 /// Largest speed that the bounds of the search allow at a piece's end, in ways of that piece a second; the least way
 /// that counts is a tenth of a radian.
 const SPEED_BOUND: f64 = 6.0;
-const LEAST_WAY_RAD: f64 = 0.1;
+const DISTANCE_MIN_RAD: f64 = 0.1;
 
 impl CubicSearch<'_> {
     /// Cubics of least energy through via points in radians.
@@ -142,8 +142,8 @@ impl CubicSearch<'_> {
         let mut problem = PieceEnergy { arm, angles_rad, speed_rad_s, piece_s, bounds: [[0.0; 2]; 2] };
         let centre = problem.to_rest();
         problem.bounds = std::array::from_fn(|j| {
-            let way = (angles_rad[1][j] - angles_rad[0][j]).abs().max(speed_rad_s[j].abs() * piece_s);
-            let half = SPEED_BOUND * way.max(LEAST_WAY_RAD) / piece_s.powi(3);
+            let distance = (angles_rad[1][j] - angles_rad[0][j]).abs().max(speed_rad_s[j].abs() * piece_s);
+            let half = SPEED_BOUND * distance.max(DISTANCE_MIN_RAD) / piece_s.powi(3);
             [centre[j] - half, centre[j] + half]
         });
         problem
@@ -158,7 +158,7 @@ impl CubicSearch<'_> {
             is_over: &is_over,
             watch: &mut watch,
         };
-        let Found { x, .. } = self.optimizer.minimise(problem, run)?;
+        let Solution { x, .. } = self.optimizer.minimise(problem, run)?;
         Ok(if let [a3, b3] = x.as_slice() { [*a3, *b3] } else { problem.to_rest() })
     }
 }

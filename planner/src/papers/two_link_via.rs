@@ -9,7 +9,7 @@
 //! [`REACHED_RAD`]. Via points lie exactly where the penalty begins, so that whatever joins them cuts into it: a margin
 //! on the radius and a check of the motion are the user's.
 use super::two_link::TwoLink;
-use crate::optimize::{Found, Optimizer, Problem, Progress, Reading, Refusal, Run};
+use crate::optimize::{Optimizer, Problem, Progress, Reading, Refusal, Run, Solution};
 
 /// How near the goal an angle has to come: what is left of it in a step is the optimiser's last digit.
 pub const REACHED_RAD: f64 = 0.01;
@@ -83,12 +83,12 @@ impl ViaTask {
             Reading::Corrected => 1.0,
             Reading::Printed => 1.0_f64.to_degrees(),
         };
-        let way = |j: usize| unit * (self.goal_rad[j] - angles_rad[j]).abs();
+        let travel = |j: usize| unit * (self.goal_rad[j] - angles_rad[j]).abs();
         let touching = self.distances(angles_rad).filter(|x| *x < contact);
         let penalty: f64 = touching.map(|x| (-x / contact).exp()).sum();
         let outside =
             angles_rad.iter().zip(TwoLink::RANGES_RAD).filter(|(q, [low, high])| *q < low || *q > high);
-        k1 * way(0) + k2 * way(1) + k3 * penalty + k4 * outside.count() as f64
+        k1 * travel(0) + k2 * travel(1) + k3 * penalty + k4 * outside.count() as f64
     }
 
     /// Walks from the start to the goal.
@@ -110,7 +110,7 @@ impl ViaTask {
             let (is_over, mut watch) = (|| false, |_: &Progress| ());
             let seed = seed.wrapping_mul(STEPS_MAX as u64).wrapping_add(step);
             let run = Run { seed, evaluations_max, guesses: &[], is_over: &is_over, watch: &mut watch };
-            let Found { x, .. } = optimizer.minimise(&Step { task: self, from_rad: here }, run)?;
+            let Solution { x, .. } = optimizer.minimise(&Step { task: self, from_rad: here }, run)?;
             let [theta, phi] = x.as_slice() else { break };
             here = [here[0] + theta, here[1] + phi];
             via_rad.push(here);

@@ -6,14 +6,14 @@
 mod polish;
 mod swarm;
 
-use crate::leave::is_clear;
+use crate::budget::Budget;
+use crate::margin_exit::is_clear;
 use crate::objective::Objective;
 use crate::optimize::{METHODS, Method, Reading, Refusal};
 use crate::plan::{
     CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, plan_until,
 };
 use crate::verify::Contact;
-use crate::work::Work;
 use crate::world::World;
 use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
@@ -135,12 +135,12 @@ pub enum PositionError {
 }
 
 /// How much is tried, from the deadline alone, so that one seed gives one answer wherever the clock does not cut in.
-struct Budget {
+struct PositionBudget {
     tries: usize,
     each_plan: Duration,
 }
 
-impl Budget {
+impl PositionBudget {
     /// About a third of the time for poses on a small controller, the rest for motions.
     fn of(deadline: Duration) -> Self {
         let ms = usize::try_from(deadline.as_millis()).unwrap_or(usize::MAX);
@@ -158,7 +158,7 @@ pub fn plan_to_position(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Reached, PositionError> {
-    let work = Work::until(options.clock(), cancel);
+    let budget = Budget::until(options.clock(), cancel);
     for (axis, value_m) in ['x', 'y', 'z'].into_iter().zip(task.target_m) {
         if !value_m.is_finite() {
             return Err(PositionError::BadTarget { axis, value_m });
@@ -167,19 +167,19 @@ pub fn plan_to_position(
     check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
     let reach_m = check_reach(task.robot, &task.target_m)?;
-    let budget = Budget::of(options.deadline);
+    let position_budget = PositionBudget::of(options.deadline);
     let search = Search {
         world: &world,
-        work: &work,
+        budget: &budget,
         start_rad: task.start_rad,
         target_m: task.target_m,
         reach_m,
         reading: options.reading,
     };
-    let poses = Poses::find(&search, task.method, options.seed, budget.tries)?;
-    let mut reached = best_motion(task, options, &poses, (&budget, &work, cancel))?;
+    let poses = Poses::find(&search, task.method, options.seed, position_budget.tries)?;
+    let mut reached = best_motion(task, options, &poses, (&position_budget, &budget, cancel))?;
     reached.error_m += ROUNDING * reach_m;
-    reached.plan.planning_s = work.elapsed_s();
+    reached.plan.planning_s = budget.elapsed_s();
     Ok(reached)
 }
 
@@ -195,10 +195,10 @@ pub fn one_try(
     method: &'static Method,
     seed: u64,
 ) -> Result<Option<(JointArray, f64)>, PositionError> {
-    let (robot, work) = (world.robot(), Work::unbounded());
+    let (robot, budget) = (world.robot(), Budget::unbounded());
     let reach_m = check_reach(robot, &target_m)?;
     let reading = Reading::Corrected;
-    let search = Search { world, work: &work, start_rad, target_m, reach_m, reading };
+    let search = Search { world, budget: &budget, start_rad, target_m, reach_m, reading };
     let Some(rough) = search.run(method, seed)? else { return Ok(None) };
     let target_m = Vector3::from(target_m);
     let pose = polish(robot, &rough, &target_m);
@@ -302,11 +302,11 @@ fn best_motion(
     task: &PositionTask,
     options: &PlanOptions,
     poses: &Poses,
-    (budget, work, cancel): (&Budget, &Work, Option<&AtomicBool>),
+    (position_budget, budget, cancel): (&PositionBudget, &Budget, Option<&AtomicBool>),
 ) -> Result<Reached, PositionError> {
     let (mut best, mut planned, mut failure, mut cut) = (None::<(Plan, JointArray)>, 0, None, false);
     for goal_rad in &poses.clear {
-        if work.is_over() || (planned >= GOALS_MAX && best.is_some()) {
+        if budget.is_over() || (planned >= GOALS_MAX && best.is_some()) {
             break;
         }
         let PositionTask { robot, scene, start_rad, margin, .. } = *task;
@@ -315,9 +315,9 @@ fn best_motion(
             break;
         }
         planned += 1;
-        let left = options.clock().saturating_sub(Duration::from_secs_f64(work.elapsed_s()));
-        cut |= left < budget.each_plan;
-        let each = PlanOptions { deadline: budget.each_plan.min(left), ..*options };
+        let left = options.clock().saturating_sub(Duration::from_secs_f64(budget.elapsed_s()));
+        cut |= left < position_budget.each_plan;
+        let each = PlanOptions { deadline: position_budget.each_plan.min(left), ..*options };
         let task = Task { robot, scene, start_rad, goal_rad: *goal_rad, margin };
         match plan_until(&task, &each, cancel) {
             Ok(plan) if plan.score < score => best = Some((plan, *goal_rad)),
@@ -333,7 +333,7 @@ fn best_motion(
                 "{by} (nearest of {found} clear poses by {} tries, then damped least squares); {}",
                 poses.tries, plan.how
             );
-            if (cut || work.was_cut()) && !plan.how.contains(CUT_SHORT) {
+            if (cut || budget.was_cut()) && !plan.how.contains(CUT_SHORT) {
                 plan.how.push_str(CUT_SHORT);
             }
             let end_rad = plan.trajectory.end_rad();

@@ -50,12 +50,12 @@ fn step(robot: &Robot, pose_rad: &JointArray, target_m: &Vector3<f64>, damping: 
     let (tip, columns) = robot.chain.jacobian(pose_rad);
     let off_m = target_m - tip.translation.vector;
     let ranges = || robot.joints.iter().map(|j| j.limits.position_rad);
-    let ways = pose_rad.iter().zip(ranges()).zip(&columns).map(|((q, [low, high]), column)| {
+    let distances = pose_rad.iter().zip(ranges()).zip(&columns).map(|((q, [low, high]), column)| {
         let towards = column.linear_m.dot(&off_m);
         let is_stuck = (*q <= low && towards < 0.0) || (*q >= high && towards > 0.0);
         if is_stuck { Vector3::zeros() } else { column.linear_m }
     });
-    let levers: Vec<Vector3<f64>> = ways.collect();
+    let levers: Vec<Vector3<f64>> = distances.collect();
     let largest = levers.iter().map(Vector3::norm_squared).fold(0.0, f64::max);
     let mut normal = Matrix3::identity() * (damping * largest);
     for lever in &levers {

@@ -4,9 +4,9 @@
 //! the tip is near, a toll for whatever is nearer than it may be. Its constants keep the paper's values and units:
 //! ε = 5e-6 m and s = 5e-10 m are precisions, `e_max` is twice the arm's reach, K and j are in seconds like the time
 //! of the joint that has farthest to go.
+use crate::budget::Budget;
 use crate::optimize::{Method, Problem, Progress, Reading, Refusal, Run, Setup};
 use crate::papers::reach::{Reach, Reward};
-use crate::work::Work;
 use crate::world::{Snapshot, World};
 use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -23,7 +23,7 @@ pub(super) struct Search<'a> {
     /// What the pose must keep from.
     pub(super) world: &'a World<'a>,
     /// The clock.
-    pub(super) work: &'a Work<'a>,
+    pub(super) budget: &'a Budget<'a>,
     /// Where the arm starts.
     pub(super) start_rad: JointArray,
     /// Where the tip shall be, in the base's frame.
@@ -60,7 +60,7 @@ impl Search<'_> {
         .checked()?;
         let problem = ClearReach { reach, search: self, snapshot: RefCell::default() };
         let optimizer = (method.make)(Setup { reading: self.reading, evaluations: Some(EVALUATIONS) });
-        let (is_over, mut watch) = (|| self.work.is_over(), |_: &Progress| ());
+        let (is_over, mut watch) = (|| self.budget.is_over(), |_: &Progress| ());
         let run = Run {
             seed,
             evaluations_max: EVALUATIONS,

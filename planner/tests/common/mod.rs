@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
 use taustream_arm::{Obstacle, Robot, Scene, Settings, Shape};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
-use taustream_planner::draw::Draw;
+use taustream_planner::rng::SeededRng;
 
 pub(crate) fn config(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config").join(name)
@@ -39,12 +39,12 @@ pub(crate) fn sphere(name: &str, center_m: [f64; 3], radius_m: f64) -> Obstacle 
 }
 
 /// Two to five spheres round the arm, none of them at its base.
-pub(crate) fn random_spheres(draw: &mut Draw) -> Scene {
+pub(crate) fn random_spheres(rng: &mut SeededRng) -> Scene {
     let mut obstacles = Vec::new();
-    let count = 2 + draw.index(4);
+    let count = 2 + rng.index(4);
     while obstacles.len() < count {
-        let center_m = [draw.within(-0.8, 0.8), draw.within(-0.8, 0.8), draw.within(0.0, 0.9)];
-        let radius_m = draw.within(0.05, 0.18);
+        let center_m = [rng.within(-0.8, 0.8), rng.within(-0.8, 0.8), rng.within(0.0, 0.9)];
+        let radius_m = rng.within(0.05, 0.18);
         if center_m[0].hypot(center_m[1]) > 0.25 + radius_m {
             obstacles.push(sphere(&format!("sphere{}", obstacles.len()), center_m, radius_m));
         }

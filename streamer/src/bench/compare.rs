@@ -46,11 +46,11 @@ pub fn compare(options: &BenchOptions, beside: &[Settings]) -> Result<Vec<Compar
     let arms: Vec<BenchOptions> = [&options.settings].into_iter().chain(beside).map(arm).collect();
     let cycle = options.settings.cycle;
     on_the_real_time_thread(cycle, options.allow_non_realtime, move |realtime| {
-        in_turns(&arms, slices, realtime)
+        alternate(&arms, slices, realtime)
     })
 }
 
-fn in_turns(arms: &[BenchOptions], slices: u32, realtime: bool) -> Result<Vec<Compared>, BenchError> {
+fn alternate(arms: &[BenchOptions], slices: u32, realtime: bool) -> Result<Vec<Compared>, BenchError> {
     let mut links = vec![String::new(); arms.len()];
     let times: Result<Vec<_>, BenchError> = arms.iter().map(|_| Ok((Times::new()?, Times::new()?))).collect();
     let mut times = times?;

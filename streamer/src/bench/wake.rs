@@ -3,7 +3,7 @@ use super::{BenchError, Quantiles, WARM_UP, histogram, quantiles};
 use crate::rt;
 use crate::tick::Schedule;
 use serde::Serialize;
-use taustream_arm::settings::Cycle;
+use taustream_arm::settings::CycleSettings;
 
 /// Upper ends of the bins of the histogram, us.
 const BINS_US: [u64; 11] = [5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000];
@@ -40,7 +40,7 @@ pub struct WakeUps {
 ///
 /// # Errors
 /// When no thread can be had, or the time is none.
-pub fn wake_ups(cycle: &Cycle, seconds: f64) -> Result<WakeUps, BenchError> {
+pub fn wake_ups(cycle: &CycleSettings, seconds: f64) -> Result<WakeUps, BenchError> {
     if !(0.01..=3_600.0).contains(&seconds) {
         return Err(BenchError::Options { seconds, slices: 1 });
     }
@@ -54,7 +54,7 @@ pub fn wake_ups(cycle: &Cycle, seconds: f64) -> Result<WakeUps, BenchError> {
     thread.join().map_err(|_| BenchError::System("the measurement has panicked".into()))?
 }
 
-fn measure(cycle: &Cycle, seconds: f64) -> Result<WakeUps, BenchError> {
+fn measure(cycle: &CycleSettings, seconds: f64) -> Result<WakeUps, BenchError> {
     let mut missing: Vec<String> = rt::lock_memory().err().iter().map(ToString::to_string).collect();
     let entered = rt::enter(cycle.priority, cycle.cpu);
     missing.extend(entered.err().into_iter().flatten().map(|e| e.to_string()));

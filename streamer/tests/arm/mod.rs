@@ -5,14 +5,14 @@ use taustream_arm::Settings;
 use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{Rig, WiredRig};
+use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, Stroke, Trajectory};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
-use taustream_streamer::facts::{Asked, Decision};
-use taustream_streamer::intake::{self, Desk};
+use taustream_streamer::cycle_state::{Decision, PendingCommand};
+use taustream_streamer::intake::{self, CommandQueue};
 use taustream_streamer::names::Names;
 use taustream_streamer::report::{Readers, Record};
 use taustream_streamer::tick::Tick;
@@ -31,9 +31,9 @@ pub(crate) fn shipped(file: &str, edit: impl Fn(&str) -> String) -> Settings {
 /// The streamer's cycle on one end of its links, simulated drives on the other.
 pub(crate) struct Arm {
     pub(crate) core: Core,
-    pub(crate) desk: Desk,
+    pub(crate) command_queue: CommandQueue,
     pub(crate) readers: Readers,
-    pub(crate) rig: WiredRig,
+    pub(crate) simulator: LinkedSimulator,
     /// The drives' ends; `None` for a bus that was pulled out.
     pub(crate) far_ends: Vec<Option<Box<dyn CanLink>>>,
     /// What the streamer sent in the last cycle, by bus.
@@ -50,7 +50,7 @@ pub(crate) struct Arm {
     pub(crate) tick: u64,
     generation: u64,
     pub(crate) counted: u64,
-    pub(crate) held_rad: JointArray,
+    pub(crate) hold_position_rad: JointArray,
     pub(crate) visited: Vec<Phase>,
 }
 
@@ -66,7 +66,7 @@ impl Arm {
             let driver = drivers::of_bus(&settings, index).unwrap();
             buses.push(Bus::new(near_end, Box::new(driver), &settings));
         }
-        let (queues, desk) = intake::pair();
+        let (queues, command_queue) = intake::pair();
         let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, true);
         let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         setups.iter_mut().for_each(|setup| setup.parameters.plant_mut().brake = true);
@@ -75,8 +75,12 @@ impl Arm {
         Self {
             readers: core.readers(),
             core,
-            desk,
-            rig: WiredRig::new(Rig::new(setups, count, 1), &settings.buses, queue_frames),
+            command_queue,
+            simulator: LinkedSimulator::new(
+                ServoSimulator::new(setups, count, 1),
+                &settings.buses,
+                queue_frames,
+            ),
             far_ends,
             sent: vec![Vec::new(); count],
             around: |cycle| {
@@ -92,7 +96,7 @@ impl Arm {
             tick: 0,
             generation: 0,
             counted: 0,
-            held_rad: [0.0; 8],
+            hold_position_rad: [0.0; 8],
             visited: Vec::new(),
         }
     }
@@ -109,7 +113,7 @@ impl Arm {
     pub(crate) fn step<P: Probe>(&mut self, probe: &mut P) {
         self.tick += 1;
         let now = self.now();
-        let tick = Tick { number: self.tick, deadline: now, woke: now, skipped: 0, last_cycle_ns: 1 };
+        let tick = Tick { number: self.tick, deadline: now, wake_time: now, skipped: 0, last_cycle_ns: 1 };
         let core = &mut self.core;
         self.calls += (self.around)(&mut || {
             run_cycle(core, tick, probe);
@@ -120,9 +124,9 @@ impl Arm {
             let Some(far_end) = far_end else { continue };
             far_end.receive(&mut self.batch);
             self.sent[bus].extend_from_slice(self.batch.frames());
-            self.rig.receive(now, bus, self.batch.frames(), &mut self.out);
+            self.simulator.receive(now, bus, self.batch.frames(), &mut self.out);
         }
-        self.rig.advance(now, &mut self.out);
+        self.simulator.advance(now, &mut self.out);
         for (far_end, out) in self.far_ends.iter_mut().zip(&mut self.out) {
             if let Some(far_end) = far_end {
                 for chunk in out.chunks(32) {
@@ -131,10 +135,10 @@ impl Arm {
             }
             out.clear();
         }
-        self.rig.rig.take_events();
+        self.simulator.simulator.take_events();
         while let Some(record) = self.readers.records.pop() {
             match record {
-                Record::Cycle(cycle) => self.held_rad = cycle.position_rad,
+                Record::CycleSettings(cycle) => self.hold_position_rad = cycle.position_rad,
                 Record::Transition(t) => self.visited.push(t.to),
                 Record::Accepted { .. } | Record::Lost(_) => {}
             }
@@ -162,15 +166,15 @@ impl Arm {
     }
 
     pub(crate) fn ask(&mut self, command: Command) {
-        assert!(self.desk.ask(Asked { sequence: self.tick, command }));
+        assert!(self.command_queue.push_command(PendingCommand { sequence: self.tick, command }));
         self.step(&mut NoProbe);
-        let answer = self.desk.answer().unwrap();
+        let answer = self.command_queue.answer().unwrap();
         assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
     pub(crate) fn move_it(&mut self, size: f64) {
         // Towards the middle, so that motions that were cut short do not add up to the end of a range.
-        let size = if self.held_rad[0] > 0.0 { -size } else { size };
+        let size = if self.hold_position_rad[0] > 0.0 { -size } else { size };
         let stroke = |start_s: f64, sign: f64| Stroke {
             start_s,
             duration_s: 1.2,
@@ -178,10 +182,10 @@ impl Arm {
             delta_rad: [0.9, 0.2, -0.4, 0.3, 0.2, 0.5, 0.0, 0.0].map(|d| d * size * sign),
         };
         let strokes = [stroke(0.0, 1.0), stroke(0.8, -0.5), stroke(1.9, 0.5), stroke(2.6, -1.0)];
-        let trajectory = Trajectory::new(JOINTS, self.held_rad, &strokes).unwrap();
+        let trajectory = Trajectory::new(JOINTS, self.hold_position_rad, &strokes).unwrap();
         self.generation += 1;
         let generation = self.generation;
-        let mut empty = self.desk.empty_box().expect("boxes go round");
+        let mut empty = self.command_queue.empty_box().expect("boxes go round");
         *empty = CheckedTrajectory {
             trajectory_id: generation,
             generation,
@@ -189,9 +193,9 @@ impl Arm {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.desk.offer(empty);
+        self.command_queue.offer(empty);
         self.step(&mut NoProbe);
-        let decision = self.desk.verdict().unwrap().decision;
+        let decision = self.command_queue.trajectory_result().unwrap().decision;
         assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
     }
 

@@ -1,12 +1,12 @@
 //! Every supervised fault, stall and guard trip, and the way back.
-use crate::rig::{HOME_RAD, JOINTS, Rig, World, swing};
+use crate::harness::{CycleHarness, HOME_RAD, JOINTS, World, swing};
 use crate::{arrived, assert_on_path, assert_within_stop_limits};
-use taustream_drivers::{DriveState, DriveWish, LinkFault};
+use taustream_drivers::{DriveState, DriveTarget, LinkFault};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_motion::{Stroke, Trajectory};
-use taustream_streamer::facts::Decision;
+use taustream_streamer::answer::AnswerReason;
+use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::names::Names;
-use taustream_streamer::words::Why;
 
 /// Every supervised fault, planted in the middle of a motion: fast stop on the path, then fault, drives holding.
 #[test]
@@ -20,24 +20,28 @@ fn fault_of_any_kind_while_moving_stops_the_arm_on_the_path_and_names_the_joint(
         ("jump", |w| w.offset_rad[5] = 0.08, FaultReason::PositionJump, Some(5)),
     ];
     for (name, plant, reason, joint) in table {
-        let mut rig = Rig::new();
-        let trajectory = rig.move_it();
-        rig.run(600);
-        rig.script(plant);
-        rig.run_until(Phase::FastStopping, 40);
-        let cause = rig.cause().unwrap();
+        let mut harness = CycleHarness::new();
+        let trajectory = harness.move_it();
+        harness.run(600);
+        harness.script(plant);
+        harness.run_until(Phase::FastStopping, 40);
+        let cause = harness.cause().unwrap();
         assert_eq!((cause.reason, cause.joint), (reason, joint), "{name}");
         if name == "warning" {
             let said = Names::default().fault(&cause);
             assert_eq!(said, "drive warns (statusword) at joint 5: 0x1237");
         }
-        rig.run_until(Phase::Fault, 1_500);
-        rig.run(50);
-        assert_eq!(rig.phase(), Phase::Fault, "{name}: nothing resumes by itself");
-        assert_eq!(rig.world.lock().unwrap().wish, Some(DriveWish::Enabled), "{name}: the drives hold");
-        assert_on_path(&rig, &trajectory);
-        assert_within_stop_limits(&rig);
-        let answer = rig.ask(Command::ClearFault);
+        harness.run_until(Phase::Fault, 1_500);
+        harness.run(50);
+        assert_eq!(harness.phase(), Phase::Fault, "{name}: nothing resumes by itself");
+        assert_eq!(
+            harness.world.lock().unwrap().drive_target,
+            Some(DriveTarget::Enabled),
+            "{name}: the drives hold"
+        );
+        assert_on_path(&harness, &trajectory);
+        assert_within_stop_limits(&harness);
+        let answer = harness.ask(Command::ClearFault);
         let gone = name == "jump"; // The joint stands still at its new place, within the tracking limit.
         assert_eq!(answer.accepted, gone, "{name}: clear-fault while the cause persists: {:?}", answer.why);
     }
@@ -45,158 +49,158 @@ fn fault_of_any_kind_while_moving_stops_the_arm_on_the_path_and_names_the_joint(
 
 #[test]
 fn tracking_error_that_creeps_stops_the_arm() {
-    let mut rig = Rig::new();
-    rig.move_it();
+    let mut harness = CycleHarness::new();
+    harness.move_it();
     for _ in 0..400 {
-        rig.script(|w| w.offset_rad[0] += 0.001);
-        rig.step_after(1);
+        harness.script(|w| w.offset_rad[0] += 0.001);
+        harness.step_after(1);
     }
-    let cause = rig.cause().unwrap();
+    let cause = harness.cause().unwrap();
     assert_eq!((cause.reason, cause.joint), (FaultReason::TrackingError, Some(0)));
-    rig.run_until(Phase::Fault, 1_500);
+    harness.run_until(Phase::Fault, 1_500);
 }
 
 #[test]
 fn fault_cleared_while_drives_hold_locks_and_enable_makes_ready() {
-    let mut rig = Rig::new();
-    rig.move_it();
-    rig.run(500);
-    rig.script(|w| w.silent = Some(3));
-    rig.run_until(Phase::Fault, 2_000);
-    let held = arrived(&rig);
-    assert!(!rig.ask(Command::Enable).accepted);
-    rig.script(|w| w.silent = None);
-    rig.run(5);
-    rig.accept(Command::ClearFault);
-    assert_eq!(rig.phase(), Phase::Locked);
-    assert!(matches!(rig.offer(swing(&held, 0.2)), Decision::NotReady { phase: Phase::Locked }));
-    rig.accept(Command::Enable);
-    assert_eq!(rig.phase(), Phase::Holding);
-    rig.run(3);
-    assert_eq!(arrived(&rig), held, "the commanded pose stays the truth");
-    assert!(matches!(rig.offer(swing(&held, 0.2)), Decision::Accepted { .. }));
-    rig.run_until(Phase::Holding, 5_000);
-    assert_within_stop_limits(&rig);
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.run(500);
+    harness.script(|w| w.silent = Some(3));
+    harness.run_until(Phase::Fault, 2_000);
+    let held = arrived(&harness);
+    assert!(!harness.ask(Command::Enable).accepted);
+    harness.script(|w| w.silent = None);
+    harness.run(5);
+    harness.accept(Command::ClearFault);
+    assert_eq!(harness.phase(), Phase::Locked);
+    assert!(matches!(harness.offer(swing(&held, 0.2)), Decision::NotReady { phase: Phase::Locked }));
+    harness.accept(Command::Enable);
+    assert_eq!(harness.phase(), Phase::Holding);
+    harness.run(3);
+    assert_eq!(arrived(&harness), held, "the commanded pose stays the truth");
+    assert!(matches!(harness.offer(swing(&held, 0.2)), Decision::Accepted { .. }));
+    harness.run_until(Phase::Holding, 5_000);
+    assert_within_stop_limits(&harness);
 }
 
 #[test]
 fn fault_of_one_drive_is_cleared_only_after_the_others_were_disabled() {
-    let mut rig = Rig::new();
-    rig.move_it();
-    rig.run(500);
-    rig.script(|w| w.forced[2] = Some(DriveState::Fault));
-    rig.run_until(Phase::Fault, 2_000);
-    assert!(matches!(rig.ask(Command::ClearFault).why, Why::PartlyEnergised { joint: 2, .. }));
-    rig.accept(Command::Disable);
-    rig.run(20);
-    assert_eq!(rig.phase(), Phase::Fault);
-    rig.accept(Command::ClearFault);
-    assert_eq!(rig.world.lock().unwrap().clears, 1);
-    assert_eq!(rig.phase(), Phase::Fault, "the drive is still being reset");
-    rig.script(|w| w.forced[2] = None);
-    rig.run_until(Phase::Disabled, 60);
-    rig.run(40);
-    rig.accept(Command::Enable);
-    rig.run_until(Phase::Holding, 50);
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.run(500);
+    harness.script(|w| w.forced[2] = Some(DriveState::Fault));
+    harness.run_until(Phase::Fault, 2_000);
+    assert!(matches!(harness.ask(Command::ClearFault).why, AnswerReason::PartlyEnergised { joint: 2, .. }));
+    harness.accept(Command::Disable);
+    harness.run(20);
+    assert_eq!(harness.phase(), Phase::Fault);
+    harness.accept(Command::ClearFault);
+    assert_eq!(harness.world.lock().unwrap().clears, 1);
+    assert_eq!(harness.phase(), Phase::Fault, "the drive is still being reset");
+    harness.script(|w| w.forced[2] = None);
+    harness.run_until(Phase::Disabled, 60);
+    harness.run(40);
+    harness.accept(Command::Enable);
+    harness.run_until(Phase::Holding, 50);
 }
 
 #[test]
 fn reset_that_does_not_help_leaves_the_fault() {
-    let mut rig = Rig::new();
-    rig.run_until(Phase::Disabled, 60);
-    rig.script(|w| w.forced[0] = Some(DriveState::Fault));
-    rig.run_until(Phase::Fault, 20);
-    rig.accept(Command::ClearFault);
-    rig.run(6_000);
-    assert_eq!((rig.phase(), rig.cause().unwrap().joint), (Phase::Fault, Some(0)));
+    let mut harness = CycleHarness::new();
+    harness.run_until(Phase::Disabled, 60);
+    harness.script(|w| w.forced[0] = Some(DriveState::Fault));
+    harness.run_until(Phase::Fault, 20);
+    harness.accept(Command::ClearFault);
+    harness.run(6_000);
+    assert_eq!((harness.phase(), harness.cause().unwrap().joint), (Phase::Fault, Some(0)));
 }
 
 #[test]
 fn one_lost_cycle_is_made_up_for_by_a_longer_step() {
-    let mut rig = Rig::new();
-    let trajectory = rig.move_it();
-    rig.run(600);
-    rig.script(|w| w.link_fault = Some(LinkFault::QueueFull));
-    rig.run(1);
-    rig.script(|w| w.link_fault = None);
-    rig.run_until(Phase::Holding, 5_000);
-    assert_on_path(&rig, &trajectory);
-    assert_eq!(rig.cause(), None);
+    let mut harness = CycleHarness::new();
+    let trajectory = harness.move_it();
+    harness.run(600);
+    harness.script(|w| w.link_fault = Some(LinkFault::QueueFull));
+    harness.run(1);
+    harness.script(|w| w.link_fault = None);
+    harness.run_until(Phase::Holding, 5_000);
+    assert_on_path(&harness, &trajectory);
+    assert_eq!(harness.cause(), None);
 }
 
 #[test]
 fn stall_within_tolerance_goes_on_in_true_time() {
-    let mut rig = Rig::new();
-    let trajectory = rig.move_it();
-    rig.run(600);
-    let before = rig.cycles.last().unwrap().s;
-    rig.step_after(2);
-    let after = rig.cycles.last().unwrap().s;
+    let mut harness = CycleHarness::new();
+    let trajectory = harness.move_it();
+    harness.run(600);
+    let before = harness.cycles.last().unwrap().s;
+    harness.step_after(2);
+    let after = harness.cycles.last().unwrap().s;
     assert!((after - before - 2e-3).abs() < 1e-12, "{before} to {after}");
-    rig.run_until(Phase::Holding, 5_000);
-    assert_on_path(&rig, &trajectory);
+    harness.run_until(Phase::Holding, 5_000);
+    assert_on_path(&harness, &trajectory);
 }
 
 #[test]
 fn stall_beyond_tolerance_freezes_and_ramps_up_again() {
-    let mut rig = Rig::new();
-    let trajectory = rig.move_it();
-    rig.run(600);
-    let before = *rig.cycles.last().unwrap();
-    rig.step_after(12);
-    let after = rig.cycles.last().unwrap();
+    let mut harness = CycleHarness::new();
+    let trajectory = harness.move_it();
+    harness.run(600);
+    let before = *harness.cycles.last().unwrap();
+    harness.step_after(12);
+    let after = harness.cycles.last().unwrap();
     assert_eq!((after.s, after.position_rad), (before.s, before.position_rad));
     assert_eq!(after.sigma.to_bits(), 0.0_f64.to_bits());
-    let resumed_at = rig.world.lock().unwrap().arrived.len();
-    rig.run_until(Phase::Holding, 6_000);
-    assert_on_path(&rig, &trajectory);
-    rig.world.lock().unwrap().arrived.drain(..resumed_at);
-    assert_within_stop_limits(&rig);
+    let resumed_at = harness.world.lock().unwrap().arrived.len();
+    harness.run_until(Phase::Holding, 6_000);
+    assert_on_path(&harness, &trajectory);
+    harness.world.lock().unwrap().arrived.drain(..resumed_at);
+    assert_within_stop_limits(&harness);
 }
 
 #[test]
 fn stall_longer_than_allowed_stays_paused_until_resume() {
-    let mut rig = Rig::new();
-    let trajectory = rig.move_it();
-    rig.run(600);
-    rig.step_after(40);
-    assert_eq!(rig.phase(), Phase::Paused);
-    rig.run(300);
-    assert_eq!(rig.phase(), Phase::Paused);
-    rig.accept(Command::Resume);
-    rig.run_until(Phase::Holding, 6_000);
-    assert_on_path(&rig, &trajectory);
+    let mut harness = CycleHarness::new();
+    let trajectory = harness.move_it();
+    harness.run(600);
+    harness.step_after(40);
+    assert_eq!(harness.phase(), Phase::Paused);
+    harness.run(300);
+    assert_eq!(harness.phase(), Phase::Paused);
+    harness.accept(Command::Resume);
+    harness.run_until(Phase::Holding, 6_000);
+    assert_on_path(&harness, &trajectory);
 }
 
 /// Drives answer SYNC, and none leaves during a stall; the answer to the first one after it comes a cycle later.
 #[test]
-fn stall_of_the_loop_is_no_silence_of_a_drive() {
-    let mut rig = Rig::new();
-    rig.move_it();
-    rig.run(600);
-    rig.script(|w| w.silent = Some(3));
-    rig.step_after(40);
-    rig.script(|w| w.silent = None);
-    rig.run(50);
-    assert_eq!((rig.phase(), rig.cause()), (Phase::Paused, None));
-    rig.script(|w| w.silent = Some(3));
-    rig.run_until(Phase::Fault, 40);
-    assert_eq!(rig.cause().unwrap().reason, FaultReason::FeedbackLate);
+fn stall_of_the_loop_is_no_missing_feedback_of_a_drive() {
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.run(600);
+    harness.script(|w| w.silent = Some(3));
+    harness.step_after(40);
+    harness.script(|w| w.silent = None);
+    harness.run(50);
+    assert_eq!((harness.phase(), harness.cause()), (Phase::Paused, None));
+    harness.script(|w| w.silent = Some(3));
+    harness.run_until(Phase::Fault, 40);
+    assert_eq!(harness.cause().unwrap().reason, FaultReason::FeedbackLate);
 }
 
 #[test]
 fn stall_longer_than_the_drives_watchdog_is_a_fault() {
-    let mut rig = Rig::new();
-    rig.move_it();
-    rig.run(600);
-    rig.step_after(150);
-    assert_eq!(rig.cause().unwrap().reason, FaultReason::Stall);
-    rig.run_until(Phase::Fault, 100);
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.run(600);
+    harness.step_after(150);
+    assert_eq!(harness.cause().unwrap().reason, FaultReason::Stall);
+    harness.run_until(Phase::Fault, 100);
 }
 
 /// Plants for the guard: motions that intake would never let through, put into the cycle's own queue.
 #[test]
-fn guard_trips_on_a_doctored_trajectory_and_every_joint_brakes_within_stop_limits() {
+fn guard_trips_on_a_corrupted_trajectory_and_every_joint_brakes_within_stop_limits() {
     let fast = |duration_s: f64, delta: f64| {
         let stroke =
             Stroke { start_s: 0.0, duration_s, n: 6, delta_rad: [0.2, 0.0, 0.0, delta, 0.0, 0.1, 0.0, 0.0] };
@@ -204,19 +208,19 @@ fn guard_trips_on_a_doctored_trajectory_and_every_joint_brakes_within_stop_limit
     };
     // Too fast; jerk far beyond; out of the position range at legal rates.
     for (trajectory, joint) in [(fast(0.5, 1.5), 3), (fast(0.05, 0.3), 0), (fast(3.0, -2.5), 3)] {
-        let mut rig = Rig::new();
-        rig.enable();
-        assert!(matches!(rig.offer(trajectory), Decision::Accepted { .. }));
-        rig.run_until(Phase::Fault, 4_000);
-        assert!(rig.phases.contains(&(Phase::Moving, Phase::Braking)), "{:?}", rig.phases);
-        let cause = rig.cause().unwrap();
+        let mut harness = CycleHarness::new();
+        harness.enable();
+        assert!(matches!(harness.offer(trajectory), Decision::Accepted { .. }));
+        harness.run_until(Phase::Fault, 4_000);
+        assert!(harness.phases.contains(&(Phase::Moving, Phase::Braking)), "{:?}", harness.phases);
+        let cause = harness.cause().unwrap();
         assert_eq!((cause.reason, cause.joint), (FaultReason::Guard, Some(joint)));
-        rig.run(150);
+        harness.run(150);
         // The last setpoint let through, from which the brake starts, may use the guard's slack of 0.1 %.
-        let worst = rig.worst_use_of_stop_limits();
+        let worst = harness.worst_use_of_stop_limits();
         assert!(worst.iter().all(|w| *w <= 1.0015), "use of stop limits (v, a, j): {worst:?}");
-        let limits = rig.settings.robot.limits();
-        let world = rig.world.lock().unwrap();
+        let limits = harness.settings.robot.limits();
+        let world = harness.world.lock().unwrap();
         for (tick, pose) in &world.arrived {
             let [low, high] = limits[3].position_rad;
             let (a, j) = (limits[3].stop.acceleration_rad_s2, limits[3].stop.jerk_rad_s3);
@@ -232,18 +236,18 @@ fn guard_trips_on_a_doctored_trajectory_and_every_joint_brakes_within_stop_limit
 
 #[test]
 fn guard_trip_can_be_cleared_and_the_arm_moves_again_from_where_it_braked() {
-    let mut rig = Rig::new();
-    rig.enable();
+    let mut harness = CycleHarness::new();
+    harness.enable();
     let stroke = Stroke { start_s: 0.0, duration_s: 0.3, n: 6, delta_rad: [1.5, 0., 0., 0., 0., 0., 0., 0.] };
-    rig.offer(Trajectory::new(JOINTS, HOME_RAD, &[stroke]).unwrap());
-    rig.run_until(Phase::Fault, 2_000);
-    rig.run(5);
-    rig.accept(Command::ClearFault);
-    rig.accept(Command::Enable);
-    let base = arrived(&rig);
+    harness.offer(Trajectory::new(JOINTS, HOME_RAD, &[stroke]).unwrap());
+    harness.run_until(Phase::Fault, 2_000);
+    harness.run(5);
+    harness.accept(Command::ClearFault);
+    harness.accept(Command::Enable);
+    let base = arrived(&harness);
     let next = swing(&base, 0.5);
-    assert!(matches!(rig.offer(next.clone()), Decision::Accepted { .. }));
-    rig.run_until(Phase::Holding, 5_000);
-    assert_eq!(arrived(&rig), next.end_rad());
-    assert_eq!(rig.cause(), None);
+    assert!(matches!(harness.offer(next.clone()), Decision::Accepted { .. }));
+    harness.run_until(Phase::Holding, 5_000);
+    assert_eq!(arrived(&harness), next.end_rad());
+    assert_eq!(harness.cause(), None);
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use taustream_tests::damiao_scenarios::{ALL, Scenario};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
-use taustream_tests::mit_setpoints::{LogEnds, encodings, judge};
-use taustream_tests::patience::{Failed, passes};
+use taustream_tests::mit_setpoints::{LogEnds, check_setpoints, encodings};
+use taustream_tests::retry::{Failed, passes};
 use taustream_tests::scenarios::Goals;
 use taustream_tests::setpoints::BusFrame;
-use taustream_tests::stage::{Place, Stage};
+use taustream_tests::test_bench::{Place, TestBench};
 use taustream_tests::{candump, cycle_log};
 
 /// Runs the scenarios of Damiao motors over the real processes on a real vcan0.
@@ -57,15 +57,15 @@ fn run(arguments: &Arguments) -> Result<usize> {
 }
 
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
-    let mut stage = Stage::open(place, &format!("{}-{attempt}", scenario.name))?;
-    let motors = encodings(&stage.settings).context("not every servo is a Damiao motor in MIT mode")?;
-    let period_s = f64::from(stage.settings.cycle.period_us) * 1e-6;
-    let bus = stage.settings.buses.first().context("no bus")?.clone();
+    let mut bench = TestBench::open(place, &format!("{}-{attempt}", scenario.name))?;
+    let motors = encodings(&bench.settings).context("not every servo is a Damiao motor in MIT mode")?;
+    let period_s = f64::from(bench.settings.cycle.period_us) * 1e-6;
+    let bus = bench.settings.buses.first().context("no bus")?.clone();
     let interface = bus.interface.clone();
-    if let Err(error) = (scenario.run)(&mut stage, goals) {
-        return Err(stage.failed(error));
+    if let Err(error) = (scenario.run)(&mut bench, goals) {
+        return Err(bench.failed(error));
     }
-    let (recording, log) = stage.close_whatever_became_of_the_streamer()?;
+    let (recording, log) = bench.close_whatever_became_of_the_streamer()?;
     let seen = |record: candump::Record| BusFrame {
         id: record.frame.id().raw(),
         data: record.frame.data().to_vec(),
@@ -84,12 +84,12 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
         text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
     }
     let ends = if scenario.kills { LogEnds::Early } else { LogEnds::WithTheStreamer };
-    let verdict = judge((&frames, &cycle_log::parse(&text)?), 0, (&motors, period_s), ends)?;
+    let check_result = check_setpoints((&frames, &cycle_log::parse(&text)?), 0, (&motors, period_s), ends)?;
     // A recording without motion would pass every comparison.
-    if verdict.on_trajectory == 0 {
+    if check_result.on_trajectory == 0 {
         return Err(anyhow!("nothing was compared with a trajectory").into());
     }
-    Ok(verdict.to_string())
+    Ok(check_result.to_string())
 }
 
 fn read(arguments: &Arguments) -> Result<(Place, Goals)> {

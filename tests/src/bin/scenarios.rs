@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use taustream_arm::Settings;
 use taustream_tests::cycle_log::Event;
 use taustream_tests::demo_file::{DemoFile, programs_beside};
-use taustream_tests::patience::{Failed, passes};
-use taustream_tests::scenarios::{self, Goals, Judged, Scenario};
-use taustream_tests::setpoints::{BusFrame, Encoding, Losses, Verdict, judge_with};
-use taustream_tests::stage::{Place, Stage};
+use taustream_tests::retry::{Failed, passes};
+use taustream_tests::scenarios::{self, CheckMode, Goals, Scenario};
+use taustream_tests::setpoints::{BusFrame, CheckResult, Encoding, Losses, check_setpoints_with};
+use taustream_tests::test_bench::{Place, TestBench};
 use taustream_tests::traffic::as_plain;
 use taustream_tests::{bus_scenarios, candump, cycle_log, restart_scenarios};
 
@@ -74,43 +74,44 @@ fn run(arguments: &Arguments) -> Result<usize> {
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let other = scenario.settings.map(|file| place.settings.with_file_name(file));
     let place = Place { settings: other.unwrap_or_else(|| place.settings.clone()), ..place.clone() };
-    let mut stage = Stage::open(&place, &format!("{}-{attempt}", scenario.name))?;
-    let settings = stage.settings.clone();
-    if let Err(error) = (scenario.run)(&mut stage, goals) {
-        return Err(stage.failed(error));
+    let mut bench = TestBench::open(&place, &format!("{}-{attempt}", scenario.name))?;
+    let settings = bench.settings.clone();
+    if let Err(error) = (scenario.run)(&mut bench, goals) {
+        return Err(bench.failed(error));
     }
-    let (recording, log) = stage.close()?;
-    let losses = match scenario.judged {
-        Judged::Exactly => Losses::None,
-        Judged::WithLosses => Losses::AsLogged,
+    let (recording, log) = bench.close()?;
+    let losses = match scenario.check_mode {
+        CheckMode::Exactly => Losses::None,
+        CheckMode::WithLosses => Losses::AsLogged,
     };
-    let verdict = judge_all(&settings, &recording, &log, losses);
-    let verdict = verdict.map_err(|error| Failed { stalled: is_off_by_a_stall(&settings, &log), error })?;
-    if verdict.on_trajectory == 0 {
+    let check_result = check_all(&settings, &recording, &log, losses);
+    let check_result =
+        check_result.map_err(|error| Failed { stalled: is_off_by_a_stall(&settings, &log), error })?;
+    if check_result.on_trajectory == 0 {
         return Err(anyhow!("nothing was compared with a trajectory: it would pass every comparison").into());
     }
-    Ok(verdict.to_string())
+    Ok(check_result.to_string())
 }
 
 /// Whether a stall may have left single joints beside the path: where setpoints take turns, each joint stands at its own
 /// last one then, and the way back is not in the log.
 fn is_off_by_a_stall(settings: &Settings, log: &Path) -> bool {
     let stands_still =
-        |event: &Event| matches!(event, Event::Cycle(c) if c.phase == "moving" && c.sigma == 0.0);
+        |event: &Event| matches!(event, Event::LoggedCycle(c) if c.phase == "moving" && c.sigma == 0.0);
     let in_turns = settings.buses.iter().any(|bus| bus.traffic.setpoint_every > 1);
     in_turns && cycle_log::read(log).is_ok_and(|log| log.iter().any(stands_still))
 }
 
 /// Judges every bus of a recording.
-fn judge_all(settings: &Settings, recording: &str, log: &Path, losses: Losses) -> Result<Verdict> {
+fn check_all(settings: &Settings, recording: &str, log: &Path, losses: Losses) -> Result<CheckResult> {
     let log = cycle_log::read(log)?;
-    let mut verdict = Verdict::default();
+    let mut check_result = CheckResult::default();
     for (index, bus) in settings.buses.iter().enumerate() {
         let encodings = encodings(settings, index);
         let frames = as_plain(frames(recording, &bus.interface)?, &log, index, &encodings, bus.traffic)?;
-        verdict.add(judge_with(losses, (&frames, &log), index, &encodings)?);
+        check_result.add(check_setpoints_with(losses, (&frames, &log), index, &encodings)?);
     }
-    Ok(verdict)
+    Ok(check_result)
 }
 
 /// What was seen on one interface.

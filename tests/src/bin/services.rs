@@ -25,7 +25,7 @@ enum What {
     Boot {
         /// What `cargo xtask install --root STAGE` has installed.
         #[arg(long)]
-        stage: PathBuf,
+        bench: PathBuf,
         /// Where the Debian image is kept.
         #[arg(long)]
         cache: PathBuf,
@@ -72,7 +72,7 @@ fn perform(what: What) -> Result<usize> {
     match what {
         What::Check { only } => checks::run(&only),
         What::Stall { process, thread } => stall::hold(process, &thread).map(|()| 0),
-        What::Boot { stage, cache, output, realtime, limit_s, only } => {
+        What::Boot { bench, cache, output, realtime, limit_s, only } => {
             let stop = Arc::new(AtomicBool::new(false));
             for number in [SIGINT, SIGTERM, SIGHUP] {
                 signal_hook::flag::register(number, Arc::clone(&stop))?;
@@ -85,9 +85,9 @@ fn perform(what: What) -> Result<usize> {
                 std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
             }
             let controller = cache.join("controller");
-            files::lay_out(&controller, &stage)?;
+            files::lay_out(&controller, &bench)?;
             let booted =
-                Booted { image: &image, files: &[&stage, &controller], output: &output, realtime, limit_s };
+                Booted { image: &image, files: &[&bench, &controller], output: &output, realtime, limit_s };
             let status = booted.run(&["/opt/services", "check", &only], &stop)?;
             println!("booted, tried and ended in {:.0} s", since.elapsed().as_secs_f64());
             if status == machine::TIMED_OUT {

@@ -1,6 +1,6 @@
 //! The arm as an operator of the machine sees and commands it: by the command line, as a user of their own.
 use super::OPERATOR;
-use super::guest::{self, Answer, PATIENCE};
+use super::guest::{self, Answer, TIMEOUT};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::thread::sleep;
@@ -42,7 +42,7 @@ pub fn phase(report: &Value) -> &str {
 pub fn make_ready() -> Result<Vec<String>> {
     let since = Instant::now();
     let (mut done, mut last) = (Vec::new(), String::new());
-    while since.elapsed() < PATIENCE {
+    while since.elapsed() < TIMEOUT {
         // A streamer that is just being restarted answers nobody.
         let Ok(report) = status() else { continue };
         let command = match phase(&report) {
@@ -86,7 +86,7 @@ pub fn wait_at(goal_rad: &[f64]) -> Result<()> {
         let report = status()?;
         match phase(&report) {
             "holding" if is_at(&report, goal_rad) => return Ok(()),
-            "holding" | "moving" | "pausing" if since.elapsed() < PATIENCE => {}
+            "holding" | "moving" | "pausing" if since.elapsed() < TIMEOUT => {}
             "paused" => {
                 println!("       the host stalled the machine; resuming");
                 taustream(&["resume"])?;

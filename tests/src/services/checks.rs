@@ -1,5 +1,5 @@
 //! What is tried in the guest, in this order, and the proof that the trials can fail.
-use super::guest::{PATIENCE, done};
+use super::guest::{TIMEOUT, done};
 use super::{STREAMER, hardening, recovery, rights};
 use anyhow::{Result, bail};
 use std::fs;
@@ -21,14 +21,14 @@ const ALL: [Check; 14] = [
     ("planner killed mid-motion", recovery::planner_killed),
     ("planner hung", recovery::planner_hung),
     ("streamer killed", recovery::streamer_killed),
-    ("cycle stalled", || recovery::cycle_stalled(PATIENCE)),
+    ("cycle stalled", || recovery::cycle_stalled(TIMEOUT)),
     ("link lost and back", recovery::link_lost),
 ];
 /// What only shows when everything has happened.
 const LAST: Check = ("journal", recovery::journal);
 
 /// Time that a planted fault gets to show itself: far above the 2 s of the watchdog.
-const DOCTORED: Duration = Duration::from_secs(8);
+const CORRUPTED: Duration = Duration::from_secs(8);
 
 /// How often a check is tried on a host that stalls the machine.
 const TRIES: usize = 3;
@@ -76,18 +76,18 @@ fn perform(name: &str, check: impl Fn() -> Result<String>) -> bool {
 /// Checks that have to fail on units that were doctored.
 const DOCTOR: [Check; 3] = [
     ("without a watchdog a stalled cycle is noticed as such", || {
-        doctored("taustream-streamer@arm1.service", "[Service]\nWatchdogSec=0\n")?;
-        must_fail(|| recovery::cycle_stalled(DOCTORED))
+        corrupted("taustream-streamer@arm1.service", "[Service]\nWatchdogSec=0\n")?;
+        must_fail(|| recovery::cycle_stalled(CORRUPTED))
     }),
     ("without hardening the exposure is noticed", || {
-        doctored(
+        corrupted(
             "taustream-streamer@arm1.service",
             "[Service]\nProtectSystem=no\nPrivateDevices=no\nSystemCallFilter=\n",
         )?;
         must_fail(hardening::exposures)
     }),
     ("without hardening the probes are let through, and noticed", || {
-        doctored(
+        corrupted(
             "taustream-streamer@probe.service",
             "[Service]\nProtectSystem=no\nRestrictAddressFamilies=\n",
         )?;
@@ -96,7 +96,7 @@ const DOCTOR: [Check; 3] = [
 ];
 
 /// Lays a drop-in over a unit, for the rest of this boot.
-fn doctored(unit: &str, text: &str) -> Result<()> {
+fn corrupted(unit: &str, text: &str) -> Result<()> {
     let folder = format!("{DROP_INS}/{unit}.d");
     fs::create_dir_all(&folder)?;
     fs::write(format!("{folder}/zz-doctored.conf"), text)?;

@@ -25,12 +25,12 @@ const ENABLED: [(&str, &str, &str); 3] = [
     ("taustream@arm1.target", "taustream-servosim@arm1.service", "taustream-servosim@.service"),
 ];
 
-/// Lays the files into `root`; `stage` is what was installed.
+/// Lays the files into `root`; `bench` is what was installed.
 ///
 /// # Errors
 /// When the installed tree is not as expected, or a file cannot be written.
-pub fn lay_out(root: &Path, stage: &Path) -> Result<()> {
-    let shared = stage.join("usr/share/taustream");
+pub fn lay_out(root: &Path, bench: &Path) -> Result<()> {
+    let shared = bench.join("usr/share/taustream");
     let write = |path: &str, text: &str| -> Result<()> {
         let path = root.join(path);
         fs::create_dir_all(path.parent().context("no parent")?)?;

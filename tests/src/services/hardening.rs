@@ -120,9 +120,9 @@ pub fn real_time() -> Result<String> {
         all.push(name);
     }
     ensure!(all.iter().any(|name| name == "cycle"), "no thread is called cycle: {all:?}");
-    let facts = fs::read_to_string(format!("/proc/{process}/status"))?;
+    let status_text = fs::read_to_string(format!("/proc/{process}/status"))?;
     let locked =
-        facts.lines().find_map(|line| line.strip_prefix("VmLck:")).map(str::trim).unwrap_or_default();
+        status_text.lines().find_map(|line| line.strip_prefix("VmLck:")).map(str::trim).unwrap_or_default();
     ensure!(!locked.is_empty() && !locked.starts_with("0 "), "no memory is locked: {locked:?}");
     Ok(format!("{} threads, {locked} locked", all.len()))
 }

@@ -1,5 +1,5 @@
 //! What comes back by itself, and what waits for an operator (docs/resumption.md).
-use super::guest::{PATIENCE, done, number, show, wait, wait_restarted};
+use super::guest::{TIMEOUT, done, number, show, wait, wait_restarted};
 use super::{PLANNER, SERVOSIM, STREAMER, arm, guest};
 use anyhow::{Context, Result, ensure};
 use std::io::{BufRead, BufReader};
@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Which was not.
 pub fn order() -> Result<String> {
     for unit in [SERVOSIM, STREAMER, PLANNER] {
-        wait(&format!("{unit} is ready"), PATIENCE, || Ok(show(unit, "ActiveState")? == "active"))?;
+        wait(&format!("{unit} is ready"), TIMEOUT, || Ok(show(unit, "ActiveState")? == "active"))?;
     }
     for (first, then) in [(SERVOSIM, STREAMER), (STREAMER, PLANNER)] {
         let ready_us = number(first, "ActiveEnterTimestampMonotonic")?;
@@ -39,7 +39,7 @@ pub fn planner_killed() -> Result<String> {
     let restarts = number(PLANNER, "NRestarts")?;
     done(&["systemctl", "kill", "--signal=KILL", PLANNER])?;
     arm::wait_at(&arm::GOALS[0])?;
-    wait_restarted(PLANNER, restarts, PATIENCE)?;
+    wait_restarted(PLANNER, restarts, TIMEOUT)?;
     arm::go_to(&arm::GOALS[1])?;
     Ok("the motion ended at its goal, the next was planned".to_owned())
 }
@@ -49,11 +49,11 @@ pub fn planner_killed() -> Result<String> {
 /// # Errors
 /// When it does not.
 pub fn planner_hung() -> Result<String> {
-    wait(&format!("{PLANNER} is ready"), PATIENCE, || Ok(show(PLANNER, "ActiveState")? == "active"))?;
+    wait(&format!("{PLANNER} is ready"), TIMEOUT, || Ok(show(PLANNER, "ActiveState")? == "active"))?;
     let restarts = number(PLANNER, "NRestarts")?;
     done(&["systemctl", "kill", "--signal=STOP", PLANNER])?;
-    wait_restarted(PLANNER, restarts, PATIENCE)?;
-    watchdog_told(PLANNER)?;
+    wait_restarted(PLANNER, restarts, TIMEOUT)?;
+    watchdog_set(PLANNER)?;
     arm::make_ready()?;
     arm::go_to(&arm::GOALS[0])?;
     Ok("killed by its watchdog".to_owned())
@@ -67,7 +67,7 @@ pub fn streamer_killed() -> Result<String> {
     arm::make_ready()?;
     let restarts = number(STREAMER, "NRestarts")?;
     done(&["systemctl", "kill", "--signal=KILL", STREAMER])?;
-    wait_restarted(STREAMER, restarts, PATIENCE)?;
+    wait_restarted(STREAMER, restarts, TIMEOUT)?;
     back_on_command()
 }
 
@@ -83,7 +83,7 @@ pub fn cycle_stalled(limit: Duration) -> Result<String> {
     let back = wait_restarted(STREAMER, restarts, limit);
     debugger.let_go();
     back?;
-    watchdog_told(STREAMER)?;
+    watchdog_set(STREAMER)?;
     ensure!(number(STREAMER, "MainPID")? != process, "the same process goes on");
     back_on_command()
 }
@@ -99,7 +99,7 @@ fn back_on_command() -> Result<String> {
     Ok(format!("found {phase}; {how:?}, moved"))
 }
 
-fn watchdog_told(unit: &str) -> Result<()> {
+fn watchdog_set(unit: &str) -> Result<()> {
     let entries = guest::journal(unit)?;
     let told = entries.iter().any(|e| e["MESSAGE"].as_str().is_some_and(|m| m.contains("Watchdog timeout")));
     ensure!(told, "systemd does not speak of the watchdog of {unit}");
@@ -130,9 +130,11 @@ pub fn link_lost() -> Result<String> {
         arm::make_ready()?;
         let restarts = number(STREAMER, "NRestarts")?;
         done(lose)?;
-        wait(&format!("a fault, the link is {what}"), PATIENCE, || {
-            Ok(arm::phase(&arm::status()?) == "fault")
-        })?;
+        wait(
+            &format!("a fault, the link is {what}"),
+            TIMEOUT,
+            || Ok(arm::phase(&arm::status()?) == "fault"),
+        )?;
         let fault = arm::status()?["fault"]["message"].as_str().unwrap_or("?").to_owned();
         for command in regain {
             done(command)?;

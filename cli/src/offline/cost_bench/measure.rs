@@ -8,9 +8,9 @@ use std::cell::RefCell;
 use std::time::{Duration, Instant};
 use taustream_arm::Robot;
 use taustream_planner::cost::{ControlPointCost, Level};
-use taustream_planner::optimize::{Found, Ibfoa, Optimizer, Parameters, Problem, Progress, Run};
+use taustream_planner::optimize::{Ibfoa, Optimizer, Parameters, Problem, Progress, Run, Solution};
 use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
-use taustream_planner::{CostModel, PaperCost, draw::Draw};
+use taustream_planner::{CostModel, PaperCost, rng::SeededRng};
 
 /// Decision vectors that are timed together: few, so that a batch seldom loses the processor on the way.
 const BATCH: usize = 5;
@@ -107,8 +107,8 @@ pub(super) fn measure(robot: &Robot, options: &Options) -> Result<CostBench, Fai
     let seen = recorded.seen.into_inner();
     let stride = seen.len().div_ceil(SET).max(1);
     let met: Vec<Vec<f64>> = seen.into_iter().step_by(stride).collect();
-    let mut draw = Draw::new(1, 0);
-    let anywhere = |_| problem.bounds().iter().map(|[low, high]| draw.within(*low, *high)).collect();
+    let mut rng = SeededRng::new(1, 0);
+    let anywhere = |_| problem.bounds().iter().map(|[low, high]| rng.within(*low, *high)).collect();
     let random: Vec<Vec<f64>> = (0..SET).map(anywhere).collect();
     let share = Duration::from_secs_f64(0.5 * options.seconds);
     let sets = vec![
@@ -135,7 +135,7 @@ pub(super) fn measure(robot: &Robot, options: &Options) -> Result<CostBench, Fai
 
 fn problem(robot: &Robot, seed: u64) -> Result<ControlPointCost<'_>, Failure> {
     let model = CostModel::default();
-    let case = Case::draw(robot, &model, seed).ok_or_else(|| {
+    let case = Case::random(robot, &model, seed).ok_or_else(|| {
         Failure::Failed(format!("{}: no two poses are clear of the paper's random spheres", robot.name))
     })?;
     case.problem(robot, CONTROL_POINTS, model).map_err(|error| Failure::Failed(error.to_string()))
@@ -161,7 +161,7 @@ fn time_set(
         };
         rounds.push(points.chunks(BATCH).flat_map(one).collect());
     }
-    let time = |way: usize| Time::of(&rounds, way, levels.len() + 1);
+    let time = |variant: usize| Time::of(&rounds, variant, levels.len() + 1);
     let plain = time(0);
     let exact = rated(points, |x| problem.rate_exactly(x))?;
     let colliding = exact.iter().filter(|cost| cost.collision).count();
@@ -186,11 +186,11 @@ fn time_set(
 }
 
 impl Time {
-    /// The times of one of `ways` ways: a round holds each batch by every way in turn.
-    fn of(rounds: &[Vec<f64>], way: usize, ways: usize) -> Self {
-        let batches = rounds.first().map_or(0, Vec::len) / ways.max(1);
+    /// The times of one of `variants` ways: a round holds each batch by every way in turn.
+    fn of(rounds: &[Vec<f64>], variant: usize, variants: usize) -> Self {
+        let batches = rounds.first().map_or(0, Vec::len) / variants.max(1);
         let of_batch = |batch: usize| -> Vec<f64> {
-            rounds.iter().filter_map(|round| round.get(batch * ways + way)).copied().collect()
+            rounds.iter().filter_map(|round| round.get(batch * variants + variant)).copied().collect()
         };
         let best = |batch| of_batch(batch).into_iter().fold(f64::INFINITY, f64::min);
         let mean_us = (0..batches).map(best).sum::<f64>() / batches.max(1) as f64;
@@ -239,7 +239,7 @@ fn timed(mut runs: Vec<OneRun>) -> Runs {
     Runs { runs: runs.len(), evaluations, median_s, least_s, processor_s }
 }
 
-fn optimise(problem: &dyn Problem, parameters: Parameters, seed: u64) -> Result<Found, Failure> {
+fn optimise(problem: &dyn Problem, parameters: Parameters, seed: u64) -> Result<Solution, Failure> {
     let (is_over, mut watch) = (|| false, |_: &Progress| ());
     let run = Run { seed, evaluations_max: usize::MAX, guesses: &[], is_over: &is_over, watch: &mut watch };
     let optimizer = Ibfoa { parameters, ..Ibfoa::CASE_1 };

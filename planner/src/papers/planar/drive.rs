@@ -1,13 +1,13 @@
 //! A whole journey: robots take turns, see what is in range, share their virtual obstacles.
 use super::field::Numbers;
-use super::robot::{Robot, Rule, Senses, VirtualObstacle};
-use super::{Place, Scene, distance_cm};
-use crate::draw::Draw;
+use super::robot::{PlanarRobot, Rule, Senses, VirtualObstacle};
+use super::{Place, PlanarScene, distance_cm};
 use crate::optimize::Refusal;
+use crate::rng::SeededRng;
 
 /// How to drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub struct PlanarDrive {
     /// How steps are chosen.
     pub rule: Rule,
     /// The numbers.
@@ -37,10 +37,11 @@ pub struct Journey {
 ///
 /// # Errors
 /// When the numbers make no sense.
-pub fn drive(scene: &Scene, how: &Drive) -> Result<Journey, Refusal> {
+pub fn drive(scene: &PlanarScene, how: &PlanarDrive) -> Result<Journey, Refusal> {
     how.numbers.check()?;
     let starts = scene.robots.iter().enumerate();
-    let robots = starts.map(|(i, [start, goal])| Robot::new(*start, *goal, Draw::new(how.seed, i as u64)));
+    let robots =
+        starts.map(|(i, [start, goal])| PlanarRobot::new(*start, *goal, SeededRng::new(how.seed, i as u64)));
     let mut fleet =
         Fleet { scene, how, robots: robots.collect(), virtuals: Vec::new(), nearest_cm: f64::INFINITY };
     let mut steps = 0;
@@ -58,9 +59,9 @@ pub fn drive(scene: &Scene, how: &Drive) -> Result<Journey, Refusal> {
 }
 
 struct Fleet<'a> {
-    scene: &'a Scene,
-    how: &'a Drive,
-    robots: Vec<Robot>,
+    scene: &'a PlanarScene,
+    how: &'a PlanarDrive,
+    robots: Vec<PlanarRobot>,
     virtuals: Vec<VirtualObstacle>,
     nearest_cm: f64,
 }

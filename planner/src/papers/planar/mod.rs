@@ -11,10 +11,10 @@ mod field;
 mod robot;
 mod scene;
 
-pub use drive::{Drive, Journey, drive};
+pub use drive::{Journey, PlanarDrive, drive};
 pub use field::{Numbers, force, potential};
 pub use robot::{Rule, VirtualObstacle};
-pub use scene::{Obstacle, Scene, Shape};
+pub use scene::{Obstacle, PlanarScene, PlanarShape};
 
 /// A place in the plane, in centimetres.
 pub type Place = [f64; 2];

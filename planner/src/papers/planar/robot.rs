@@ -6,8 +6,8 @@
 //! step); it goes back along its own trace, which is known to be free, and forgets what it retraced.
 use super::field::{Numbers, force};
 use super::{Place, distance_cm};
-use crate::draw::Draw;
 use crate::optimize::Reading;
+use crate::rng::SeededRng;
 
 /// How a robot chooses its steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub(super) struct Senses<'a> {
 
 /// A robot on its way.
 #[derive(Clone, Debug)]
-pub(super) struct Robot {
+pub(super) struct PlanarRobot {
     pub(super) goal: Place,
     /// The way from the start to here, without what was retraced: never empty.
     trace: Vec<Place>,
@@ -51,12 +51,12 @@ pub(super) struct Robot {
     observed_from: usize,
     /// How long the trace is where a retreat ends.
     returns_to: Option<usize>,
-    draw: Draw,
+    rng: SeededRng,
 }
 
-impl Robot {
-    pub(super) fn new(start: Place, goal: Place, draw: Draw) -> Self {
-        Self { goal, trace: vec![start], path: vec![start], observed_from: 0, returns_to: None, draw }
+impl PlanarRobot {
+    pub(super) fn new(start: Place, goal: Place, rng: SeededRng) -> Self {
+        Self { goal, trace: vec![start], path: vec![start], observed_from: 0, returns_to: None, rng }
     }
 
     pub(super) fn place(&self) -> Place {
@@ -110,15 +110,15 @@ impl Robot {
         let mut best = (cost(here), None, distance_cm(here, self.goal));
         for _ in 0..senses.numbers.bacteria {
             // Uniform in the square, as eq. 9 has it, then of a step's length.
-            let [dx, dy]: Place = std::array::from_fn(|_| self.draw.within(-1.0, 1.0));
+            let [dx, dy]: Place = std::array::from_fn(|_| self.rng.within(-1.0, 1.0));
             let share = senses.numbers.step_cm / dx.hypot(dy);
             let there = [here[0] + share * dx, here[1] + share * dy];
             if !(share.is_finite() && (senses.is_clear)(there)) {
                 continue;
             }
-            let (now, way) = (cost(there), distance_cm(there, self.goal));
-            if now < best.0 || (now <= best.0 && way < best.2) {
-                best = (now, Some(there), way);
+            let (now, distance) = (cost(there), distance_cm(there, self.goal));
+            if now < best.0 || (now <= best.0 && distance < best.2) {
+                best = (now, Some(there), distance);
             }
         }
         best.1

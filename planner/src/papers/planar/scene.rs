@@ -3,7 +3,7 @@ use super::{Place, distance_cm};
 
 /// The outline of an obstacle.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
+pub enum PlanarShape {
     /// A disc.
     Disc {
         /// Its centre.
@@ -22,7 +22,7 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
     /// Its outline at the start.
-    pub shape: Shape,
+    pub shape: PlanarShape,
     /// Its speed.
     pub velocity_cm_s: Place,
 }
@@ -31,13 +31,13 @@ impl Obstacle {
     /// A disc that stands still.
     #[must_use]
     pub fn disc(centre_cm: Place, radius_cm: f64) -> Self {
-        Self { shape: Shape::Disc { centre_cm, radius_cm }, velocity_cm_s: [0.0; 2] }
+        Self { shape: PlanarShape::Disc { centre_cm, radius_cm }, velocity_cm_s: [0.0; 2] }
     }
 
     /// Walls that stand still.
     #[must_use]
     pub fn walls(corners_cm: &[Place]) -> Self {
-        Self { shape: Shape::Walls { corners_cm: corners_cm.to_vec() }, velocity_cm_s: [0.0; 2] }
+        Self { shape: PlanarShape::Walls { corners_cm: corners_cm.to_vec() }, velocity_cm_s: [0.0; 2] }
     }
 
     /// The nearest point of the obstacle and how far it is; inside a disc, the place itself at a distance of nothing.
@@ -47,12 +47,12 @@ impl Obstacle {
         // The obstacle's movement is the robot's the other way.
         let seen = [place_cm[0] - dx, place_cm[1] - dy];
         let point = match &self.shape {
-            Shape::Disc { centre_cm, radius_cm } => {
+            PlanarShape::Disc { centre_cm, radius_cm } => {
                 let away = distance_cm(seen, *centre_cm);
                 let share = if away > *radius_cm { radius_cm / away } else { 1.0 };
                 std::array::from_fn(|i| centre_cm[i] + share * (seen[i] - centre_cm[i]))
             }
-            Shape::Walls { corners_cm } => nearest_of_walls(corners_cm, seen),
+            PlanarShape::Walls { corners_cm } => nearest_of_walls(corners_cm, seen),
         };
         ([point[0] + dx, point[1] + dy], distance_cm(seen, point))
     }
@@ -75,7 +75,7 @@ fn nearest_of_walls(corners_cm: &[Place], place: Place) -> Place {
 
 /// Where robots start and have to go, and what is in their way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
+pub struct PlanarScene {
     /// Its name.
     pub name: &'static str,
     /// Start and goal of every robot.
@@ -85,15 +85,15 @@ pub struct Scene {
 }
 
 /// The paper's start and goal.
-const WAY: [Place; 2] = [[50.0, -90.0], [-20.0, 90.0]];
+const DISTANCE: [Place; 2] = [[50.0, -90.0], [-20.0, 90.0]];
 /// Where the straight way between them is half done.
 const MIDDLE: Place = [15.0, 0.0];
 
-impl Scene {
+impl PlanarScene {
     /// The paper's kinds of scene. Start, goal and the two discs' centres are printed; every size is ours.
     #[must_use]
     pub fn paper_002() -> Vec<Self> {
-        let one = |name, obstacles| Self { name, robots: vec![WAY], obstacles };
+        let one = |name, obstacles| Self { name, robots: vec![DISTANCE], obstacles };
         let crossing = Obstacle { velocity_cm_s: [5.217, 0.0], ..Obstacle::disc([-35.0, 0.0], 9.5) };
         let three = [[-1.0, -4.0], [15.0, 2.0], [31.0, 8.0]].map(|c| Obstacle::disc(c, 7.0));
         vec![
@@ -117,7 +117,7 @@ impl Scene {
 
 /// Corners given with the way ahead as y, turned so that the paper's way runs into them, and put at a place.
 fn trap(corners: &[Place], at: Place) -> Obstacle {
-    let [start, goal] = WAY;
+    let [start, goal] = DISTANCE;
     let length = distance_cm(start, goal);
     let ahead = [(goal[0] - start[0]) / length, (goal[1] - start[1]) / length];
     let turned: Vec<Place> = corners
@@ -128,7 +128,7 @@ fn trap(corners: &[Place], at: Place) -> Obstacle {
 }
 
 /// Four robots whose ways cross, three of them through traps.
-fn four_robots() -> Scene {
+fn four_robots() -> PlanarScene {
     let robots = vec![
         [[-80.0, -90.0], [-80.0, 90.0]],
         [[-20.0, -90.0], [-20.0, 90.0]],
@@ -140,5 +140,5 @@ fn four_robots() -> Scene {
     };
     let obstacles =
         vec![cup(-80.0, 0.0), Obstacle::disc([-20.0, 10.0], 9.5), cup(31.0, -10.0), cup(75.0, 10.0)];
-    Scene { name: "four-robots", robots, obstacles }
+    PlanarScene { name: "four-robots", robots, obstacles }
 }

@@ -1,5 +1,5 @@
 //! A stage for one scenario: the real processes on one bus, a `candump` beside them, everything kept in one folder.
-use crate::patience::Failed;
+use crate::retry::Failed;
 use anyhow::{Context, Result, bail, ensure};
 use rustix::process::{Pid, Signal, kill_process};
 use serde::Deserialize;
@@ -14,7 +14,7 @@ use taustream_messages::service::{ReportSubscriber, Wire};
 use taustream_messages::{FaultReason, Phase, Report};
 
 /// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it judges no speed.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const TIMEOUT: Duration = Duration::from_secs(60);
 /// Pause between two looks.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -45,14 +45,14 @@ impl Process {
     /// Waits until the process has printed `words`.
     ///
     /// # Errors
-    /// When it ends before, or takes longer than [`PATIENCE`]; with what it said.
+    /// When it ends before, or takes longer than [`TIMEOUT`]; with what it said.
     pub fn await_words(&mut self, words: &str) -> Result<()> {
         let since = Instant::now();
         while !fs::read_to_string(&self.stdout)?.contains(words) {
             if let Some(status) = self.child.try_wait()? {
                 bail!("{} ended with {status} before it said `{words}`: {}", self.name, self.said());
             }
-            ensure!(since.elapsed() < PATIENCE, "{} never said `{words}`: {}", self.name, self.said());
+            ensure!(since.elapsed() < TIMEOUT, "{} never said `{words}`: {}", self.name, self.said());
             sleep(LOOK);
         }
         Ok(())
@@ -69,7 +69,7 @@ impl Process {
     ///
     /// # Errors
     /// When it has ended.
-    pub fn tell(&mut self, line: &str) -> Result<()> {
+    pub fn show(&mut self, line: &str) -> Result<()> {
         let stdin = self.stdin.as_mut().context("its input is closed")?;
         writeln!(stdin, "{line}").with_context(|| format!("cannot tell {} `{line}`", self.name))
     }
@@ -86,14 +86,14 @@ impl Process {
     /// Waits for its end.
     ///
     /// # Errors
-    /// When it takes longer than [`PATIENCE`].
+    /// When it takes longer than [`TIMEOUT`].
     pub fn await_end(&mut self) -> Result<ExitStatus> {
         let since = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait()? {
                 return Ok(status);
             }
-            ensure!(since.elapsed() < PATIENCE, "{} does not end: {}", self.name, self.said());
+            ensure!(since.elapsed() < TIMEOUT, "{} does not end: {}", self.name, self.said());
             sleep(LOOK);
         }
     }
@@ -133,7 +133,7 @@ impl Motion {
 
 /// The processes of one scenario.
 #[derive(Debug)]
-pub struct Stage {
+pub struct TestBench {
     dir: PathBuf,
     programs: PathBuf,
     settings_file: PathBuf,
@@ -163,7 +163,7 @@ pub struct Place {
     pub output: PathBuf,
 }
 
-impl Stage {
+impl TestBench {
     /// Starts candump, simulator, streamer and planner, in this order, and waits until the arm is ready to be enabled.
     ///
     /// # Errors
@@ -205,7 +205,7 @@ impl Stage {
 
         let wire = Wire::join(&settings.name, "scenario", &taustream_arm::runtime::directory()?)?;
         let reports = wire.report_subscriber()?;
-        let mut stage = Self {
+        let mut bench = Self {
             dir,
             programs: place.programs.clone(),
             settings_file: place.settings.clone(),
@@ -217,8 +217,8 @@ impl Stage {
             reports,
             _wire: wire,
         };
-        stage.await_phase(Phase::Disabled)?;
-        Ok(stage)
+        bench.await_phase(Phase::Disabled)?;
+        Ok(bench)
     }
 
     /// The folder of this scenario's files.
@@ -390,7 +390,7 @@ impl Stage {
             if let Some((report, phase)) = newest.as_ref().and_then(Report::checked) {
                 return Ok((*report, phase));
             }
-            ensure!(since.elapsed() < PATIENCE, "no report: {}", self.streamer.said());
+            ensure!(since.elapsed() < TIMEOUT, "no report: {}", self.streamer.said());
             sleep(LOOK);
         }
     }
@@ -407,7 +407,7 @@ impl Stage {
                 return Ok(report);
             }
             ensure!(
-                since.elapsed() < PATIENCE,
+                since.elapsed() < TIMEOUT,
                 "waited for {what}; the arm is {} ({:?} joint {} value {}), s = {} of {}: {}",
                 phase.word(),
                 report.fault(),
@@ -433,7 +433,7 @@ impl Stage {
     ///
     /// # Errors
     /// When it does not get there.
-    pub fn await_under_way(&mut self, motion: Motion, share: f64) -> Result<Report> {
+    pub fn await_in_progress(&mut self, motion: Motion, share: f64) -> Result<Report> {
         self.await_through_stalls("a motion under way", |r, phase| {
             motion.is_in(r) && phase == Phase::Moving && r.trajectory_s > share * r.trajectory_duration_s
         })
@@ -490,7 +490,7 @@ impl Stage {
     fn is_stalled(&self, report: &Report) -> bool {
         let limit_s = self.settings.supervision.feedback_age_s_max;
         let all_late = report.feedback_age_s.iter().take(report.joints()).all(|age_s| *age_s > limit_s);
-        let bus_well = report.buses().iter().all(|bus| bus.trouble == 0);
+        let bus_well = report.buses().iter().all(|bus| bus.bus_fault == 0);
         report.stalls > 0 || (all_late && bus_well) || report.fault() == Some(FaultReason::Stall)
     }
 

@@ -8,10 +8,10 @@
 use std::path::{Path, PathBuf};
 use taustream_arm::last_pose::LastPose;
 use taustream_arm::{Feedback, Settings};
-use taustream_messages::{Phase, Report, Standing};
+use taustream_messages::{Phase, ReferenceState, Report};
 use taustream_motion::MAX_JOINTS;
-use taustream_streamer::memory::{Keeper, recall};
-use taustream_streamer::turns::{Recorded, Rule};
+use taustream_streamer::pose_store::{PoseStore, restore_poses};
+use taustream_streamer::referencing::{Recorded, Rule};
 
 struct Scratch(PathBuf);
 
@@ -39,8 +39,8 @@ fn report(phase: Phase, energised: u32, at_rad: f64, ms: u64) -> Report {
         energised,
         time_ns: 1_000_000_000 + ms * 1_000_000,
         measured_rad: [at_rad; MAX_JOINTS],
-        turn_offset_rad: [2.5; MAX_JOINTS],
-        standing: [Standing::Encoder.code(); MAX_JOINTS],
+        multi_turn_offset_rad: [2.5; MAX_JOINTS],
+        reference_state: [ReferenceState::Encoder.code(); MAX_JOINTS],
         ..Report::default()
     }
 }
@@ -48,14 +48,14 @@ fn report(phase: Phase, energised: u32, at_rad: f64, ms: u64) -> Report {
 /// The record after these reports, 100 ms apart.
 fn kept(name: &str, settings: &Settings, reports: &[(Phase, u32, f64)]) -> Option<Recorded> {
     let scratch = Scratch::new(name);
-    let mut keeper = Keeper::start(settings, scratch.0.clone()).unwrap();
+    let mut pose_store = PoseStore::start(settings, scratch.0.clone()).unwrap();
     for (number, (phase, energised, at_rad)) in (0_u64..).zip(reports) {
-        keeper.note(&report(*phase, *energised, *at_rad, number * 100));
+        pose_store.note(&report(*phase, *energised, *at_rad, number * 100));
         // The writer takes one record at a time.
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
-    drop(keeper);
-    recall(settings, &scratch.0)[0]
+    drop(pose_store);
+    restore_poses(settings, &scratch.0)[0]
 }
 
 #[test]
@@ -80,10 +80,10 @@ fn record_at_rest_is_believed_and_one_of_a_motion_is_not() {
 fn record_of_another_binding_is_not_believed() {
     let settings = settings();
     let scratch = Scratch::new("binding");
-    let mut keeper = Keeper::start(&settings, scratch.0.clone()).unwrap();
-    keeper.note(&report(Phase::Disabled, 0, 0.5, 0));
-    drop(keeper);
-    assert!(recall(&settings, &scratch.0).iter().filter(|joint| joint.is_some()).count() == 6);
+    let mut pose_store = PoseStore::start(&settings, scratch.0.clone()).unwrap();
+    pose_store.note(&report(Phase::Disabled, 0, 0.5, 0));
+    drop(pose_store);
+    assert!(restore_poses(&settings, &scratch.0).iter().filter(|joint| joint.is_some()).count() == 6);
     let changes: [fn(&mut Settings); 4] = [
         |s| s.servos[2].sign = -s.servos[2].sign,
         |s| s.servos[2].zero_offset_rad += 1e-9,
@@ -93,36 +93,37 @@ fn record_of_another_binding_is_not_believed() {
     for change in changes {
         let mut other = settings.clone();
         change(&mut other);
-        let known: Vec<bool> = recall(&other, &scratch.0).iter().take(6).map(Option::is_some).collect();
+        let known: Vec<bool> =
+            restore_poses(&other, &scratch.0).iter().take(6).map(Option::is_some).collect();
         assert_eq!(known, [true, true, false, true, true, true]);
     }
     // Broken, the file tells nothing of any joint.
     let file = LastPose::file(&scratch.0, &settings.name);
     let text = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, text.replace("0.5", "0.6")).unwrap();
-    assert!(recall(&settings, &scratch.0).iter().all(Option::is_none));
+    assert!(restore_poses(&settings, &scratch.0).iter().all(Option::is_none));
 }
 
 #[test]
-fn drive_that_was_switched_off_leaves_its_record_standing() {
+fn drive_that_was_switched_off_keeps_its_record() {
     let settings = settings();
     let scratch = Scratch::new("off");
-    let mut keeper = Keeper::start(&settings, scratch.0.clone()).unwrap();
+    let mut pose_store = PoseStore::start(&settings, scratch.0.clone()).unwrap();
     for ms in [0, 100, 200, 300] {
-        keeper.note(&report(Phase::Disabled, 0, 0.5, ms));
+        pose_store.note(&report(Phase::Disabled, 0, 0.5, ms));
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let mut gone = report(Phase::Configuring, 0, 0.5, 2_000);
-    gone.standing = [Standing::Unheard.code(); MAX_JOINTS];
-    gone.turn_offset_rad = [0.0; MAX_JOINTS];
-    keeper.note(&gone);
-    drop(keeper);
-    let recorded = recall(&settings, &scratch.0)[0].unwrap();
+    gone.reference_state = [ReferenceState::NoFeedback.code(); MAX_JOINTS];
+    gone.multi_turn_offset_rad = [0.0; MAX_JOINTS];
+    pose_store.note(&gone);
+    drop(pose_store);
+    let recorded = restore_poses(&settings, &scratch.0)[0].unwrap();
     assert_eq!(recorded, Recorded { position_rad: 0.5, offset_rad: 2.5, at_rest: true });
 }
 
 /// Random numbers from a numbered seed.
-fn draw(seed: u64, salt: u64) -> f64 {
+fn random(seed: u64, salt: u64) -> f64 {
     let mut z =
         seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(salt.wrapping_mul(0xBF58_476D_1CE4_E5B9));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -133,10 +134,10 @@ fn draw(seed: u64, salt: u64) -> f64 {
 /// Goal: a joint is never called referenced on a wrong turn: whatever its period, its range, where it truly stands and
 /// what its feedback says, as long as it moved less than the rest of half a period since the record.
 #[test]
-fn turn_that_is_chosen_is_the_true_one_or_none() {
+fn offset_that_is_chosen_is_the_true_one_or_none() {
     let mut chosen = [0_u32; 2];
     for seed in 0..200_000 {
-        let within = |salt, low: f64, high: f64| low + (high - low) * draw(seed, salt);
+        let within = |salt, low: f64, high: f64| low + (high - low) * random(seed, salt);
         let period_rad = 10_f64.powf(within(1, -2.0, 1.5));
         let range_rad = [-within(2, 0.1, 6.0), within(3, 0.1, 6.0)];
         let rule = Rule { feedback: Feedback::Wraps, period_rad, range_rad };
@@ -147,7 +148,7 @@ fn turn_that_is_chosen_is_the_true_one_or_none() {
         let recorded_rad = true_rad + within(6, -0.59, 0.59) * period_rad;
         let recorded = Recorded { position_rad: recorded_rad, offset_rad: 0.0, at_rest: true };
         let resolved = rule.resolve(reading_rad, Some(recorded), false);
-        if resolved.standing.is_referenced() {
+        if resolved.reference_state.is_referenced() {
             let off_rad = (reading_rad + resolved.offset_rad - true_rad).abs();
             assert!(off_rad < 1e-6 * period_rad.max(1.0), "seed {seed}: {resolved:?} is {off_rad} rad off");
             chosen[0] += 1;
@@ -157,7 +158,7 @@ fn turn_that_is_chosen_is_the_true_one_or_none() {
         }
         let blind = rule.resolve(reading_rad, None, false);
         let alone = range_rad[1] - range_rad[0] <= 0.8 * period_rad;
-        assert_eq!(blind.standing.is_referenced(), alone, "seed {seed}: {blind:?}");
+        assert_eq!(blind.reference_state.is_referenced(), alone, "seed {seed}: {blind:?}");
     }
     assert!(chosen.iter().all(|count| *count > 20_000), "{chosen:?}");
 }

@@ -1,11 +1,11 @@
 //! Why a command was taken over or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
 use taustream_drivers::DriveState;
-use taustream_messages::{Phase, Standing};
+use taustream_messages::{Phase, ReferenceState};
 
 /// The cycle's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub struct CommandAnswer {
     /// The question's number.
     pub sequence: u64,
     /// Taken over?
@@ -13,13 +13,13 @@ pub struct Answer {
     /// The phase after it.
     pub phase: Phase,
     /// What happens now, or why not.
-    pub why: Why,
+    pub why: AnswerReason,
 }
 
 /// What happens now, or why not. Joints are zero-based.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(missing_docs, reason = "each variant's sentence stands in `Why::sentence`")]
-pub enum Why {
+pub enum AnswerReason {
     Enabling,
     Unlocked,
     TakingOver,
@@ -51,26 +51,26 @@ pub enum Why {
     TooManyRamps,
     BusRestored,
     BusPassive { bus: usize },
-    OutOfReach { bus: usize },
+    Unreachable { bus: usize },
     HoldsBesideFailed { joint: usize, bus: usize },
     Unowned { joint: usize },
     PartlyEnergised { joint: usize, state: DriveState },
     StillEnergised { joint: usize },
-    NotReferenced { joint: usize, standing: Standing, by_rad: f64 },
+    NotReferenced { joint: usize, reference_state: ReferenceState, by_rad: f64 },
     ReferenceOutside { joint: usize, at_rad: f64, range_rad: [f64; 2] },
     ReferenceFar { joint: usize, at_rad: f64, nearest_rad: f64, limit_rad: f64 },
     ReferenceNotNeeded { joint: usize, reading_rad: f64, at_rad: f64 },
     NoSuchJoint { joint: usize },
     Energised { joint: usize, state: DriveState },
     Wait,
-    Leaving,
+    ShuttingDown,
 }
 
-impl Why {
+impl AnswerReason {
     /// The sentence for people.
     #[must_use]
     pub fn sentence(&self, names: &Names) -> String {
-        self.taken().or_else(|| self.of_turns(names)).unwrap_or_else(|| self.refused(names))
+        self.taken().or_else(|| self.of_referencing(names)).unwrap_or_else(|| self.refused(names))
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
@@ -104,20 +104,20 @@ impl Why {
 
     /// Answers that have to do with turns.
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
-    fn of_turns(&self, names: &Names) -> Option<String> {
+    fn of_referencing(&self, names: &Names) -> Option<String> {
         Some(match *self {
             Self::Referenced { joint, at_rad } => {
                 format!("{} stands at {at_rad:.6} rad; it is kept on disk", names.joint(joint))
             }
-            Self::NotReferenced { joint, standing, by_rad } => {
-                let by = match standing {
-                    Standing::RecordFar => format!(" (by {by_rad:.4} rad)"),
+            Self::NotReferenced { joint, reference_state, by_rad } => {
+                let by = match reference_state {
+                    ReferenceState::RecordFar => format!(" (by {by_rad:.4} rad)"),
                     _ => String::new(),
                 };
                 format!(
                     "{} is not referenced: {}{by}; look where it stands, then `taustream reference --joint ..`",
                     names.joint(joint),
-                    standing.word()
+                    reference_state.word()
                 )
             }
             Self::ReferenceOutside { joint, at_rad, range_rad: [low, high] } => format!(
@@ -179,7 +179,7 @@ impl Why {
                 names.bus(bus),
                 names.interface(bus)
             ),
-            Self::OutOfReach { bus } => format!(
+            Self::Unreachable { bus } => format!(
                 "no drive can be told: {} has failed, and its drives are where their own watchdogs have left them; \
                  `clear-fault` reaches them again once the bus is mended",
                 names.bus(bus)
@@ -218,7 +218,7 @@ impl Why {
             Self::NoFault => "there is no fault",
             Self::TooManyRamps => "too many speed changes at once; wait a second and ask again",
             Self::Wait => "another change is under way; wait until it has ended",
-            Self::Leaving => "the streamer is ending",
+            Self::ShuttingDown => "the streamer is ending",
             _ => "it is not possible now",
         }
     }

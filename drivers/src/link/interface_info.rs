@@ -20,7 +20,7 @@ use std::num::NonZeroU32;
 
 /// An interface as the kernel describes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Facts {
+pub(super) struct InterfaceInfo {
     /// True when the hardware type is CAN.
     pub(super) is_can: bool,
     /// True when it is administratively up.
@@ -45,7 +45,7 @@ pub(super) fn exists(interface: &str) -> bool {
 }
 
 /// Asks the kernel.
-pub(super) fn of(interface: &str) -> Result<Facts, OpenError> {
+pub(super) fn of(interface: &str) -> Result<InterfaceInfo, OpenError> {
     let unknown = |source| OpenError::System { interface: interface.to_owned(), doing: "ask for", source };
     let index = index_of(interface).map_err(unknown)?;
     let answer = query(index).map_err(unknown)?;
@@ -61,7 +61,13 @@ pub(super) fn of(interface: &str) -> Result<Facts, OpenError> {
     // Drivers without a controller (vcan) state neither.
     let bitrate_bit_s = controller.as_ref().and_then(|c| c.bit_rate().ok().flatten());
     let state = controller.as_ref().and_then(|c| c.state().ok().flatten());
-    Ok(Facts { is_can, is_up: info.ifi_flags().contains(Iff::UP), kind: kind_of(info), bitrate_bit_s, state })
+    Ok(InterfaceInfo {
+        is_can,
+        is_up: info.ifi_flags().contains(Iff::UP),
+        kind: kind_of(info),
+        bitrate_bit_s,
+        state,
+    })
 }
 
 /// The index of an interface.

@@ -1,9 +1,9 @@
 //! What every bring-up knows of time: how long to wait, and a clock that does not count our own stalls as waiting.
-use crate::servo::{DriveWish, Nanos};
+use crate::servo::{DriveTarget, Nanos};
 
 /// Limits of waiting.
 #[derive(Clone, Copy, Debug)]
-pub struct Patience {
+pub struct Timeouts {
     /// Each confirmation of a step.
     pub step: Nanos,
     /// Age up to which what a drive said is recent.
@@ -12,11 +12,11 @@ pub struct Patience {
 
 /// What the master knows in a cycle, beside the drive itself.
 #[derive(Clone, Copy, Debug)]
-pub struct Cycle {
+pub struct BringUpCycle {
     /// Patient clock.
     pub now: Nanos,
     /// The wish.
-    pub wish: DriveWish,
+    pub drive_target: DriveTarget,
     /// Another master was heard a short while ago.
     pub other_master: bool,
 }
@@ -28,14 +28,14 @@ const STEP_PERIODS: u64 = 10;
 
 /// A clock that advances with the cycles, but not through our own stalls.
 #[derive(Clone, Copy, Debug)]
-pub struct PatientClock {
+pub struct StepTimer {
     step: Nanos,
     now: Nanos,
     ticked: Option<Nanos>,
     other_master_at: Option<Nanos>,
 }
 
-impl PatientClock {
+impl StepTimer {
     /// At its beginning.
     #[must_use]
     pub fn new(period_us: u32) -> Self {
@@ -43,12 +43,12 @@ impl PatientClock {
         Self { step, now: Nanos(0), ticked: None, other_master_at: None }
     }
     /// One cycle at `time`, with this wish.
-    pub fn tick(&mut self, time: Nanos, wish: DriveWish) -> Cycle {
+    pub fn tick(&mut self, time: Nanos, drive_target: DriveTarget) -> BringUpCycle {
         let passed = self.ticked.map_or(0, |then| time.0.saturating_sub(then.0));
         self.now = Nanos(self.now.0.saturating_add(passed.min(self.step.0)));
         self.ticked = Some(time);
-        let heard = |at: Nanos| self.now.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0;
-        Cycle { now: self.now, wish, other_master: self.other_master_at.is_some_and(heard) }
+        let received = |at: Nanos| self.now.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0;
+        BringUpCycle { now: self.now, drive_target, other_master: self.other_master_at.is_some_and(received) }
     }
     /// Its time.
     #[must_use]

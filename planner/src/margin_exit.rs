@@ -3,12 +3,12 @@
 //! After a stop or a sag an arm may touch nothing and yet stand inside the margin, or so close to its edge that no
 //! motion of the search's wary steps begins there. Then a short straight way out is found first; planning goes on
 //! from its end with the full margin. Only until the arm has left are the distances those that the start has.
+use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
-use crate::draw::Draw;
 use crate::plan::{PlanError, PoseOf};
+use crate::rng::SeededRng;
 use crate::tree::Space;
 use crate::verify::Stretch;
-use crate::work::Work;
 use crate::world::{Snapshot, World};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 
@@ -80,7 +80,7 @@ impl Note {
 }
 
 /// A motion that begins inside the margin, or at its edge.
-pub struct Leaving<'a> {
+pub struct MarginExit<'a> {
     /// What it must keep until it has left.
     pub near: &'a World<'a>,
     /// Where it begins.
@@ -89,17 +89,17 @@ pub struct Leaving<'a> {
     pub note: Option<Note>,
 }
 
-impl Leaving<'_> {
+impl MarginExit<'_> {
     /// When a motion has left the margin of a world; `None` when it never does, or the clock cuts in.
     #[must_use]
-    pub fn left_s(&self, world: &World, motion: &Trajectory, work: &Work) -> Option<f64> {
+    pub fn left_s(&self, world: &World, motion: &Trajectory, budget: &Budget) -> Option<f64> {
         let (duration_s, mut snapshot) = (motion.duration_s(), Snapshot::default());
         let mut instants = (0..=INSTANTS).map(|i| duration_s * f64::from(i) / f64::from(INSTANTS));
         let left_s = instants.find(|t_s| {
-            work.is_over_after(world.pairs().len())
+            budget.is_over_after(world.pairs().len())
                 || world.is_free(&motion.sample(*t_s).position_rad, LEFT_M, &mut snapshot)
         });
-        left_s.filter(|_| !work.was_cut())
+        left_s.filter(|_| !budget.was_cut())
     }
 
     /// What a motion that leaves at an instant must keep, and when.
@@ -118,28 +118,28 @@ pub fn is_clear(world: &World, pose_rad: &JointArray) -> bool {
 /// The end of a short straight way out, clear in the second world and proven in the first: the one that makes the
 /// least detour to the goal among the shortest. `None` when there is none nearby.
 #[must_use]
-pub fn way_out(
+pub fn find_margin_exit(
     [near, world]: [&World; 2],
     [start_rad, goal_rad]: [&JointArray; 2],
     seed: u64,
-    work: &Work,
+    budget: &Budget,
 ) -> Option<JointArray> {
-    let space = Space::new(world, work);
-    let mut draw = Draw::new(seed, 20);
+    let space = Space::new(world, budget);
+    let mut rng = SeededRng::new(seed, 20);
     for ring_m in RINGS_M {
         let mut best: Option<(f64, JointArray)> = None;
         for direction in 0..=DIRECTIONS {
             // Towards the goal first: what leads there is no detour.
-            let target = if direction == 0 { *goal_rad } else { random_target(&space, start_rad, &mut draw) };
+            let target = if direction == 0 { *goal_rad } else { random_target(&space, start_rad, &mut rng) };
             let share = (ring_m / space.distance_m(start_rad, &target)).min(1.0);
             let end = Space::between(start_rad, &target, share);
-            let Some(pose) = first_clear(world, start_rad, &end, work) else { continue };
-            let way_m = space.distance_m(start_rad, &pose) + space.distance_m(&pose, goal_rad);
+            let Some(pose) = first_clear(world, start_rad, &end, budget) else { continue };
+            let distance_m = space.distance_m(start_rad, &pose) + space.distance_m(&pose, goal_rad);
             let edge = StraightEdge { from_rad: start_rad, to_rad: &pose };
-            if best.as_ref().is_none_or(|(b, _)| way_m < *b)
-                && sweep(near, &edge, [0.0, 1.0], &SweepRules::WAY_OUT, work).is_ok()
+            if best.as_ref().is_none_or(|(b, _)| distance_m < *b)
+                && sweep(near, &edge, [0.0, 1.0], &SweepRules::MARGIN_EXIT, budget).is_ok()
             {
-                best = Some((way_m, pose));
+                best = Some((distance_m, pose));
             }
         }
         if let Some((_, pose)) = best {
@@ -150,18 +150,23 @@ pub fn way_out(
 }
 
 /// A pose inside the position limits, in a random direction.
-fn random_target(space: &Space, start_rad: &JointArray, draw: &mut Draw) -> JointArray {
+fn random_target(space: &Space, start_rad: &JointArray, rng: &mut SeededRng) -> JointArray {
     let mut target = [0.0; MAX_JOINTS];
     let joints = &space.world.robot().joints;
     for ((q, start), joint) in target.iter_mut().zip(start_rad).zip(joints) {
         let [low, high] = joint.limits.position_rad;
-        *q = (start + draw.within(-1.0, 1.0)).clamp(low, high);
+        *q = (start + rng.within(-1.0, 1.0)).clamp(low, high);
     }
     target
 }
 
 /// The first clear pose of a straight way.
-fn first_clear(world: &World, from_rad: &JointArray, to_rad: &JointArray, work: &Work) -> Option<JointArray> {
+fn first_clear(
+    world: &World,
+    from_rad: &JointArray,
+    to_rad: &JointArray,
+    budget: &Budget,
+) -> Option<JointArray> {
     let mut poses = (1..=STEPS).map(|i| Space::between(from_rad, to_rad, f64::from(i) / f64::from(STEPS)));
-    poses.find(|pose| !work.is_over_after(world.pairs().len()) && is_clear(world, pose))
+    poses.find(|pose| !budget.is_over_after(world.pairs().len()) && is_clear(world, pose))
 }

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, Trajectory};
-use taustream_planner::draw::Draw;
+use taustream_planner::budget::Budget;
 use taustream_planner::plan::{StartMargin, Task, plan_until};
-use taustream_planner::work::Work;
+use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
 use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, Violation, plan, verify};
 
@@ -92,12 +92,12 @@ fn replan_from_inside_the_margin_of_spheres_keeps_what_it_says_by_an_independent
     let robot = ur5();
     let mut planned = 0;
     for seed in 0..150 {
-        let mut draw = Draw::new(seed, 300);
+        let mut rng = SeededRng::new(seed, 300);
         let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
-        let start = pose(std::array::from_fn(|_| draw.within(-2.0, 2.0)));
-        let goal = pose(std::array::from_fn(|_| draw.within(-2.0, 2.0)));
-        let gap_m = draw.within(0.002, 0.019);
-        let mut ball = sphere("ball", [draw.within(-0.6, 0.6), draw.within(-0.6, 0.6), 0.6], 1e-6);
+        let start = pose(std::array::from_fn(|_| rng.within(-2.0, 2.0)));
+        let goal = pose(std::array::from_fn(|_| rng.within(-2.0, 2.0)));
+        let gap_m = rng.within(0.002, 0.019);
+        let mut ball = sphere("ball", [rng.within(-0.6, 0.6), rng.within(-0.6, 0.6), 0.6], 1e-6);
         let one = |ball| Scene { obstacles: vec![ball], ..free.clone() };
         let (room_m, links_m) = ur5_distances_m(&robot, &one(ball.clone()), &start);
         if !(0.04..0.4).contains(&room_m) || links_m < 0.01 {
@@ -127,7 +127,7 @@ fn replan_from_inside_the_margin_of_spheres_keeps_what_it_says_by_an_independent
 
 /// A margin so wide that no short way leads out of it: the arm can be moved all the same.
 #[test]
-fn replan_start_with_no_way_out_nearby_keeps_the_reduced_margin_all_the_way_and_says_so() {
+fn replan_start_with_no_exit_nearby_keeps_the_reduced_margin_throughout_and_says_so() {
     let robot = ur5();
     let (start, goal) =
         (pose([0.0, -0.4, 0.2, -1.57, -1.57, 0.0]), pose([2.9, -1.3, 0.7, -1.57, -1.57, 0.0]));
@@ -154,7 +154,7 @@ fn replan_start_with_no_way_out_nearby_keeps_the_reduced_margin_all_the_way_and_
 }
 
 #[test]
-fn planning_strictly_tells_touching_from_being_near_and_touching_starts_stay_refused() {
+fn planning_strictly_distinguishes_touching_from_being_near_and_touching_starts_stay_refused() {
     let (robot, scene) = (ur5(), scene("pillars"));
     let near = near_pillar(&robot, &scene, 0.0112);
     let strict = |start: &JointArray, goal: &JointArray| {
@@ -201,7 +201,7 @@ fn replan_from_anywhere_on_a_verified_motion_is_never_refused() {
             assert!(world.contact(&start).is_none(), "seed {seed}: proven, and yet too near at {t_s} s");
             at_the_edge += u32::from(distance_m(&world, &start) < scene.margin_m + 8e-4);
             for goal in [START, GOAL] {
-                let asked =
+                let requested =
                     PlanOptions { deadline: Duration::from_secs(2), ..options(5, PlannerKind::RrtConnect) };
                 let task = Task {
                     robot: &robot,
@@ -210,7 +210,7 @@ fn replan_from_anywhere_on_a_verified_motion_is_never_refused() {
                     goal_rad: pose(goal),
                     margin: StartMargin::AsItStands,
                 };
-                plan_until(&task, &asked, None)
+                plan_until(&task, &requested, None)
                     .unwrap_or_else(|e| panic!("seed {seed}, stopped at {t_s} s: {e}"));
             }
         }
@@ -234,9 +234,9 @@ fn planning_start_a_hair_outside_the_margin_is_led_out_under_the_full_margin() {
 }
 
 #[test]
-fn work_that_is_over_stays_over_and_unbounded_work_is_not() {
-    let work = Work::until(Duration::ZERO, None);
-    assert!(work.is_over() && work.was_cut() && work.is_over_after(1));
-    let endless = Work::unbounded();
+fn budget_that_is_over_stays_over_and_an_unbounded_one_is_not() {
+    let budget = Budget::until(Duration::ZERO, None);
+    assert!(budget.is_over() && budget.was_cut() && budget.is_over_after(1));
+    let endless = Budget::unbounded();
     assert!((0..10_000).all(|_| !endless.is_over_after(100)) && !endless.was_cut());
 }

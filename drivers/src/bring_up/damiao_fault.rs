@@ -1,6 +1,6 @@
 //! What the master finds wrong with a Damiao motor, and what the motor's own codes mean.
 //!
-//! Codes from 0x2 0000 to 0x2 FFFF, apart from those of CiA 402 (see [`crate::bring_up::trouble`]): the motor's status
+//! Codes from 0x2 0000 to 0x2 FFFF, apart from those of CiA 402 (see [`crate::bring_up::fault`]): the motor's status
 //! nibble, or one of these. A refused register stands in [`crate::ServoStatus::refused_object`].
 use crate::codec::damiao_frames::{Register, is_integer, status_words};
 
@@ -10,7 +10,7 @@ const FINDING: u32 = 0x0100;
 /// A finding of the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum DamiaoTrouble {
+pub enum DamiaoFault {
     /// It does not answer.
     NoAnswer = BASE | FINDING | 0x01,
     /// A register was not answered.
@@ -24,12 +24,12 @@ pub enum DamiaoTrouble {
     /// It let go by itself.
     DroppedOut = BASE | FINDING | 0x06,
     /// It fell silent while it was in use.
-    Silent = BASE | FINDING | 0x07,
+    NoReply = BASE | FINDING | 0x07,
     /// Its registers are not as they were left.
     Restarted = BASE | FINDING | 0x08,
 }
 
-impl DamiaoTrouble {
+impl DamiaoFault {
     /// Every finding.
     pub const ALL: [Self; 8] = [
         Self::NoAnswer,
@@ -38,7 +38,7 @@ impl DamiaoTrouble {
         Self::EnableTimeout,
         Self::CommandFar,
         Self::DroppedOut,
-        Self::Silent,
+        Self::NoReply,
         Self::Restarted,
     ];
 
@@ -65,7 +65,7 @@ impl DamiaoTrouble {
             Self::DroppedOut => {
                 "the motor let go by itself, or restarted; check its supply, and that nobody else disables it"
             }
-            Self::Silent => "the motor fell silent; check its power and the wiring",
+            Self::NoReply => "the motor fell silent; check its power and the wiring",
             Self::Restarted => {
                 "the motor has restarted, or somebody wrote its registers; clear the fault to set them again"
             }
@@ -99,8 +99,8 @@ pub const fn differs(register: Register, value: [u8; 4]) -> (u32, u32) {
 /// The sentence for one of these codes; `None` for another protocol's.
 #[must_use]
 pub fn explain(code: u32) -> Option<String> {
-    if let Some(trouble) = DamiaoTrouble::ALL.into_iter().find(|trouble| trouble.code() == code) {
-        return Some(trouble.sentence().to_owned());
+    if let Some(fault) = DamiaoFault::ALL.into_iter().find(|fault| fault.code() == code) {
+        return Some(fault.sentence().to_owned());
     }
     let status = u8::try_from(code.checked_sub(BASE)?).ok().filter(|status| *status <= 0xF)?;
     Some(format!("status {status:X}: {}", status_words(status)))

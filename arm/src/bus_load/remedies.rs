@@ -11,7 +11,7 @@ const FD_BIT_S: u32 = 1_000_000;
 
 /// One way out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WayOut {
+pub struct LoadRemedy {
     /// What to change.
     pub what: String,
     /// The load that the fullest bus then has in the worst case, in percent.
@@ -20,40 +20,42 @@ pub struct WayOut {
     pub suffices: bool,
 }
 
-pub(super) fn of(bus: &Bus, settings: &Settings, servos: &[Protocol]) -> Vec<WayOut> {
-    let mut ways = Ways { bus, settings, servos, found: Vec::new() };
+pub(super) fn of(bus: &Bus, settings: &Settings, servos: &[Protocol]) -> Vec<LoadRemedy> {
+    let mut remedies = Remedies { bus, settings, servos, found: Vec::new() };
     for buses in 2..=servos.len().min(3) {
         let largest = servos.len().div_ceil(buses);
         let share = servos.get(..largest).unwrap_or(servos);
-        ways.push(format!("{buses} buses, at most {largest} servos on each"), bus, settings, share);
+        remedies.push(format!("{buses} buses, at most {largest} servos on each"), bus, settings, share);
     }
     if !matches!(bus.kind, BusKind::Fd { .. }) {
-        ways.fd();
+        remedies.fd();
     }
     if servos.iter().all(|protocol| protocol.as_cia402().is_some()) {
-        ways.traffic();
+        remedies.traffic();
     }
     let period_us = settings.cycle.period_us.saturating_mul(2);
-    let slower =
-        Settings { cycle: crate::settings::Cycle { period_us, ..settings.cycle }, ..settings.clone() };
-    ways.push(format!("cycle.period_us = {period_us}, for every joint of the arm"), bus, &slower, servos);
-    ways.found
+    let slower = Settings {
+        cycle: crate::settings::CycleSettings { period_us, ..settings.cycle },
+        ..settings.clone()
+    };
+    remedies.push(format!("cycle.period_us = {period_us}, for every joint of the arm"), bus, &slower, servos);
+    remedies.found
 }
 
-struct Ways<'a> {
+struct Remedies<'a> {
     bus: &'a Bus,
     settings: &'a Settings,
     servos: &'a [Protocol],
-    found: Vec<WayOut>,
+    found: Vec<LoadRemedy>,
 }
 
-impl Ways<'_> {
+impl Remedies<'_> {
     fn push(&mut self, what: String, bus: &Bus, settings: &Settings, servos: &[Protocol]) {
         self.note(what, BusLoad::of(bus, settings, servos).percent);
     }
 
     fn note(&mut self, what: String, percent: f64) {
-        self.found.push(WayOut { what, percent, suffices: percent <= WARNED_PERCENT });
+        self.found.push(LoadRemedy { what, percent, suffices: percent <= WARNED_PERCENT });
     }
 
     fn fd(&mut self) {

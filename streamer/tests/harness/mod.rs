@@ -5,19 +5,19 @@ use std::sync::{Arc, Mutex};
 use taustream_arm::Settings;
 use taustream_drivers::link::{OpenError, Sent};
 use taustream_drivers::{
-    CanFrame, CanId, CanLink, DriveState, DriveWish, FrameBatch, JointCommand, LinkFault, Nanos, ServoDriver,
-    ServoStatus,
+    CanFrame, CanId, CanLink, DriveState, DriveTarget, FrameBatch, JointCommand, LinkFault, Nanos,
+    ServoDriver, ServoStatus,
 };
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
-use taustream_streamer::facts::{Asked, Cause, Decision, Verdict};
-use taustream_streamer::intake::{self, Desk, Leave};
+use taustream_streamer::cycle_state::{Cause, Decision, PendingCommand, TrajectoryResult};
+use taustream_streamer::intake::{self, CommandQueue, Shutdown};
 use taustream_streamer::names::Names;
 use taustream_streamer::report::{CycleRecord, Note, Readers, Record};
 use taustream_streamer::tick::Tick;
-use taustream_streamer::words::Answer;
 
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const JOINTS: usize = 6;
@@ -35,9 +35,9 @@ pub struct World {
     pub warning: Option<usize>,
     pub silent: Option<usize>,
     /// What adopted drives hold.
-    pub held_rad: JointArray,
+    pub hold_position_rad: JointArray,
     /// Taken off what the drives read of the joints, as a feedback does that counts from elsewhere.
-    pub turn_rad: JointArray,
+    pub revolution_rad: JointArray,
     /// Added to the measured position of a joint.
     pub offset_rad: JointArray,
     pub link_fault: Option<LinkFault>,
@@ -54,7 +54,7 @@ pub struct World {
     /// Frames that left.
     pub frames: u64,
     confirmed: u64,
-    pub wish: Option<DriveWish>,
+    pub drive_target: Option<DriveTarget>,
     pub clears: u32,
     /// How often the driver was told to look at its drives anew.
     pub start_overs: u32,
@@ -67,18 +67,18 @@ pub struct World {
 }
 
 impl World {
-    fn advance(&mut self, wish: DriveWish) {
-        self.steps = if self.wish == Some(wish) { self.steps + 1 } else { 0 };
-        self.wish = Some(wish);
+    fn advance(&mut self, drive_target: DriveTarget) {
+        self.steps = if self.drive_target == Some(drive_target) { self.steps + 1 } else { 0 };
+        self.drive_target = Some(drive_target);
         for (joint, state) in self.states.iter_mut().enumerate().take(JOINTS) {
             let steady = self.steps >= 5;
-            *state = match (self.forced[joint], wish) {
+            *state = match (self.forced[joint], drive_target) {
                 (Some(forced), _) => forced,
-                (None, DriveWish::TorqueOff) => DriveState::Disabled,
-                (None, DriveWish::Disabled) if steady => DriveState::Disabled,
-                (None, DriveWish::Disabled) if *state == DriveState::Enabled => DriveState::Disabling,
-                (None, DriveWish::Enabled) if steady => DriveState::Enabled,
-                (None, DriveWish::Enabled) if *state == DriveState::Disabled => DriveState::Enabling,
+                (None, DriveTarget::TorqueOff) => DriveState::Disabled,
+                (None, DriveTarget::Disabled) if steady => DriveState::Disabled,
+                (None, DriveTarget::Disabled) if *state == DriveState::Enabled => DriveState::Disabling,
+                (None, DriveTarget::Enabled) if steady => DriveState::Enabled,
+                (None, DriveTarget::Enabled) if *state == DriveState::Disabled => DriveState::Enabling,
                 (None, _) => *state,
             };
         }
@@ -98,14 +98,14 @@ impl ServoDriver for FakeDriver {
     fn encode(
         &mut self,
         _now: Nanos,
-        wish: DriveWish,
+        drive_target: DriveTarget,
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
         let mut world = self.world.lock().unwrap();
-        world.advance(wish);
-        let turn_rad = world.turn_rad;
-        world.pending = std::array::from_fn(|joint| commands[joint].position_rad + turn_rad[joint]);
+        world.advance(drive_target);
+        let revolution_rad = world.revolution_rad;
+        world.pending = std::array::from_fn(|joint| commands[joint].position_rad + revolution_rad[joint]);
         out.push(CanFrame::classic(CanId::standard(0x080), &[]));
         for joint in 0..JOINTS {
             out.push(CanFrame::classic(CanId::standard(0x201 + u16::try_from(joint).unwrap()), &[0; 6]));
@@ -117,7 +117,7 @@ impl ServoDriver for FakeDriver {
             if world.silent != Some(joint) {
                 self.received[joint] = Some(now);
                 self.position_rad[joint] =
-                    world.pipeline[2][joint] + world.offset_rad[joint] - world.turn_rad[joint];
+                    world.pipeline[2][joint] + world.offset_rad[joint] - world.revolution_rad[joint];
             }
         }
     }
@@ -130,8 +130,8 @@ impl ServoDriver for FakeDriver {
             state: world.states[joint],
             position_rad: self.received[joint].map_or(f64::NAN, |_| self.position_rad[joint]),
             velocity_rad_s: f64::NAN,
-            held_rad: if world.states[joint] == DriveState::Adopted {
-                world.held_rad[joint] - world.turn_rad[joint]
+            hold_position_rad: if world.states[joint] == DriveState::Adopted {
+                world.hold_position_rad[joint] - world.revolution_rad[joint]
             } else {
                 f64::NAN
             },
@@ -164,7 +164,7 @@ impl CanLink for FakeLink {
         }
         let pending = world.pending;
         // De-energised drives stay where they are, whatever is commanded.
-        let energised = world.wish == Some(DriveWish::Enabled);
+        let energised = world.drive_target == Some(DriveTarget::Enabled);
         let next = if energised { pending } else { world.pipeline[0] };
         world.pipeline.rotate_right(1);
         world.pipeline[0] = next;
@@ -210,9 +210,9 @@ impl CanLink for FakeLink {
 }
 
 /// The streamer's cycle with its scripted surroundings.
-pub struct Rig {
+pub struct CycleHarness {
     pub core: Core,
-    pub desk: Desk,
+    pub command_queue: CommandQueue,
     pub world: Shared,
     pub settings: Settings,
     pub readers: Readers,
@@ -241,7 +241,7 @@ pub fn shipped_settings() -> Settings {
     settings
 }
 
-impl Rig {
+impl CycleHarness {
     pub fn new() -> Self {
         Self::with(shipped_settings())
     }
@@ -254,8 +254,8 @@ impl Rig {
             refused_object: 0,
             warning: None,
             silent: None,
-            held_rad: [f64::NAN; MAX_JOINTS],
-            turn_rad: [0.0; MAX_JOINTS],
+            hold_position_rad: [f64::NAN; MAX_JOINTS],
+            revolution_rad: [0.0; MAX_JOINTS],
             offset_rad: [0.0; MAX_JOINTS],
             link_fault: None,
             link_takes: 0,
@@ -265,7 +265,7 @@ impl Rig {
             reopens: true,
             frames: 0,
             confirmed: 0,
-            wish: None,
+            drive_target: None,
             clears: 0,
             start_overs: 0,
             arrived: Vec::new(),
@@ -282,13 +282,13 @@ impl Rig {
             position_rad: HOME_RAD,
         };
         let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), &settings);
-        let (queues, desk) = intake::pair();
+        let (queues, command_queue) = intake::pair();
         let buses = Buses::new(vec![bus]).unwrap();
         let core = Core::new(&settings, buses, queues, true);
         let readers = core.readers();
         Self {
             core,
-            desk,
+            command_queue,
             world,
             settings,
             readers,
@@ -307,12 +307,17 @@ impl Rig {
         self.tick += periods;
         self.world.lock().unwrap().tick = self.tick;
         let time = Nanos(self.tick * PERIOD_NS);
-        let tick =
-            Tick { number: self.tick, deadline: time, woke: time, skipped: periods - 1, last_cycle_ns: 1 };
+        let tick = Tick {
+            number: self.tick,
+            deadline: time,
+            wake_time: time,
+            skipped: periods - 1,
+            last_cycle_ns: 1,
+        };
         self.last = run_cycle(&mut self.core, tick, &mut NoProbe);
         while let Some(record) = self.readers.records.pop() {
             match record {
-                Record::Cycle(cycle) => self.cycles.push(cycle),
+                Record::CycleSettings(cycle) => self.cycles.push(cycle),
                 Record::Transition(t) => self.phases.push((t.from, t.to)),
                 Record::Accepted { .. } => {}
                 Record::Lost(n) => panic!("{n} records lost"),
@@ -357,37 +362,37 @@ impl Rig {
     }
 
     /// Asks, runs one cycle, and returns the answer.
-    pub fn ask(&mut self, command: Command) -> Answer {
+    pub fn ask(&mut self, command: Command) -> CommandAnswer {
         self.sequence += 1;
-        assert!(self.desk.ask(Asked { sequence: self.sequence, command }));
+        assert!(self.command_queue.push_command(PendingCommand { sequence: self.sequence, command }));
         self.step_after(1);
-        let answer = self.desk.answer().expect("every command is answered in its cycle");
+        let answer = self.command_queue.answer().expect("every command is answered in its cycle");
         assert_eq!(answer.sequence, self.sequence);
         answer
     }
 
     /// Asks what cannot be answered in the same cycle, and runs it.
-    pub fn ask_for_later(&mut self, command: Command) -> Option<Answer> {
+    pub fn queue_request(&mut self, command: Command) -> Option<CommandAnswer> {
         self.sequence += 1;
-        assert!(self.desk.ask(Asked { sequence: self.sequence, command }));
+        assert!(self.command_queue.push_command(PendingCommand { sequence: self.sequence, command }));
         self.step_after(1);
-        self.desk.answer()
+        self.command_queue.answer()
     }
 
     /// Runs one cycle that must answer.
-    pub fn step_to_answer(&mut self) -> Answer {
+    pub fn step_to_answer(&mut self) -> CommandAnswer {
         self.step_after(1);
-        self.desk.answer().expect("an answer that was waited for")
+        self.command_queue.answer().expect("an answer that was waited for")
     }
 
     /// The service thread's part: starts the links that were handed out over. True when all are there again.
     pub fn restore_buses(&mut self) -> bool {
-        let mut handover = self.desk.failed_links().expect("links of failed buses are handed out");
+        let mut handover = self.command_queue.failed_links().expect("links of failed buses are handed out");
         let mut links = handover.links.iter_mut().flatten();
-        handover.well = links.all(|link| link.reopen().is_ok());
-        let well = handover.well;
-        self.desk.give_back_links(handover);
-        well
+        handover.recovered = links.all(|link| link.reopen().is_ok());
+        let recovered = handover.recovered;
+        self.command_queue.return_links(handover);
+        recovered
     }
 
     pub fn accept(&mut self, command: Command) {
@@ -403,7 +408,7 @@ impl Rig {
     }
 
     pub fn offer_as(&mut self, trajectory: Trajectory, generation: u64) -> Decision {
-        let mut empty = self.desk.empty_box().expect("boxes go round");
+        let mut empty = self.command_queue.empty_box().expect("boxes go round");
         *empty = CheckedTrajectory {
             trajectory_id: 1000 + generation,
             generation,
@@ -411,10 +416,10 @@ impl Rig {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.desk.offer(empty);
+        self.command_queue.offer(empty);
         self.step_after(1);
-        let Verdict { decision, .. } =
-            self.desk.verdict().expect("every trajectory is answered in its cycle");
+        let TrajectoryResult { decision, .. } =
+            self.command_queue.trajectory_result().expect("every trajectory is answered in its cycle");
         decision
     }
 
@@ -435,8 +440,8 @@ impl Rig {
         trajectory
     }
 
-    pub fn leave(&mut self, leave: Leave) {
-        self.desk.leaver().ask(leave);
+    pub fn shutdown(&mut self, shutdown: Shutdown) {
+        self.command_queue.shutdown_handle().request(shutdown);
     }
 
     /// The largest |velocity|, |acceleration| and |jerk| over their stop limits, by plain differences of what arrived.

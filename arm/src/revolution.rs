@@ -7,13 +7,13 @@ use crate::trust::Feedback;
 
 /// Largest part of a period by which a remembered or stated angle may miss the turn that it chooses. Half would be the
 /// point where two turns are equally near; the rest is margin for what moved meanwhile, and for eyes.
-pub const TURN_PART_MAX: f64 = 0.4;
+pub const PERIOD_SHARE_MAX: f64 = 0.4;
 
 /// What is to be added to `reading_rad`, a whole number of periods, to come nearest to `near_rad`.
 ///
 /// Real time: arithmetic only.
 #[must_use]
-pub fn nearest_turn_rad(reading_rad: f64, period_rad: f64, near_rad: f64) -> f64 {
+pub fn nearest_offset_rad(reading_rad: f64, period_rad: f64, near_rad: f64) -> f64 {
     ((near_rad - reading_rad) / period_rad).round() * period_rad
 }
 
@@ -23,20 +23,20 @@ pub fn nearest_turn_rad(reading_rad: f64, period_rad: f64, near_rad: f64) -> f64
 ///
 /// # Errors
 /// When several turns could be meant, or none.
-pub fn only_turn_rad(reading_rad: f64, period_rad: f64, range_rad: [f64; 2]) -> Result<f64, Turns> {
+pub fn only_offset_rad(reading_rad: f64, period_rad: f64, range_rad: [f64; 2]) -> Result<f64, OffsetError> {
     let [low_rad, high_rad] = range_rad;
-    if high_rad - low_rad > 2.0 * TURN_PART_MAX * period_rad {
-        return Err(Turns::Several);
+    if high_rad - low_rad > 2.0 * PERIOD_SHARE_MAX * period_rad {
+        return Err(OffsetError::Several);
     }
     let margin_rad = (period_rad - (high_rad - low_rad)) / 2.0;
-    let turn_rad = nearest_turn_rad(reading_rad, period_rad, low_rad.midpoint(high_rad));
-    let inside = (low_rad - margin_rad..=high_rad + margin_rad).contains(&(reading_rad + turn_rad));
-    if inside { Ok(turn_rad) } else { Err(Turns::None) }
+    let offset_rad = nearest_offset_rad(reading_rad, period_rad, low_rad.midpoint(high_rad));
+    let inside = (low_rad - margin_rad..=high_rad + margin_rad).contains(&(reading_rad + offset_rad));
+    if inside { Ok(offset_rad) } else { Err(OffsetError::None) }
 }
 
 /// Why there is not one turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turns {
+pub enum OffsetError {
     /// None puts the joint inside its range.
     None,
     /// More than one does, or nearly does.

@@ -7,9 +7,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// A stream of random choices.
 #[derive(Clone, Debug)]
-pub struct Draw(ChaCha8Rng);
+pub struct SeededRng(ChaCha8Rng);
 
-impl Draw {
+impl SeededRng {
     /// The stream of a seed; different `stream` numbers of one seed are independent.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
@@ -55,10 +55,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draw_of_one_seed_repeats_and_other_streams_differ() {
+    fn rng_of_one_seed_repeats_and_other_streams_differ() {
         let take = |seed, stream| {
-            let mut draw = Draw::new(seed, stream);
-            std::array::from_fn::<u64, 8, _>(|_| draw.unit().to_bits())
+            let mut rng = SeededRng::new(seed, stream);
+            std::array::from_fn::<u64, 8, _>(|_| rng.unit().to_bits())
         };
         assert_eq!(take(7, 0), take(7, 0));
         assert_ne!(take(7, 0), take(7, 1));
@@ -66,24 +66,24 @@ mod tests {
     }
 
     #[test]
-    fn draw_without_the_taken_ones_reaches_all_others_equally_often() {
-        let mut draw = Draw::new(1, 0);
+    fn random_index_without_the_excluded_ones_reaches_all_others_equally_often() {
+        let mut rng = SeededRng::new(1, 0);
         let mut times = [0_u32; 6];
         for _ in 0..30_000 {
-            times[draw.index_except(6, &[0, 3, 4])] += 1;
+            times[rng.index_except(6, &[0, 3, 4])] += 1;
         }
         assert_eq!([times[0], times[3], times[4]], [0; 3], "taken ones were drawn: {times:?}");
         // 10000 each, deviation 82.
         assert!([1, 2, 5].iter().all(|i: &usize| times[*i].abs_diff(10_000) < 500), "{times:?}");
-        assert_eq!((draw.index_except(2, &[0, 1]), draw.index_except(0, &[])), (0, 0));
+        assert_eq!((rng.index_except(2, &[0, 1]), rng.index_except(0, &[])), (0, 0));
     }
 
     #[test]
-    fn draw_of_normal_numbers_has_the_moments_of_the_normal_distribution() {
-        let mut draw = Draw::new(2, 0);
+    fn normal_random_numbers_have_the_moments_of_the_normal_distribution() {
+        let mut rng = SeededRng::new(2, 0);
         let n = 100_000;
         let sums = (0..n).fold([0.0; 4], |s, _| {
-            let x = draw.normal();
+            let x = rng.normal();
             [s[0] + x, s[1] + x * x, s[2] + x * x * x, s[3] + x * x * x * x]
         });
         let moments = sums.map(|s| s / f64::from(n));
@@ -96,10 +96,10 @@ mod tests {
     }
 
     #[test]
-    fn draw_stays_in_its_range() {
+    fn random_number_stays_in_its_range() {
         for seed in 0..1_000 {
-            let mut draw = Draw::new(seed, 3);
-            let (x, i) = (draw.within(-2.0, 3.0), draw.index(5));
+            let mut rng = SeededRng::new(seed, 3);
+            let (x, i) = (rng.within(-2.0, 3.0), rng.index(5));
             assert!((-2.0..3.0).contains(&x) && i < 5, "seed {seed}: {x}, {i}");
         }
     }

@@ -3,10 +3,10 @@
 /// What is known of a joint's turn. Only a joint whose turn is known may be energised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
-pub enum Standing {
+pub enum ReferenceState {
     /// Its drive was not heard yet.
     #[default]
-    Unheard = 0,
+    NoFeedback = 0,
     /// The feedback tells every angle of the joint.
     Encoder = 1,
     /// The turn nearest the last pose on disk.
@@ -27,10 +27,10 @@ pub enum Standing {
     Incremental = 9,
 }
 
-impl Standing {
+impl ReferenceState {
     /// Every standing.
     pub const ALL: [Self; 10] = [
-        Self::Unheard,
+        Self::NoFeedback,
         Self::Encoder,
         Self::Record,
         Self::Adoption,
@@ -50,7 +50,7 @@ impl Standing {
     /// The standing of a code; an unknown one counts as nothing known.
     #[must_use]
     pub fn from_code(code: u32) -> Self {
-        Self::ALL.into_iter().find(|standing| standing.code() == code).unwrap_or_default()
+        Self::ALL.into_iter().find(|reference_state| reference_state.code() == code).unwrap_or_default()
     }
     /// True when the joint's turn is known.
     #[must_use]
@@ -61,7 +61,7 @@ impl Standing {
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
-            Self::Unheard => "its drive was not heard yet",
+            Self::NoFeedback => "its drive was not heard yet",
             Self::Encoder => "its feedback tells every angle",
             Self::Record => "by the last pose on disk",
             Self::Adoption => "its drive was never off since it was known",

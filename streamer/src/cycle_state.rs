@@ -3,7 +3,7 @@ use crate::phases::Event;
 use crate::tick::Tick;
 use taustream_drivers::{ErrorFrame, LinkFault, ServoStatus};
 pub use taustream_messages::{BUSES_MAX, Cause};
-use taustream_messages::{BusTrouble, Command, Phase};
+use taustream_messages::{BusFault, Command, Phase};
 use taustream_motion::limits::Quantity;
 use taustream_motion::time_scale::Scale;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -15,7 +15,7 @@ pub const TRANSITIONS_MAX: usize = 12;
 
 /// A command with the number under which it is answered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asked {
+pub struct PendingCommand {
     /// Ties the answer to the question.
     pub sequence: u64,
     /// What is asked.
@@ -24,7 +24,7 @@ pub struct Asked {
 
 /// The real-time thread's final word on a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
+pub struct TrajectoryResult {
     /// The trajectory.
     pub trajectory_id: u64,
     /// Its generation.
@@ -100,9 +100,9 @@ pub enum Braking {
 
 /// One bus in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BusFacts {
+pub struct BusState {
     /// Frames that the drivers wanted sent.
-    pub wanted: u32,
+    pub requested: u32,
     /// Frames that the link took.
     pub sent: u32,
     /// Why not all, or why nothing could be received.
@@ -112,11 +112,11 @@ pub struct BusFacts {
     /// Error frames received.
     pub errors: u32,
     /// Why nothing leaves on it any more, from its failure to `clear-fault`.
-    pub failed: Option<BusTrouble>,
+    pub failed: Option<BusFault>,
     /// Its controller is error-passive.
     pub passive: bool,
     /// Cycles in a row in which not everything was taken.
-    pub lost_in_a_row: u32,
+    pub consecutive_lost: u32,
     /// Frames handed over and not yet seen on the wire.
     pub in_flight: u32,
     /// The newest error frame since start.
@@ -135,7 +135,7 @@ pub struct Restored {
     /// The `clear-fault` that asked for it.
     pub sequence: u64,
     /// Every one of them is there again. If not, the one who asked was told why.
-    pub well: bool,
+    pub recovered: bool,
 }
 
 /// One change of phase.
@@ -155,13 +155,13 @@ pub struct Transition {
 
 /// Everything that one cycle has found out.
 #[derive(Clone, Copy, Debug)]
-pub struct Facts {
+pub struct CycleState {
     /// The cycle.
     pub tick: Tick,
     /// Commands taken in this cycle.
-    pub commands: [Option<Asked>; COMMANDS_MAX],
+    pub commands: [Option<PendingCommand>; COMMANDS_MAX],
     /// What became of the trajectory that was offered.
-    pub verdict: Option<Verdict>,
+    pub trajectory_result: Option<TrajectoryResult>,
     /// The drives are wished energised: the setpoint is meant for metal.
     pub live: bool,
     /// Id of the trajectory that made the setpoint; 0 when the arm holds or brakes.
@@ -187,27 +187,27 @@ pub struct Facts {
     /// Lowest and highest angle of the brake, one pair a joint.
     pub sweep_rad: [[f64; 2]; MAX_JOINTS],
     /// The buses.
-    pub buses: [BusFacts; BUSES_MAX],
+    pub buses: [BusState; BUSES_MAX],
     /// Failed buses came back from being started over.
     pub restored: Option<Restored>,
     /// Joints on failed buses: what is known of them is old, and no command reaches them.
-    pub out_of_reach: [bool; MAX_JOINTS],
+    pub unreachable: [bool; MAX_JOINTS],
     /// Joints whose setpoint did not leave: it was not their turn, or their bus took nothing.
-    pub held_back: [bool; MAX_JOINTS],
+    pub not_sent: [bool; MAX_JOINTS],
     /// The drives, after receiving.
     pub servos: [ServoStatus; MAX_JOINTS],
     /// Pose of the last setpoint that left.
     pub commanded_rad: JointArray,
 }
 
-impl Facts {
+impl CycleState {
     /// A cycle of which nothing is known yet.
     #[must_use]
     pub fn begin(tick: Tick) -> Self {
         Self {
             tick,
             commands: [None; COMMANDS_MAX],
-            verdict: None,
+            trajectory_result: None,
             live: false,
             trajectory_id: 0,
             trajectory_s: 0.0,
@@ -220,10 +220,10 @@ impl Facts {
             trip: None,
             braking: Braking::No,
             sweep_rad: [[0.0; 2]; MAX_JOINTS],
-            buses: [BusFacts::default(); BUSES_MAX],
+            buses: [BusState::default(); BUSES_MAX],
             restored: None,
-            out_of_reach: [false; MAX_JOINTS],
-            held_back: [false; MAX_JOINTS],
+            unreachable: [false; MAX_JOINTS],
+            not_sent: [false; MAX_JOINTS],
             servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
             commanded_rad: [0.0; MAX_JOINTS],
         }
@@ -231,15 +231,15 @@ impl Facts {
 
     /// The first bus that has failed, and why.
     #[must_use]
-    pub fn failed_bus(&self) -> Option<(usize, BusTrouble)> {
+    pub fn failed_bus(&self) -> Option<(usize, BusFault)> {
         self.buses.iter().enumerate().find_map(|(bus, found)| Some((bus, found.failed?)))
     }
 
     /// True when at least one frame left, or none was wanted because nothing has to be said. A failed bus is silent
     /// because nothing can be.
     #[must_use]
-    pub fn setpoints_left(&self) -> bool {
-        let quiet = self.buses.iter().all(|b| b.wanted == 0 && b.failed.is_none());
+    pub fn setpoints_sent(&self) -> bool {
+        let quiet = self.buses.iter().all(|b| b.requested == 0 && b.failed.is_none());
         quiet || self.buses.iter().any(|b| b.sent > 0)
     }
 }

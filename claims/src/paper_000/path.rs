@@ -1,6 +1,6 @@
 //! A way by corners, and what its motion is worth.
 use super::{SEGMENT_S, refused};
-use crate::lab::Stop;
+use crate::run_context::Stop;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
 use taustream_motion::profile::Profile;
@@ -14,21 +14,21 @@ const CLEARANCE_M: [f64; 2] = [1e-4, 1.0];
 const POINTS: u32 = 600;
 
 /// A way: corners with straight joint lines between them, and the profile along each.
-pub(super) struct Way {
+pub(super) struct TipPath {
     pub(super) corners: Vec<JointArray>,
     pub(super) profile: Box<dyn Profile + Send>,
 }
 
 /// What a way is worth.
 #[derive(Clone, Copy)]
-pub(super) struct Worth {
+pub(super) struct PathCost {
     pub(super) cost: PaperCost,
     pub(super) clearance_m: f64,
     /// Highest velocity, acceleration, jerk, and jump of the jerk at a corner.
     pub(super) peaks: [f64; 4],
 }
 
-impl Way {
+impl TipPath {
     /// With three control points segments have 6 s each, as in the paper; others share its 24 s so that all have the
     /// same peak of the jerk, which is then the lowest that there is.
     fn segments_s(&self) -> Vec<f64> {
@@ -45,7 +45,7 @@ impl Way {
         self.corners.windows(2).filter_map(|p| if let [a, b] = p { Some((a, b)) } else { None })
     }
 
-    pub(super) fn worth(&self, robot: &Robot, scene: &Scene) -> Result<Worth, Stop> {
+    pub(super) fn worth(&self, robot: &Robot, scene: &Scene) -> Result<PathCost, Stop> {
         let rate = |expansion_m: f64| self.rate(robot, scene, expansion_m);
         let cost = rate(CostModel::default().expansion_m)?;
         let [exactly_m, mut far_m] = CLEARANCE_M;
@@ -54,7 +54,7 @@ impl Way {
             let middle_m = 0.5 * (near_m + far_m);
             if rate(middle_m)?.collision { far_m = middle_m } else { near_m = middle_m }
         }
-        Ok(Worth { cost, clearance_m: near_m, peaks: self.peaks() })
+        Ok(PathCost { cost, clearance_m: near_m, peaks: self.peaks() })
     }
 
     fn rate(&self, robot: &Robot, scene: &Scene, expansion_m: f64) -> Result<PaperCost, Stop> {

@@ -4,12 +4,12 @@
 //! The offset is found when the drive is first heard, stays while it is heard, and is forgotten with it. It is added to
 //! what the drives answer and taken off what they are told, so nothing between knows of it. A joint whose offset is
 //! not known has none, and is not energised.
-use crate::facts::Facts;
-use crate::words::Why;
-use taustream_arm::turn::{self, TURN_PART_MAX, Turns as Possible};
+use crate::answer::AnswerReason;
+use crate::cycle_state::CycleState;
+use taustream_arm::revolution::{self, OffsetError as Possible, PERIOD_SHARE_MAX};
 use taustream_arm::{Feedback, Servo, Settings};
 use taustream_drivers::{DriveState, JointCommand};
-use taustream_messages::Standing;
+use taustream_messages::ReferenceState;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// What was last known of a joint's turn.
@@ -24,7 +24,7 @@ pub struct Recorded {
 }
 
 /// The last pose of every joint whose turn was known.
-pub type Memory = [Option<Recorded>; MAX_JOINTS];
+pub type LastPoses = [Option<Recorded>; MAX_JOINTS];
 
 /// What a reading means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub struct Resolved {
     /// What is to be added to it; 0 while it is not known.
     pub offset_rad: f64,
     /// Whether it is known, and whence.
-    pub standing: Standing,
+    pub reference_state: ReferenceState,
     /// Where it is not known for being too far: by how much the nearest turn misses the last pose.
     pub by_rad: f64,
 }
@@ -60,16 +60,16 @@ impl Rule {
     /// Real time: arithmetic only.
     #[must_use]
     pub fn resolve(&self, reading_rad: f64, recorded: Option<Recorded>, adopted: bool) -> Resolved {
-        let known = |standing, offset_rad| Resolved { offset_rad, standing, by_rad: 0.0 };
+        let known = |reference_state, offset_rad| Resolved { offset_rad, reference_state, by_rad: 0.0 };
         match (self.feedback, recorded) {
-            (Feedback::MultiTurn, _) => known(Standing::Encoder, 0.0),
-            (_, Some(recorded)) if adopted => known(Standing::Adoption, recorded.offset_rad),
-            (Feedback::Incremental, _) => known(Standing::Incremental, 0.0),
+            (Feedback::MultiTurn, _) => known(ReferenceState::Encoder, 0.0),
+            (_, Some(recorded)) if adopted => known(ReferenceState::Adoption, recorded.offset_rad),
+            (Feedback::Incremental, _) => known(ReferenceState::Incremental, 0.0),
             (Feedback::Wraps, recorded) => {
-                match (turn::only_turn_rad(reading_rad, self.period_rad, self.range_rad), recorded) {
-                    (Ok(offset_rad), _) => known(Standing::Encoder, offset_rad),
-                    (Err(Possible::None), _) => known(Standing::OutOfRange, 0.0),
-                    (Err(Possible::Several), None) => known(Standing::NoRecord, 0.0),
+                match (revolution::only_offset_rad(reading_rad, self.period_rad, self.range_rad), recorded) {
+                    (Ok(offset_rad), _) => known(ReferenceState::Encoder, offset_rad),
+                    (Err(Possible::None), _) => known(ReferenceState::OutOfRange, 0.0),
+                    (Err(Possible::Several), None) => known(ReferenceState::NoRecord, 0.0),
                     (Err(Possible::Several), Some(recorded)) => self.by_record(reading_rad, recorded),
                 }
             }
@@ -77,33 +77,33 @@ impl Rule {
     }
 
     fn by_record(&self, reading_rad: f64, recorded: Recorded) -> Resolved {
-        let offset_rad = turn::nearest_turn_rad(reading_rad, self.period_rad, recorded.position_rad);
+        let offset_rad = revolution::nearest_offset_rad(reading_rad, self.period_rad, recorded.position_rad);
         let by_rad = (reading_rad + offset_rad - recorded.position_rad).abs();
         if !recorded.at_rest {
-            return Resolved { offset_rad: 0.0, standing: Standing::RecordMoving, by_rad };
+            return Resolved { offset_rad: 0.0, reference_state: ReferenceState::RecordMoving, by_rad };
         }
         // Not-a-number is too far.
-        let near = by_rad <= TURN_PART_MAX * self.period_rad;
-        let standing = if near { Standing::Record } else { Standing::RecordFar };
-        Resolved { offset_rad: if near { offset_rad } else { 0.0 }, standing, by_rad }
+        let near = by_rad <= PERIOD_SHARE_MAX * self.period_rad;
+        let reference_state = if near { ReferenceState::Record } else { ReferenceState::RecordFar };
+        Resolved { offset_rad: if near { offset_rad } else { 0.0 }, reference_state, by_rad }
     }
 
     /// The offset when somebody says that a joint which reads `reading_rad` stands at `at_rad`.
-    fn stated(&self, joint: usize, reading_rad: f64, at_rad: f64) -> Result<f64, Why> {
+    fn stated(&self, joint: usize, reading_rad: f64, at_rad: f64) -> Result<f64, AnswerReason> {
         if !(self.range_rad[0]..=self.range_rad[1]).contains(&at_rad) {
-            return Err(Why::ReferenceOutside { joint, at_rad, range_rad: self.range_rad });
+            return Err(AnswerReason::ReferenceOutside { joint, at_rad, range_rad: self.range_rad });
         }
         match self.feedback {
-            Feedback::MultiTurn => Err(Why::ReferenceNotNeeded { joint, reading_rad, at_rad }),
+            Feedback::MultiTurn => Err(AnswerReason::ReferenceNotNeeded { joint, reading_rad, at_rad }),
             Feedback::Incremental => Ok(at_rad - reading_rad),
             Feedback::Wraps => {
-                let offset_rad = turn::nearest_turn_rad(reading_rad, self.period_rad, at_rad);
+                let offset_rad = revolution::nearest_offset_rad(reading_rad, self.period_rad, at_rad);
                 let nearest_rad = reading_rad + offset_rad;
-                let limit_rad = TURN_PART_MAX * self.period_rad;
+                let limit_rad = PERIOD_SHARE_MAX * self.period_rad;
                 if (nearest_rad - at_rad).abs() <= limit_rad {
                     Ok(offset_rad)
                 } else {
-                    Err(Why::ReferenceFar { joint, at_rad, nearest_rad, limit_rad })
+                    Err(AnswerReason::ReferenceFar { joint, at_rad, nearest_rad, limit_rad })
                 }
             }
         }
@@ -112,7 +112,7 @@ impl Rule {
 
 /// One joint's turn.
 #[derive(Clone, Copy, Debug)]
-struct Turn {
+struct JointReferencing {
     rule: Rule,
     resolved: Resolved,
     recorded: Option<Recorded>,
@@ -121,30 +121,31 @@ struct Turn {
 
 /// The turns of all joints.
 #[derive(Clone, Debug)]
-pub struct Turns {
-    turns: Vec<Option<Turn>>,
+pub struct Referencing {
+    entries: Vec<Option<JointReferencing>>,
 }
 
-impl Turns {
+impl Referencing {
     /// Nothing known yet.
     #[must_use]
     pub fn new(settings: &Settings) -> Self {
-        let mut turns = vec![None; MAX_JOINTS];
+        let mut entries = vec![None; MAX_JOINTS];
         for servo in &settings.servos {
-            let resolved = Resolved { offset_rad: 0.0, standing: Standing::Unheard, by_rad: 0.0 };
+            let resolved =
+                Resolved { offset_rad: 0.0, reference_state: ReferenceState::NoFeedback, by_rad: 0.0 };
             let rule = Rule::of(servo, settings);
-            if let Some(slot) = turns.get_mut(servo.joint) {
-                *slot = Some(Turn { rule, resolved, recorded: None, present: false });
+            if let Some(slot) = entries.get_mut(servo.joint) {
+                *slot = Some(JointReferencing { rule, resolved, recorded: None, present: false });
             }
         }
-        Self { turns }
+        Self { entries }
     }
 
     /// Takes the last pose that is known.
-    pub fn recall(&mut self, memory: &Memory) {
-        for (turn, recorded) in self.turns.iter_mut().zip(memory) {
-            if let Some(turn) = turn {
-                turn.recorded = *recorded;
+    pub fn restore_poses(&mut self, last_poses: &LastPoses) {
+        for (entry, recorded) in self.entries.iter_mut().zip(last_poses) {
+            if let Some(entry) = entry {
+                entry.recorded = *recorded;
             }
         }
     }
@@ -152,28 +153,29 @@ impl Turns {
     /// Turns what the drives answered into joint angles; finds and forgets turns as drives come and go.
     ///
     /// Real time: arithmetic only.
-    pub fn read(&mut self, facts: &mut Facts) {
-        for (turn, servo) in self.turns.iter_mut().zip(&mut facts.servos) {
-            let Some(turn) = turn else { continue };
+    pub fn read(&mut self, cycle_state: &mut CycleState) {
+        for (entry, servo) in self.entries.iter_mut().zip(&mut cycle_state.servos) {
+            let Some(entry) = entry else { continue };
             let present = servo.state.reports() && servo.position_rad.is_finite();
-            match (turn.present, present) {
+            match (entry.present, present) {
                 (false, true) => {
                     let adopted = servo.state == DriveState::Adopted;
-                    turn.resolved = turn.rule.resolve(servo.position_rad, turn.recorded, adopted);
+                    entry.resolved = entry.rule.resolve(servo.position_rad, entry.recorded, adopted);
                 }
                 // It may come back from a power cut: only what was seen at rest tells its turn then.
                 (true, false) => {
-                    turn.resolved = Resolved { offset_rad: 0.0, standing: Standing::Unheard, by_rad: 0.0 }
+                    entry.resolved =
+                        Resolved { offset_rad: 0.0, reference_state: ReferenceState::NoFeedback, by_rad: 0.0 }
                 }
                 (true, true) | (false, false) => {}
             }
-            turn.present = present;
-            servo.position_rad += turn.resolved.offset_rad;
-            servo.held_rad += turn.resolved.offset_rad;
-            if present && turn.resolved.standing.is_referenced() {
-                turn.recorded = Some(Recorded {
+            entry.present = present;
+            servo.position_rad += entry.resolved.offset_rad;
+            servo.hold_position_rad += entry.resolved.offset_rad;
+            if present && entry.resolved.reference_state.is_referenced() {
+                entry.recorded = Some(Recorded {
                     position_rad: servo.position_rad,
-                    offset_rad: turn.resolved.offset_rad,
+                    offset_rad: entry.resolved.offset_rad,
                     at_rest: servo.state == DriveState::Disabled,
                 });
             }
@@ -184,19 +186,19 @@ impl Turns {
     ///
     /// Real time: arithmetic only.
     #[must_use]
-    pub fn tell(&self, commands: &[JointCommand; MAX_JOINTS]) -> [JointCommand; MAX_JOINTS] {
-        let mut told = *commands;
-        for (command, turn) in told.iter_mut().zip(&self.turns) {
-            command.position_rad -= turn.map_or(0.0, |turn| turn.resolved.offset_rad);
+    pub fn to_drives(&self, commands: &[JointCommand; MAX_JOINTS]) -> [JointCommand; MAX_JOINTS] {
+        let mut drive_commands = *commands;
+        for (command, entry) in drive_commands.iter_mut().zip(&self.entries) {
+            command.position_rad -= entry.map_or(0.0, |entry| entry.resolved.offset_rad);
         }
-        told
+        drive_commands
     }
 
     /// What is known of a joint.
     #[must_use]
     pub fn resolved(&self, joint: usize) -> Resolved {
-        let unknown = Resolved { offset_rad: 0.0, standing: Standing::Unheard, by_rad: 0.0 };
-        self.turns.get(joint).copied().flatten().map_or(unknown, |turn| turn.resolved)
+        let unknown = Resolved { offset_rad: 0.0, reference_state: ReferenceState::NoFeedback, by_rad: 0.0 };
+        self.entries.get(joint).copied().flatten().map_or(unknown, |entry| entry.resolved)
     }
 
     /// Offsets of all joints.
@@ -211,13 +213,18 @@ impl Turns {
     ///
     /// # Errors
     /// Why the word cannot be right, or is not needed.
-    pub fn refer(&mut self, joint: usize, position_rad: f64, at_rad: f64) -> Result<f64, Why> {
-        let Some(turn) = self.turns.get_mut(joint).and_then(Option::as_mut) else {
-            return Err(Why::NoSuchJoint { joint });
+    pub fn set_reference(
+        &mut self,
+        joint: usize,
+        position_rad: f64,
+        at_rad: f64,
+    ) -> Result<f64, AnswerReason> {
+        let Some(entry) = self.entries.get_mut(joint).and_then(Option::as_mut) else {
+            return Err(AnswerReason::NoSuchJoint { joint });
         };
-        let reading_rad = position_rad - turn.resolved.offset_rad;
-        let offset_rad = turn.rule.stated(joint, reading_rad, at_rad)?;
-        turn.resolved = Resolved { offset_rad, standing: Standing::Operator, by_rad: 0.0 };
+        let reading_rad = position_rad - entry.resolved.offset_rad;
+        let offset_rad = entry.rule.stated(joint, reading_rad, at_rad)?;
+        entry.resolved = Resolved { offset_rad, reference_state: ReferenceState::Operator, by_rad: 0.0 };
         Ok(reading_rad + offset_rad)
     }
 }

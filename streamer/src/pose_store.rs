@@ -2,14 +2,14 @@
 //!
 //! A record tells the turn of a joint after everything was off only if nothing but hands could have moved the joint since:
 //! it rested, and was off or may lose its torque without moving. Everything else is written too, and says so.
-use crate::turns::{Memory, Recorded};
+use crate::referencing::{LastPoses, Recorded};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use taustream_arm::Settings;
 use taustream_arm::last_pose::{LastJoint, LastPose, binding_digest};
 use taustream_drivers::Nanos;
-use taustream_messages::{Phase, Report, Standing};
+use taustream_messages::{Phase, ReferenceState, Report};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use tracing::{error, info, warn};
 
@@ -24,8 +24,8 @@ const SAME_RAD: f64 = 1e-4;
 
 /// What is known of the joints of an arm, from its file. What is wrong with the file is said, and nothing of it believed.
 #[must_use]
-pub fn recall(settings: &Settings, directory: &Path) -> Memory {
-    let mut memory: Memory = [None; MAX_JOINTS];
+pub fn restore_poses(settings: &Settings, directory: &Path) -> LastPoses {
+    let mut memory: LastPoses = [None; MAX_JOINTS];
     let pose = match LastPose::load(directory, &settings.name) {
         Ok(pose) => pose,
         Err(e) if e.missing => {
@@ -62,7 +62,7 @@ struct Named {
 
 /// Writes records when there is something new.
 #[derive(Debug)]
-pub struct Keeper {
+pub struct PoseStore {
     arm: String,
     joints: Vec<Named>,
     sender: Option<SyncSender<LastPose>>,
@@ -72,7 +72,7 @@ pub struct Keeper {
     written: Option<(LastPose, Nanos)>,
 }
 
-impl Keeper {
+impl PoseStore {
     /// A keeper of the arm's record below `directory`.
     ///
     /// # Errors
@@ -144,28 +144,30 @@ impl Keeper {
         let before = self.written.as_ref().map(|(pose, _)| pose);
         let joint = |named: &Named| {
             let at = |values: &[f64; MAX_JOINTS]| values.get(named.joint).copied().unwrap_or(f64::NAN);
-            let standing =
-                report.standing.get(named.joint).map_or(Standing::Unheard, |c| Standing::from_code(*c));
+            let reference_state = report
+                .reference_state
+                .get(named.joint)
+                .map_or(ReferenceState::NoFeedback, |c| ReferenceState::from_code(*c));
             // A drive that was switched off leaves what was known of it standing.
-            if let (Standing::Unheard, Some(known)) =
-                (standing, before.and_then(|b| b.joint(&named.name, &named.binding)))
+            if let (ReferenceState::NoFeedback, Some(known)) =
+                (reference_state, before.and_then(|b| b.joint(&named.name, &named.binding)))
             {
                 return known.clone();
             }
             LastJoint {
                 name: named.name.clone(),
                 binding: named.binding.clone(),
-                referenced: standing.is_referenced(),
+                referenced: reference_state.is_referenced(),
                 at_rest: still && (report.energised == 0 || named.limp_is_safe),
                 position_rad: at(&report.measured_rad),
-                offset_rad: at(&report.turn_offset_rad),
+                offset_rad: at(&report.multi_turn_offset_rad),
             }
         };
         Some(LastPose::new(&self.arm, self.joints.iter().map(joint).collect()))
     }
 }
 
-impl Drop for Keeper {
+impl Drop for PoseStore {
     fn drop(&mut self) {
         self.sender = None;
         if self.writer.take().is_some_and(|writer| writer.join().is_err()) {

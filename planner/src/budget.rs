@@ -1,7 +1,7 @@
 //! How much work a plan may take: the clock that aborts, and the evaluations that are granted.
 //!
 //! Stages are granted evaluations, which are the same on every machine; the clock only aborts. So one seed gives
-//! one answer wherever the clock did not cut in, and [`Work::was_cut`] tells whether it did.
+//! one answer wherever the clock did not cut in, and [`Budget::was_cut`] tells whether it did.
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ const LOOK_EVERY: usize = 256;
 
 /// The deadline of one plan, and its cancellation.
 #[derive(Debug)]
-pub struct Work<'a> {
+pub struct Budget<'a> {
     started: Instant,
     deadline: Instant,
     cancel: Option<&'a AtomicBool>,
@@ -21,7 +21,7 @@ pub struct Work<'a> {
     cut: Cell<bool>,
 }
 
-impl<'a> Work<'a> {
+impl<'a> Budget<'a> {
     /// Starts the clock.
     #[must_use]
     pub fn until(deadline: Duration, cancel: Option<&'a AtomicBool>) -> Self {

@@ -44,7 +44,7 @@ impl From<SplineError> for Stop {
 }
 
 /// What experiments run in.
-pub struct Lab<'a> {
+pub struct RunContext<'a> {
     effort: Effort,
     /// Told what is going on, a sentence at a time.
     say: &'a (dyn Fn(&str) + Sync),
@@ -52,7 +52,7 @@ pub struct Lab<'a> {
     is_over: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Lab<'a> {
+impl<'a> RunContext<'a> {
     /// A lab that reports with `say` and works until `is_over`.
     #[must_use]
     pub fn new(
@@ -150,27 +150,27 @@ mod tests {
     #[test]
     fn answers_keep_their_order_on_any_number_of_threads() {
         for jobs in [0, 1, 2, 7, 300] {
-            let lab = Lab::new(effort(jobs), &|_| (), &|| false);
-            let squares = lab.each(100, |i| Ok(i * i)).unwrap();
+            let run_context = RunContext::new(effort(jobs), &|_| (), &|| false);
+            let squares = run_context.each(100, |i| Ok(i * i)).unwrap();
             assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i), "{jobs} jobs");
-            assert_eq!(lab.each(0, |_| Ok(())), Ok(Vec::new()));
+            assert_eq!(run_context.each(0, |_| Ok(())), Ok(Vec::new()));
         }
     }
 
     #[test]
     fn refusal_and_interruption_end_the_runs() {
-        let lab = Lab::new(effort(2), &|_| (), &|| false);
+        let run_context = RunContext::new(effort(2), &|_| (), &|| false);
         let refused = |i| if i == 3 { Err(Stop::Refused("three".to_owned())) } else { Ok(i) };
-        assert_eq!(lab.each(1000, refused), Err(Stop::Refused("three".to_owned())));
-        let over = Lab::new(effort(2), &|_| (), &|| true);
+        assert_eq!(run_context.each(1000, refused), Err(Stop::Refused("three".to_owned())));
+        let over = RunContext::new(effort(2), &|_| (), &|| true);
         assert_eq!(over.each(1, |_| Ok(())), Err(Stop::Interrupted));
     }
 
     #[test]
     fn seeds_of_neighbouring_efforts_and_runs_do_not_meet() {
         let seeds = |seed: u64| {
-            let lab = Lab::new(Effort { seed, ..effort(1) }, &|_| (), &|| false);
-            (0..1000).map(|run| lab.seed(run)).collect::<Vec<_>>()
+            let run_context = RunContext::new(Effort { seed, ..effort(1) }, &|_| (), &|| false);
+            (0..1000).map(|run| run_context.seed(run)).collect::<Vec<_>>()
         };
         let mut all: Vec<u64> = (0..50).flat_map(seeds).collect();
         all.sort_unstable();

@@ -2,13 +2,13 @@
 //!
 //! [`crate::ServoStatus::error_code`] holds kinds of codes that do not overlap: emergency codes (up to 0xFFFF), these
 //! (0x1 0000 to 0x1 FFFF), those of Damiao motors (0x2 0000 to 0x2 FFFF), and SDO abort codes (from 0x503 0000).
-use crate::bring_up::damiao_trouble as damiao;
-use crate::codec::{object, words};
+use crate::bring_up::damiao_fault as damiao;
+use crate::codec::{error_text, object};
 
 /// A finding of the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Trouble {
+pub enum BringUpFault {
     /// Three requests were not answered while listening.
     NoAnswer = 0x0001_0001,
     /// No boot-up message after the communication reset.
@@ -45,7 +45,7 @@ pub enum Trouble {
     Foreign = 0x0001_0011,
 }
 
-impl Trouble {
+impl BringUpFault {
     /// Every finding.
     pub const ALL: [Self; 17] = [
         Self::NoAnswer,
@@ -130,14 +130,14 @@ pub fn explain_refusal(code: u32, object: u32) -> String {
 /// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.
 #[must_use]
 pub fn explain(code: u32) -> String {
-    if let Some(trouble) = Trouble::ALL.into_iter().find(|trouble| trouble.code() == code) {
-        return trouble.sentence().to_owned();
+    if let Some(fault) = BringUpFault::ALL.into_iter().find(|fault| fault.code() == code) {
+        return fault.sentence().to_owned();
     }
     if let Some(sentence) = damiao::explain(code) {
         return sentence;
     }
     match u16::try_from(code) {
-        Ok(emcy) => format!("0x{emcy:04X} {}", words::emcy(emcy)),
-        Err(_) => format!("SDO abort 0x{code:08X} {}", words::sdo_abort(code)),
+        Ok(emcy) => format!("0x{emcy:04X} {}", error_text::emcy(emcy)),
+        Err(_) => format!("SDO abort 0x{code:08X} {}", error_text::sdo_abort(code)),
     }
 }

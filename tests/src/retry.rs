@@ -25,7 +25,7 @@ impl<E: Into<Error>> From<E> for Failed {
 /// passed.
 pub fn passes(name: &str, perform: impl Fn(usize) -> Result<String, Failed>) -> bool {
     let since = Instant::now();
-    let result = with_patience(name, perform);
+    let result = with_retries(name, perform);
     let took_s = since.elapsed().as_secs_f64();
     match &result {
         Ok(seen) => println!("ok     {name}: {seen}; {took_s:.1} s"),
@@ -35,7 +35,7 @@ pub fn passes(name: &str, perform: impl Fn(usize) -> Result<String, Failed>) -> 
 }
 
 /// Again only after a stall of the host; what did not hold in the last try is the error.
-fn with_patience<T>(name: &str, perform: impl Fn(usize) -> Result<T, Failed>) -> Result<T> {
+fn with_retries<T>(name: &str, perform: impl Fn(usize) -> Result<T, Failed>) -> Result<T> {
     for attempt in 1..TRIES {
         match perform(attempt) {
             Err(Failed { error, stalled: true }) => {
@@ -56,7 +56,7 @@ mod tests {
 
     fn tries(stalled: bool, good_at: usize) -> (usize, bool) {
         let made = Cell::new(0);
-        let outcome = with_patience("a", |attempt| {
+        let outcome = with_retries("a", |attempt| {
             made.set(attempt);
             if attempt == good_at { Ok(()) } else { Err(Failed { error: anyhow!("no"), stalled }) }
         });

@@ -2,7 +2,7 @@
 //!
 //! Pure as the drives are: frames, orders and time in, frames out. Chance comes from a seed.
 use super::disturbance::Disturbance;
-use super::faults::{After, FaultKind, FaultOrder};
+use super::faults::{After, FaultKind, FaultRequest};
 use super::servo::SimulatedServo;
 use super::settings::DriveSetup;
 use crate::frame::CanFrame;
@@ -30,8 +30,8 @@ struct Unit {
 /// A fault that was ordered.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
-    order: FaultOrder,
-    ordered: Nanos,
+    request: FaultRequest,
+    requested_at: Nanos,
     began: Option<Nanos>,
 }
 
@@ -48,7 +48,7 @@ pub struct Event {
 
 /// All drives of an arm.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub struct ServoSimulator {
     units: Vec<Unit>,
     faults: Vec<Pending>,
     /// Frames that a delay holds back, by due time, for each bus.
@@ -58,7 +58,7 @@ pub struct Rig {
     events: Vec<Event>,
 }
 
-impl Rig {
+impl ServoSimulator {
     /// Drives of all joints, base to tip, on `buses` buses. `seed` decides which frames a lossy wire loses.
     #[must_use]
     pub fn new(setups: Vec<DriveSetup>, buses: usize, seed: u64) -> Self {
@@ -95,17 +95,17 @@ impl Rig {
     }
 
     /// Orders a fault.
-    pub fn order(&mut self, now: Nanos, order: FaultOrder) {
-        self.faults.push(Pending { order, ordered: now, began: None });
+    pub fn request(&mut self, now: Nanos, request: FaultRequest) {
+        self.faults.push(Pending { request, requested_at: now, began: None });
     }
 
     /// Ends the faults of a joint, or of all, begun or not. A drive that went into fault stays there.
     pub fn clear(&mut self, joint: Option<usize>) {
-        let ended = |pending: &Pending| joint.is_none_or(|joint| pending.order.joint == joint);
+        let ended = |pending: &Pending| joint.is_none_or(|joint| pending.request.joint == joint);
         let (end, keep): (Vec<_>, Vec<_>) = self.faults.iter().copied().partition(ended);
         self.faults = keep;
         for pending in end.into_iter().filter(|pending| pending.began.is_some()) {
-            self.end(pending.order);
+            self.end(pending.request);
         }
     }
 
@@ -196,8 +196,8 @@ impl Rig {
         z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
         #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-        let draw = ((z ^ z >> 31) >> 11) as f64 / (1_u64 << 53) as f64;
-        draw < probability
+        let rng = ((z ^ z >> 31) >> 11) as f64 / (1_u64 << 53) as f64;
+        rng < probability
     }
 
     /// Notes when joints were enabled, and when they began to move.
@@ -219,32 +219,32 @@ impl Rig {
     fn begin_and_end(&mut self, now: Nanos, out: &mut [Vec<CanFrame>]) {
         let mut faults = std::mem::take(&mut self.faults);
         faults.retain_mut(|pending| {
-            let order = pending.order;
-            let Some(unit) = self.units.get(order.joint) else { return false };
+            let request = pending.request;
+            let Some(unit) = self.units.get(request.joint) else { return false };
             if let Some(began) = pending.began {
-                let over = order.for_s.is_some_and(|for_s| now.since_s(began) >= for_s);
+                let over = request.for_s.is_some_and(|for_s| now.since_s(began) >= for_s);
                 if over {
-                    self.end(order);
+                    self.end(request);
                 }
                 return !over;
             }
-            let counts_from = match order.after {
-                After::Start => Some(pending.ordered),
+            let counts_from = match request.after {
+                After::Start => Some(pending.requested_at),
                 After::Enable => unit.enabled,
                 After::Moving => unit.moving,
             };
-            if counts_from.is_some_and(|from| now.since_s(from) >= order.at_s) {
+            if counts_from.is_some_and(|from| now.since_s(from) >= request.at_s) {
                 pending.began = Some(now);
-                self.begin(now, order, out);
+                self.begin(now, request, out);
             }
             true
         });
         self.faults = faults;
     }
 
-    fn begin(&mut self, now: Nanos, order: FaultOrder, out: &mut [Vec<CanFrame>]) {
-        let Some(unit) = self.units.get_mut(order.joint) else { return };
-        match order.kind {
+    fn begin(&mut self, now: Nanos, request: FaultRequest, out: &mut [Vec<CanFrame>]) {
+        let Some(unit) = self.units.get_mut(request.joint) else { return };
+        match request.kind {
             FaultKind::Silence => unit.silent = true,
             FaultKind::Delay { by_s } => unit.delay_s = by_s,
             FaultKind::Drop { probability } => unit.loss = probability,
@@ -255,15 +255,15 @@ impl Rig {
             | FaultKind::Refuse { .. }
             | FaultKind::Restart => {}
         }
-        if let Some(disturbance) = disturbance(order.kind, true) {
-            self.with_drive(now, order.joint, out, |drive, frames| drive.disturb(disturbance, frames));
+        if let Some(disturbance) = disturbance(request.kind, true) {
+            self.with_drive(now, request.joint, out, |drive, frames| drive.disturb(disturbance, frames));
         }
-        self.tell(order, true);
+        self.report_event(request, true);
     }
 
-    fn end(&mut self, order: FaultOrder) {
-        let Some(unit) = self.units.get_mut(order.joint) else { return };
-        match order.kind {
+    fn end(&mut self, request: FaultRequest) {
+        let Some(unit) = self.units.get_mut(request.joint) else { return };
+        match request.kind {
             FaultKind::Silence => unit.silent = false,
             FaultKind::Delay { .. } => unit.delay_s = 0.0,
             FaultKind::Drop { .. } => unit.loss = 0.0,
@@ -274,16 +274,16 @@ impl Rig {
             | FaultKind::Refuse { .. }
             | FaultKind::Restart => {}
         }
-        if let Some(disturbance) = disturbance(order.kind, false) {
+        if let Some(disturbance) = disturbance(request.kind, false) {
             // Ending a disturbance makes no drive send anything.
             unit.drive.disturb(disturbance, &mut Vec::new());
         }
-        self.tell(order, false);
+        self.report_event(request, false);
     }
 
-    fn tell(&mut self, order: FaultOrder, began: bool) {
-        if let Some(unit) = self.units.get(order.joint) {
-            self.events.push(Event { joint: unit.joint.clone(), kind: order.kind, began });
+    fn report_event(&mut self, request: FaultRequest, began: bool) {
+        if let Some(unit) = self.units.get(request.joint) {
+            self.events.push(Event { joint: unit.joint.clone(), kind: request.kind, began });
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A rig behind its buses in time: a bus with a bit rate delivers each frame when its last bit has passed, a virtual one
 //! at once.
-use super::rig::Rig;
+use super::simulator::ServoSimulator;
 use super::wire::{Delivered, Sender, Wire};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
@@ -8,19 +8,19 @@ use taustream_arm::Bus;
 
 /// Simulated drives and the wires that they hang on.
 #[derive(Clone, Debug)]
-pub struct WiredRig {
+pub struct LinkedSimulator {
     /// The drives.
-    pub rig: Rig,
+    pub simulator: ServoSimulator,
     wires: Vec<Option<Wire>>,
     scratch: Vec<Vec<CanFrame>>,
 }
 
-impl WiredRig {
+impl LinkedSimulator {
     /// Puts a rig behind its buses; the master's side of each holds `queue_max` frames.
     #[must_use]
-    pub fn new(rig: Rig, buses: &[Bus], queue_max: usize) -> Self {
+    pub fn new(simulator: ServoSimulator, buses: &[Bus], queue_max: usize) -> Self {
         let wires = buses.iter().map(|bus| Wire::new(bus.kind, queue_max)).collect();
-        Self { rig, wires, scratch: vec![Vec::new(); buses.len()] }
+        Self { simulator, wires, scratch: vec![Vec::new(); buses.len()] }
     }
 
     /// The wire of a bus that has a bit rate.
@@ -32,7 +32,7 @@ impl WiredRig {
     /// Lets time pass; `out` takes what each bus has delivered from the drives.
     pub fn advance(&mut self, now: Nanos, out: &mut [Vec<CanFrame>]) {
         (0..self.wires.len()).for_each(|bus| self.deliver_by(now, bus, out));
-        self.rig.advance(now, &mut self.scratch);
+        self.simulator.advance(now, &mut self.scratch);
         self.pass_on(now, out);
     }
 
@@ -44,7 +44,7 @@ impl WiredRig {
             Some(wire) => frames.iter().for_each(|frame| {
                 wire.offer(now, Sender::Master, *frame);
             }),
-            None => self.rig.receive(now, bus, frames, out),
+            None => self.simulator.receive(now, bus, frames, out),
         }
     }
 
@@ -52,7 +52,7 @@ impl WiredRig {
     #[must_use]
     pub fn next_due(&self) -> Option<Nanos> {
         let wires = self.wires.iter().flatten().filter_map(Wire::next_due);
-        wires.chain(self.rig.next_due()).min()
+        wires.chain(self.simulator.next_due()).min()
     }
 
     fn deliver_by(&mut self, now: Nanos, bus: usize, out: &mut [Vec<CanFrame>]) {
@@ -65,7 +65,7 @@ impl WiredRig {
         match delivered.sender {
             Sender::Drive => out.get_mut(bus).into_iter().for_each(|out| out.push(delivered.frame)),
             Sender::Master => {
-                self.rig.receive(delivered.at, bus, &[delivered.frame], &mut self.scratch);
+                self.simulator.receive(delivered.at, bus, &[delivered.frame], &mut self.scratch);
                 self.pass_on(delivered.at, out);
             }
         }

@@ -9,7 +9,7 @@
 //!
 //! The arm is seen from behind its first joint, whose turn moves the spheres instead. Behind that, a parallel joint
 //! moves points by the sum of its group's angles; only a tilted axis takes a rotation of the directions.
-use super::flat::{Flat, FlatBone, FlatSphere};
+use super::flat::{Flat, FlatSegment, FlatSphere};
 use super::lanes::{Lanes, Vector, Vector3};
 use super::margin::Limits;
 use pulp::{Simd, WithSimd};
@@ -71,7 +71,7 @@ impl WithSimd for Pass<'_> {
         let lanes = Lanes(simd);
         let Self { flat, limits, cells, .. } = self;
         let (mut length_m, mut least) = (0.0, lanes.all(f32::MAX));
-        let mut arm = Arm::new(lanes);
+        let mut arm = ArmLanes::new(lanes);
         let (phases, _) = S::as_simd_f32s(self.phases);
         // The tip at every pose and one vector more: steps go from each pose to the next one.
         let row = self.phases.len() + PADDING;
@@ -131,7 +131,7 @@ fn path_m<S: Simd>(lanes: Lanes<S>, tips: &mut [f32], row: usize) -> f32 {
 }
 
 /// The arm in as many poses as there are lanes, seen from behind its first joint.
-struct Arm<S: Simd> {
+struct ArmLanes<S: Simd> {
     /// Sine and cosine of the first joint's angle.
     first: [Vector<S>; 2],
     /// The frames' origins; behind the arm's last one nothing.
@@ -142,7 +142,7 @@ struct Arm<S: Simd> {
     along: [(Vector3<S>, Vector<S>); MAX_JOINTS],
 }
 
-impl<S: Simd> Arm<S> {
+impl<S: Simd> ArmLanes<S> {
     /// Somewhere.
     #[inline(always)]
     fn new(lanes: Lanes<S>) -> Self {
@@ -171,20 +171,24 @@ impl<S: Simd> Arm<S> {
             None => tip,
         };
         let (mut axes, mut are_turned) = (Axes::plain(lanes), false);
-        for ((bone, angle), slot) in flat.others.iter().zip(&angles[1..]).zip(&mut self.origins[2..]) {
-            let sin_cos =
-                if bone.turns { turn(lanes, *angle, phase) } else { [lanes.all(0.0), lanes.all(1.0)] };
-            let swing = if bone.swings { Some(sin_cos) } else { None };
+        for ((link_segment, angle), slot) in flat.others.iter().zip(&angles[1..]).zip(&mut self.origins[2..])
+        {
+            let sin_cos = if link_segment.turns {
+                turn(lanes, *angle, phase)
+            } else {
+                [lanes.all(0.0), lanes.all(1.0)]
+            };
+            let swing = if link_segment.swings { Some(sin_cos) } else { None };
             let seen = if are_turned { Some(&axes) } else { None };
-            tip = shifted(lanes, at, seen, bone.origin, swing);
-            at = match bone.next {
+            tip = shifted(lanes, at, seen, link_segment.origin, swing);
+            at = match link_segment.next {
                 Some(next) => shifted(lanes, at, seen, next, swing),
                 None => tip,
             };
             *slot = tip;
-            if let Some(tilt) = bone.tilt {
-                axes.turn(lanes, bone, sin_cos);
-                axes.tilt(lanes, bone, tilt);
+            if let Some(tilt) = link_segment.tilt {
+                axes.turn(lanes, link_segment, sin_cos);
+                axes.tilt(lanes, link_segment, tilt);
                 are_turned = true;
             }
         }
@@ -297,8 +301,8 @@ impl<S: Simd> Arm<S> {
 
 /// Sine and cosine of an angle at a phase of its way.
 #[inline(always)]
-fn turn<S: Simd>(lanes: Lanes<S>, [from, way]: [f32; 2], phase: Vector<S>) -> [Vector<S>; 2] {
-    lanes.sin_cos_pi(lanes.mul_add(lanes.all(way), phase, lanes.all(from)))
+fn turn<S: Simd>(lanes: Lanes<S>, [from, travel]: [f32; 2], phase: Vector<S>) -> [Vector<S>; 2] {
+    lanes.sin_cos_pi(lanes.mul_add(lanes.all(travel), phase, lanes.all(from)))
 }
 
 /// A constant point seen from behind the first joint's tilt.
@@ -343,11 +347,11 @@ impl<S: Simd> Axes<S> {
 
     /// Turns them about z, as far as anything behind asks for them.
     #[inline(always)]
-    fn turn(&mut self, lanes: Lanes<S>, bone: &FlatBone, [sin, cos]: [Vector<S>; 2]) {
+    fn turn(&mut self, lanes: Lanes<S>, link_segment: &FlatSegment, [sin, cos]: [Vector<S>; 2]) {
         for (x, y) in self.x.iter_mut().zip(&mut self.y) {
             let (a, b) = (*x, *y);
             *y = lanes.sub_mul(sin, a, lanes.mul(cos, b));
-            if bone.wants[0] {
+            if link_segment.wants[0] {
                 *x = lanes.mul_add(sin, b, lanes.mul(cos, a));
             }
         }
@@ -355,14 +359,14 @@ impl<S: Simd> Axes<S> {
 
     /// Tilts them about x, likewise.
     #[inline(always)]
-    fn tilt(&mut self, lanes: Lanes<S>, bone: &FlatBone, [cos, sin]: [f32; 2]) {
+    fn tilt(&mut self, lanes: Lanes<S>, link_segment: &FlatSegment, [cos, sin]: [f32; 2]) {
         let (cos, sin) = (lanes.all(cos), lanes.all(sin));
         for (y, z) in self.y.iter_mut().zip(&mut self.z) {
             let (a, b) = (*y, *z);
-            if bone.wants[0] {
+            if link_segment.wants[0] {
                 *y = lanes.mul_add(sin, b, lanes.mul(cos, a));
             }
-            if bone.wants[1] {
+            if link_segment.wants[1] {
                 *z = lanes.sub_mul(sin, a, lanes.mul(cos, b));
             }
         }
