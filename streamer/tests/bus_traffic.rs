@@ -42,7 +42,7 @@ fn setpoints_in(tick: u64, frames: &[CanFrame]) -> Vec<SentSetpoint> {
         let (id, data) = (frame.id().raw(), frame.data());
         match (id, data.len()) {
             (0x201..=0x206, 6) => {
-                found.push(SentSetpoint { tick, node: id - 0x200, counts: i32_at(data, 2) })
+                found.push(SentSetpoint { tick, node: id - 0x200, counts: i32_at(data, 2) });
             }
             (0x301..=0x306, 8) => {
                 found.push(SentSetpoint { tick, node: id - 0x300, counts: i32_at(data, 0) });

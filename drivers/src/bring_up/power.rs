@@ -178,7 +178,7 @@ impl Power {
                 self.phase = Phase::TakingOver { since: now };
             }
             (DriveTarget::Disabled | DriveTarget::Keep, DriveTarget::Enabled, _) => {
-                self.try_enable(now, step)
+                self.try_enable(now, step);
             }
             (_, DriveTarget::Keep, Phase::On | Phase::TakingOver { .. }) => self.phase = Phase::Kept,
             (_, DriveTarget::Keep, Phase::Enabling { .. }) => {
@@ -245,7 +245,7 @@ impl Power {
         match self.phase {
             Phase::Off => {}
             Phase::Enabling { since, rung: reached } => {
-                self.advance_up(now, step, received, (since, reached))
+                self.advance_up(now, step, received, (since, reached));
             }
             Phase::On => self.advance_on(step, received),
             Phase::Kept => self.advance_kept(step),
