@@ -1,6 +1,6 @@
 //! Reports and receipts in words, with the names of the joints.
 use crate::arm::ArmName;
-use taustream_messages::{Outcome, Rejection, Report};
+use taustream_messages::{Outcome, Pause, PauseReason, Rejection, Report};
 
 /// What went wrong, where, by how much: "tracking error (rad) at joint elbow: 0.12 against 0.05".
 pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
@@ -11,6 +11,18 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
         };
     };
     arm.names().fault(&cause)
+}
+
+/// Why the arm is paused, and how it goes on; `None` for an arm that is not.
+pub(crate) fn pause_sentence(report: &Report) -> Option<String> {
+    let Pause { reason, gap_s } = report.pause()?;
+    Some(match reason {
+        PauseReason::Operator => "paused by command; `taustream resume` goes on".to_owned(),
+        PauseReason::Stall => format!(
+            "paused because no setpoint left for {:.1} ms (the computer was busy or asleep); `taustream resume` goes on",
+            gap_s * 1e3
+        ),
+    })
 }
 
 /// The receipt in one sentence.
@@ -52,6 +64,17 @@ mod tests {
         assert_eq!(text, "drive fault at joint 2 `lift`: 0x8611 following error too large");
         report.fault_reason = 99;
         assert!(fault_sentence(&report, &arm()).contains("code 99"));
+    }
+
+    #[test]
+    fn pause_sentence_says_who_or_what_paused_and_how_to_go_on() {
+        let mut report = Report::default();
+        assert_eq!(pause_sentence(&report), None);
+        report.set_pause(Some(Pause { reason: PauseReason::Operator, gap_s: 0.0 }));
+        assert!(pause_sentence(&report).unwrap().contains("by command"));
+        report.set_pause(Some(Pause { reason: PauseReason::Stall, gap_s: 0.0461 }));
+        let text = pause_sentence(&report).unwrap();
+        assert!(text.contains("no setpoint left for 46.1 ms") && text.contains("taustream resume"), "{text}");
     }
 
     #[test]

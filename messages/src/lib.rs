@@ -8,6 +8,7 @@
 pub mod bus;
 pub mod command;
 pub mod fault;
+pub mod pause;
 pub mod phase;
 pub mod plan;
 pub mod receipt;
@@ -20,6 +21,7 @@ pub mod trajectory;
 pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
 pub use fault::{BusFault, Cause, Evidence, FaultReason};
+pub use pause::{Pause, PauseReason};
 pub use phase::Phase;
 pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
@@ -29,4 +31,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;

@@ -1,5 +1,7 @@
 //! The streamer's state, published off the real-time thread at a settable rate.
-use crate::{BUSES_MAX, BusReport, Cause, FaultReason, LAYOUT_VERSION, Phase, RobotDigest};
+use crate::{
+    BUSES_MAX, BusReport, Cause, FaultReason, LAYOUT_VERSION, Pause, PauseReason, Phase, RobotDigest,
+};
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::MAX_JOINTS;
 
@@ -39,6 +41,10 @@ pub struct Report {
     pub fault_value: f64,
     /// The limit that it broke.
     pub fault_limit: f64,
+    /// [`PauseReason::code`], 0 for an arm that is not paused.
+    pub pause_reason: u32,
+    /// How long no setpoint left before a pause by a stall, s.
+    pub pause_gap_s: f64,
     /// Newest generation accepted; a sender uses this plus 1.
     pub generation: u64,
     /// The trajectory that runs or ran last; 0 for none.
@@ -164,6 +170,18 @@ impl Report {
             value: self.fault_value,
             limit: self.fault_limit,
         })
+    }
+
+    /// Writes why the arm is paused; `None` for an arm that is not.
+    pub fn set_pause(&mut self, pause: Option<Pause>) {
+        self.pause_reason = pause.map_or(0, |pause| pause.reason.code());
+        self.pause_gap_s = pause.map_or(0.0, |pause| pause.gap_s);
+    }
+
+    /// Why the arm is paused, or about to be.
+    #[must_use]
+    pub fn pause(&self) -> Option<Pause> {
+        PauseReason::from_code(self.pause_reason).map(|reason| Pause { reason, gap_s: self.pause_gap_s })
     }
 
     /// The fault, if there is one.

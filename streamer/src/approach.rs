@@ -38,20 +38,23 @@ impl Approach {
         !self.any || t_s >= self.duration_s
     }
 
-    /// Adds what is left after `t_s` to a setpoint.
+    /// Adds what is left after `t_s` to a setpoint. Returns what it added to the positions, rad.
     ///
     /// Real time: one polynomial, no allocation.
-    pub fn add_to(&self, setpoint: &mut Setpoint, t_s: f64) {
+    pub fn add_to(&self, setpoint: &mut Setpoint, t_s: f64) -> JointArray {
+        let mut added_rad = [0.0; taustream_motion::MAX_JOINTS];
         if self.has_ended(t_s) {
-            return;
+            return added_rad;
         }
         let rate = 1.0 / self.duration_s;
         let phi = Phi::at(RAMP_N, t_s.max(0.0) * rate);
         for (joint, offset) in self.offset_rad.iter().enumerate() {
-            setpoint.position_rad[joint] += offset * (1.0 - phi.value);
+            added_rad[joint] = offset * (1.0 - phi.value);
+            setpoint.position_rad[joint] += added_rad[joint];
             setpoint.velocity_rad_s[joint] -= offset * phi.d1 * rate;
             setpoint.acceleration_rad_s2[joint] -= offset * phi.d2 * rate * rate;
             setpoint.jerk_rad_s3[joint] -= offset * phi.d3 * rate * rate * rate;
         }
+        added_rad
     }
 }

@@ -168,6 +168,8 @@ pub struct CycleState {
     pub trajectory_id: u64,
     /// Its trajectory time.
     pub trajectory_s: f64,
+    /// How far the setpoint is from the trajectory while a difference is faded out, rad.
+    pub off_path_rad: JointArray,
     /// The time scale at the setpoint.
     pub scale: Scale,
     /// Time since the last setpoint that left.
@@ -211,6 +213,7 @@ impl CycleState {
             live: false,
             trajectory_id: 0,
             trajectory_s: 0.0,
+            off_path_rad: [0.0; MAX_JOINTS],
             scale: Scale::default(),
             gap_s: 0.0,
             frozen: false,

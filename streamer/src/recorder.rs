@@ -144,6 +144,8 @@ impl Log {
             "sync": cycle.syncs.get(..self.buses), "frames": cycle.frames.get(..self.buses), "phase": cycle.phase.word(),
             "trajectory_id": cycle.trajectory_id, "s": cycle.s, "sigma": cycle.sigma,
             "position_rad": cycle.position_rad.get(..self.joints),
+            "off_path_rad": cycle.off_path_rad.get(..self.joints),
+            "joint_sent": cycle.joint_sent.get(..self.joints),
             "sent": cycle.sent.get(..self.buses), "lost": cycle.lost.get(..self.buses),
         })
     }
@@ -188,6 +190,8 @@ mod tests {
             s: 0.1 + 0.2,
             sigma: 1.0 / 3.0,
             position_rad,
+            off_path_rad: [0.0; MAX_JOINTS],
+            joint_sent: [true; MAX_JOINTS],
             sent: [7; BUSES_MAX],
             lost: [0; BUSES_MAX],
         }

@@ -87,6 +87,10 @@ pub struct CycleRecord {
     pub sigma: f64,
     /// What was encoded, rad.
     pub position_rad: JointArray,
+    /// How far `position_rad` is from the trajectory while a difference is faded out, rad.
+    pub off_path_rad: JointArray,
+    /// Whether the setpoint of each joint was handed to its bus in this cycle.
+    pub joint_sent: [bool; MAX_JOINTS],
     /// Frames taken by each bus.
     pub sent: [u32; BUSES_MAX],
     /// Frames refused by each bus.
@@ -343,6 +347,8 @@ impl Reporter {
                 s: if cycle_state.trajectory_id == 0 { 0.0 } else { cycle_state.trajectory_s },
                 sigma: cycle_state.scale.sigma,
                 position_rad: command.setpoint().position_rad,
+                off_path_rad: cycle_state.off_path_rad,
+                joint_sent: cycle_state.not_sent.map(|not_sent| !not_sent),
                 sent: cycle_state.buses.map(|b| b.sent),
                 lost: cycle_state.buses.map(|b| lost_frames(&b)),
             }));
@@ -372,6 +378,7 @@ impl Reporter {
         (r.tick, r.time_ns, r.phase) =
             (cycle_state.tick.number, cycle_state.tick.wake_time.0, supervisor.phase().code());
         r.set_cause(supervisor.cause());
+        r.set_pause(supervisor.paused_by());
         for (bus, found) in r.buses.iter_mut().zip(&cycle_state.buses) {
             let passive = found.passive.then_some(BusFault::ErrorPassive);
             bus.bus_fault = found.failed.or(passive).map_or(0, BusFault::code);

@@ -13,7 +13,7 @@ use crate::watch::Watch;
 use taustream_arm::Settings;
 use taustream_arm::settings::Supervision;
 use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
-use taustream_messages::{FaultReason, Phase};
+use taustream_messages::{FaultReason, Pause, PauseReason, Phase};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// How long the drives may take to come to rest after a stall before the arm stays paused, s.
@@ -65,6 +65,10 @@ pub struct Supervisor {
     pub(crate) speed_chosen: bool,
     /// A stall froze the motion; it goes on when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
+    /// How long no setpoint left before it, s.
+    stall_gap_s: f64,
+    /// Why the arm is paused, or about to be.
+    paused_by: Option<Pause>,
     pub(crate) resetting_since: Option<Nanos>,
     /// Failed buses are being started over, for this `clear-fault`.
     pub(crate) restoring: Option<u64>,
@@ -96,6 +100,8 @@ impl Supervisor {
             speed_chosen: false,
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
+            stall_gap_s: 0.0,
+            paused_by: None,
             resetting_since: None,
             restoring: None,
             shutting_down: Shutdown::No,
@@ -130,6 +136,11 @@ impl Supervisor {
     #[must_use]
     pub fn cause(&self) -> Option<Cause> {
         self.cause
+    }
+    /// Why the arm is paused, or about to be.
+    #[must_use]
+    pub fn paused_by(&self) -> Option<Pause> {
+        self.paused_by
     }
     /// The speed override, 0 to 1.
     #[must_use]
@@ -198,6 +209,13 @@ impl Supervisor {
             *slot = Some(transition);
         }
         (self.phase, self.since) = (to, cycle_state.tick.wake_time);
+        if event == Event::StalledLong {
+            self.paused_by = Some(Pause { reason: PauseReason::Stall, gap_s: self.stall_gap_s });
+        } else if event == Event::PauseRequested {
+            self.paused_by = Some(Pause { reason: PauseReason::Operator, gap_s: 0.0 });
+        } else if to != Phase::Paused {
+            self.paused_by = None;
+        }
         // Drives that follow commands, or are let go, are kept no more.
         self.adopted &= !matches!(to, Phase::Holding | Phase::Disabling | Phase::Disabled);
         match to {
@@ -272,6 +290,7 @@ impl Supervisor {
         }
         if cycle_state.frozen {
             self.stalled_since = Some(cycle_state.tick.wake_time);
+            self.stall_gap_s = cycle_state.gap_s;
             if cycle_state.gap_s > self.stall_resume_s {
                 self.stalled_since = None;
                 self.step(Event::StalledLong, cycle_state, actions);

@@ -184,7 +184,7 @@ impl Track {
                 self.next.approach = self.sent.approach + step;
                 let approach_s = self.seconds(self.next.approach);
                 setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), cycle_state.scale);
-                self.approach.add_to(&mut setpoint, approach_s);
+                cycle_state.off_path_rad = self.approach.add_to(&mut setpoint, approach_s);
                 cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
                 self.next.position_rad = setpoint.position_rad;
             }

@@ -44,8 +44,6 @@ pub struct Booted<'a> {
     pub files: &'a [&'a Path],
     /// Directory of the host that stays writable as /machine/output; the journal is left there.
     pub output: &'a Path,
-    /// Priority of the machine on the host.
-    pub realtime: Option<u8>,
     /// How long the command may take, s.
     pub limit_s: u32,
 }
@@ -71,7 +69,7 @@ impl Booted<'_> {
         let mut words: Vec<OsString> = vec!["systemd.show_status=0".into()];
         words.push(word("ubd0r=", self.image)?);
         words.push(word("machine_out=", self.output)?);
-        let machine = Machine::new().limit_s(self.limit_s).realtime(self.realtime);
+        let machine = Machine::new().limit_s(self.limit_s);
         let status = machine.boot(&scratch, &words, stop, (std::io::stdout(), std::io::stderr()));
         Ok(status?)
     }

@@ -24,6 +24,10 @@ pub struct LoggedCycle {
     pub sigma: f64,
     /// Setpoints that were encoded, rad.
     pub position_rad: Vec<f64>,
+    /// How far each of them is from the trajectory, on the way back to it after a stall, rad.
+    pub off_path_rad: Vec<f64>,
+    /// Whether the setpoint of each joint was handed to its bus in this cycle.
+    pub joint_sent: Vec<bool>,
     /// Frames handed to each bus.
     pub sent: Vec<u64>,
     /// Frames refused by each bus.
@@ -57,6 +61,9 @@ pub enum Event {
         generation: u64,
         /// A trajectory file's object.
         file: serde_json::Value,
+        /// The held pose less the trajectory's base, rad.
+        #[serde(default)]
+        start_offset_rad: Vec<f64>,
     },
     /// Setpoints were sent.
     LoggedCycle(LoggedCycle),

@@ -1,7 +1,7 @@
 //! Scenarios over the real processes on a real vcan0: the machine they run in and what judges their recordings.
 //!
 //! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`bench`] starts the real processes
-//! for one of the [`scenarios`], [`bus_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what an independent recorder
+//! for one of the [`scenarios`], [`bus_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what the `bus-recorder`
 //! saw on the bus, [`cycle_log`] what the streamer claims, and [`setpoints`] judges the one by the other ([`mit_setpoints`]
 //! for motors in MIT mode).
 //!
@@ -19,6 +19,7 @@ pub mod debian;
 pub mod demo_file;
 pub mod machine;
 pub mod mit_setpoints;
+mod on_path;
 pub mod restart_scenarios;
 pub mod retry;
 pub mod scenarios;

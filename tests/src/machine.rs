@@ -7,13 +7,12 @@
 //! What the guest is not: it has one CPU; a system call, reading the clock included, costs 14 to 38 us; its timing
 //! is evidence of nothing but regressions. So build outside and run inside.
 use crate::scratch::{Scratch, quoted};
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid};
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{Error, PipeReader, Read, Write, pipe};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -28,6 +27,8 @@ const GUEST: &str = include_str!("../machine/guest.sh");
 
 /// Time for boot, the guest's own time-out and power-off, on top of the command's limit.
 const BOOT_AND_HALT: Duration = Duration::from_secs(60);
+/// Nice value of the guest: it gets its CPU at once beside ordinary work, and no limit of real-time scheduling stops it.
+const NICE: i8 = -15;
 /// How often the host looks after the guest.
 const LOOK: Duration = Duration::from_millis(20);
 /// Time between asking the guest's processes to end and killing them.
@@ -92,6 +93,7 @@ pub struct Machine {
     memory_mib: u32,
     writable: Vec<PathBuf>,
     interfaces: u32,
+    nice: i8,
     realtime: Option<u8>,
     cpu: Option<usize>,
 }
@@ -103,14 +105,23 @@ impl Default for Machine {
 }
 
 impl Machine {
-    /// 300 s, 1 GiB, two interfaces, nothing writable through to the host, bound to the last CPU, ordinary priority.
+    /// 300 s, 1 GiB, two interfaces, nothing writable through to the host, bound to the last CPU, ordinary scheduling
+    /// with a nice value of -15 where that is permitted.
     #[must_use]
     pub fn new() -> Self {
         // Its kernel and its processes hand over to each other by ptrace: on one CPU a system call costs half.
         let cpu = rustix::thread::sched_getaffinity(None)
             .ok()
             .and_then(|set| (0..rustix::thread::CpuSet::MAX_CPU).rev().find(|cpu| set.is_set(*cpu)));
-        Self { limit_s: 300, memory_mib: 1024, writable: Vec::new(), interfaces: 2, realtime: None, cpu }
+        Self {
+            limit_s: 300,
+            memory_mib: 1024,
+            writable: Vec::new(),
+            interfaces: 2,
+            nice: NICE,
+            realtime: None,
+            cpu,
+        }
     }
     /// Time that the command may take; past it, it is told to end (status 124), and killed 5 s later (137).
     #[must_use]
@@ -136,7 +147,15 @@ impl Machine {
         self.interfaces = count;
         self
     }
-    /// `SCHED_FIFO` priority on the host, where permitted (said aloud where not). A busy guest then takes its whole CPU.
+    /// Nice value on the host; a negative one where it is permitted, else the caller's own.
+    #[must_use]
+    pub fn nice(mut self, nice: i8) -> Self {
+        self.nice = nice;
+        self
+    }
+    /// `SCHED_FIFO` priority on the host instead, where permitted (said aloud where not). For guests that sleep most of the
+    /// time: a guest that computes takes its whole CPU, and the host's limit for real-time processes then stops it for
+    /// 50 ms of every second.
     #[must_use]
     pub fn realtime(mut self, priority: Option<u8>) -> Self {
         self.realtime = priority;
@@ -233,18 +252,23 @@ impl Machine {
         // The kernel takes consoles by descriptor number, and descriptors 0 to 2 are the only ones that a child gets
         // without a race; so a shell moves them to 5 and 6, and gives the kernel's own words to the log.
         // umask 0: files that the guest makes get its umask, not both.
-        const MOVE: &str = "umask 0; exec 5>&0 6>&1 </dev/null 1>&2; exec \"$@\"";
+        // Where the kernel shares its time between sessions, the nice value of the session counts.
+        const MOVE: &str = "umask 0; exec 5>&0 6>&1 </dev/null 1>&2; \
+             { echo \"$NICE\" > /proc/self/autogroup; } 2> /dev/null; unset NICE; exec \"$@\"";
         if scratch.as_os_str().as_bytes().iter().any(u8::is_ascii_whitespace) {
             let why = "it is named on a kernel's command line, so it must have no blank; set TMPDIR".into();
             return Err(MachineError::BadPath { path: scratch.into(), why });
         }
-        let mut command = Command::new("/bin/sh");
-        command.args(["-c", MOVE, "vcan-machine"]).process_group(0).env_clear();
+        // A session, and with it a group, of its own.
+        let mut command = Command::new("setsid");
+        command.args(["/bin/sh", "-c", MOVE, "vcan-machine"]).env_clear();
         // No TMPDIR: the guest's memory belongs into /dev/shm. HOME: where it would keep its sockets.
-        command.env("PATH", search_path()).env("HOME", scratch);
+        command.env("PATH", search_path()).env("HOME", scratch).env("NICE", self.nice.to_string());
         if let Some(cpu) = self.cpu {
             command.args(["taskset", "-c", &cpu.to_string()]);
         }
+        // `nice` goes on without where it is not permitted.
+        command.args(["nice", "-n", &self.nice.to_string()]);
         if let Some(priority) = self.realtime {
             if may_have_priority(priority) {
                 command.args(["chrt", "-f", &priority.to_string()]);
@@ -421,9 +445,10 @@ impl Guest {
     }
 
     fn signal(&self, signal: Signal) {
-        if let Some(group) = self.pid() {
-            // An error says that nobody is left in it.
-            let _nobody = kill_process_group(group, signal);
+        if let Some(pid) = self.pid() {
+            // The group is there as soon as the launched process has made it. An error says that nobody is left.
+            let _nobody = kill_process_group(pid, signal);
+            let _nobody = kill_process(pid, signal);
         }
     }
 }

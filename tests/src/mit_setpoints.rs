@@ -8,10 +8,9 @@
 //! gains, the logged angle, and the velocity that this angle has from cycle to cycle. That logged angles are those of the
 //! accepted trajectory is judged as for every other arm.
 use crate::cycle_log::{Event, LoggedCycle};
-use crate::setpoints::{BusFrame, CheckResult, Flaw, compare_trajectory, may_be_off, trajectory};
-use std::collections::BTreeMap;
+use crate::on_path::PathCheck;
+use crate::setpoints::{BusFrame, CheckResult, Flaw, may_be_off};
 use taustream_arm::{DamiaoMode, Settings};
-use taustream_motion::Trajectory;
 
 /// Registers and requests for feedback.
 const REGISTERS: u32 = 0x7FF;
@@ -123,22 +122,22 @@ pub fn check_setpoints(
         |frame: &&BusFrame| frame.id == REGISTERS || motors.iter().any(|m| u32::from(m.node_id) == frame.id);
     let sent: Vec<&BusFrame> = frames.iter().filter(ours).collect();
     let mut check_result = CheckResult { frames: frames.len(), ..last_measured(frames, motors) };
-    let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
+    let mut path = PathCheck::default();
     let mut claimed = vec![false; sent.len()];
     let mut last: Option<&LoggedCycle> = None;
     for event in log {
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
             Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
-            Event::Trajectory { trajectory_id, file, .. } => {
-                trajectories.insert(*trajectory_id, trajectory(file)?);
+            Event::Trajectory { trajectory_id, file, start_offset_rad, .. } => {
+                path.accept(*trajectory_id, file, start_offset_rad)?;
                 check_result.trajectories += 1;
             }
             Event::LoggedCycle(cycle) => {
                 let before = last.filter(|last| last.tick + 1 == cycle.tick);
                 check_result.setpoints +=
                     compare_cycle(&sent, (before, cycle), bus, (motors, period_s), &mut claimed)?;
-                check_result.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                check_result.on_trajectory += path.compare(cycle)?;
                 check_result.syncs += 1;
                 last = Some(cycle);
             }

@@ -82,10 +82,7 @@ fn kill_and_restart(restart: &Restart, bench: &mut TestBench, goals: &Goals) -> 
             joint + 1
         );
     }
-    let recording = bench.recorded()?;
-    // The last line may be half written.
-    let whole = recording.rfind('\n').map_or("", |end| recording.get(..=end).unwrap_or_default());
-    let told = only_keeping(whole, restarted_us)?;
+    let told = only_keeping(&bench.recorded()?, restarted_us)?;
     bench.cli_done(&["enable"])?;
     bench.await_phase(Phase::Holding)?;
     bench.cli_done(&["speed", "100"])?;

@@ -1,21 +1,18 @@
 //! The judge of a recording: was every setpoint on the bus the one that the trajectory demands?
 //!
-//! It shares no encoding with the product. The bus is what `candump` wrote; the claim is the streamer's cycle log. For
+//! It shares no encoding with the product. The bus is what the recorder wrote; the claim is the streamer's cycle log. For
 //! each cycle: the frames between two SYNCs are exactly one RPDO per servo, their targets equal the encoding
-//! of the logged setpoint count by count, and the logged setpoint equals the accepted trajectory at the logged
-//! trajectory time: bit for bit by the product's sampler, and to 1e-11 rad by a second formula written here.
+//! of the logged setpoint count by count, and the logged setpoint is on the accepted trajectory (`on_path.rs`).
 use crate::carried::Carried;
 use crate::cycle_log::{Event, LoggedCycle};
+use crate::on_path::PathCheck;
 use std::collections::BTreeMap;
 use std::fmt;
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
 /// TPDO1 of node 0.
 const TPDO1: u32 = 0x180;
-/// Agreement of the second formula with the product's sampler.
-const SECOND_FORMULA_RAD: f64 = 1e-11;
 
-/// One frame as `candump` saw it.
+/// One frame as the recorder saw it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusFrame {
     /// The id, with the kernel's flags.
@@ -113,7 +110,9 @@ pub enum Flaw {
         what: String,
     },
     /// The logged setpoint is not on the trajectory.
-    #[error("tick {tick}: joint {joint} is at {got_rad} rad, the trajectory at s = {s} is at {want_rad} rad")]
+    #[error(
+        "tick {tick}: joint {joint} is at {got_rad} rad; the trajectory at s = {s}, with {off_rad} rad on the way back, is at {want_rad} rad"
+    )]
     OffTrajectory {
         /// Cycle number.
         tick: u64,
@@ -121,8 +120,10 @@ pub enum Flaw {
         joint: usize,
         /// Logged setpoint.
         got_rad: f64,
-        /// The trajectory there.
+        /// Where it belongs.
         want_rad: f64,
+        /// The difference from the trajectory that the log states.
+        off_rad: f64,
         /// Trajectory time.
         s: f64,
     },
@@ -182,14 +183,14 @@ fn check_assuming(
     let mut carried = Carried::new(frames, bus, encodings);
     let mut check_result =
         CheckResult { frames: frames.len(), syncs: carried.syncs(), ..last_measured(frames, encodings) };
-    let mut trajectories: BTreeMap<u64, Trajectory> = BTreeMap::new();
+    let mut path = PathCheck::default();
     let mut last: Option<&LoggedCycle> = None;
     for event in log {
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
             Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
-            Event::Trajectory { trajectory_id, file, .. } => {
-                trajectories.insert(*trajectory_id, trajectory(file)?);
+            Event::Trajectory { trajectory_id, file, start_offset_rad, .. } => {
+                path.accept(*trajectory_id, file, start_offset_rad)?;
                 check_result.trajectories += 1;
             }
             Event::LoggedCycle(cycle) => {
@@ -200,7 +201,7 @@ fn check_assuming(
                         cycle.tick, cycle.lost
                     )));
                 }
-                check_result.on_trajectory += compare_trajectory(&trajectories, cycle)?;
+                check_result.on_trajectory += path.compare(cycle)?;
                 if is_lost(cycle, bus) {
                     continue; // Nothing of it left: the next cycle takes its place.
                 }
@@ -306,80 +307,4 @@ fn is_whole(cycle: &LoggedCycle, bus: usize) -> bool {
 /// No frame of the cycle was taken.
 fn is_lost(cycle: &LoggedCycle, bus: usize) -> bool {
     cycle.sent.get(bus).is_none_or(|sent| *sent == 0)
-}
-
-/// Phases in which the arm is on its trajectory.
-fn is_on_path(phase: &str) -> bool {
-    matches!(phase, "moving" | "pausing" | "paused" | "stopping" | "fast-stopping")
-}
-
-pub(crate) fn compare_trajectory(
-    trajectories: &BTreeMap<u64, Trajectory>,
-    cycle: &LoggedCycle,
-) -> Result<usize, Flaw> {
-    if !is_on_path(&cycle.phase) {
-        return Ok(0);
-    }
-    let Some(trajectory) = trajectories.get(&cycle.trajectory_id) else {
-        let id = cycle.trajectory_id;
-        return Err(Flaw::Log(format!("tick {}: moves on trajectory {id}, never accepted", cycle.tick)));
-    };
-    let sampled = trajectory.sample(cycle.s).position_rad;
-    let second = second_formula(trajectory, cycle.s);
-    for joint in 0..trajectory.joints() {
-        let got_rad = cycle.position_rad.get(joint).copied().unwrap_or(f64::NAN);
-        let off = |want_rad: f64| Flaw::OffTrajectory {
-            tick: cycle.tick,
-            joint: joint + 1,
-            got_rad,
-            want_rad,
-            s: cycle.s,
-        };
-        if got_rad.to_bits() != sampled[joint].to_bits() {
-            return Err(off(sampled[joint]));
-        }
-        if (got_rad - second[joint]).abs() > SECOND_FORMULA_RAD {
-            return Err(off(second[joint]));
-        }
-    }
-    Ok(trajectory.joints())
-}
-
-/// Positions by the definition of Tau-J*, written without a line of the product's sampler.
-fn second_formula(trajectory: &Trajectory, t_s: f64) -> JointArray {
-    let mut q = *trajectory.base_rad();
-    for Stroke { start_s, duration_s, n, delta_rad } in trajectory.strokes() {
-        let s = ((t_s - start_s) / duration_s).clamp(0.0, 1.0);
-        let phi = 1.0 - (1.0 - s.powf(4.0)).powf(f64::from(*n));
-        for (q, delta) in q.iter_mut().zip(delta_rad) {
-            *q += delta * phi;
-        }
-    }
-    q
-}
-
-/// Reads a trajectory object of the log with plain JSON access.
-pub(crate) fn trajectory(file: &serde_json::Value) -> Result<Trajectory, Flaw> {
-    let missing = || Flaw::Log(format!("a trajectory that is none: {file}"));
-    let joints = |v: &serde_json::Value| -> Option<JointArray> {
-        let mut array = [0.0; MAX_JOINTS];
-        let list = v.as_array()?;
-        for (slot, value) in array.iter_mut().zip(list) {
-            *slot = value.as_f64()?;
-        }
-        (list.len() <= MAX_JOINTS).then_some(array)
-    };
-    let stroke = |v: &serde_json::Value| -> Option<Stroke> {
-        Some(Stroke {
-            start_s: v["start_s"].as_f64()?,
-            duration_s: v["duration_s"].as_f64()?,
-            n: u32::try_from(v["n"].as_u64()?).ok()?,
-            delta_rad: joints(&v["delta_rad"])?,
-        })
-    };
-    let count = file["joints"].as_u64().and_then(|n| usize::try_from(n).ok()).ok_or_else(missing)?;
-    let base = joints(&file["base_rad"]).ok_or_else(missing)?;
-    let strokes = file["strokes"].as_array().ok_or_else(missing)?;
-    let strokes: Option<Vec<Stroke>> = strokes.iter().map(stroke).collect();
-    Trajectory::new(count, base, &strokes.ok_or_else(missing)?).map_err(|e| Flaw::Log(e.to_string()))
 }

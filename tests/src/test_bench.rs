@@ -1,4 +1,4 @@
-//! A stage for one scenario: the real processes on one bus, a `candump` beside them, everything kept in one folder.
+//! A stage for one scenario: the real processes on one bus, a `bus-recorder` beside them, everything kept in one folder.
 use crate::retry::Failed;
 use anyhow::{Context, Result, bail, ensure};
 use rustix::process::{Pid, Signal, kill_process};
@@ -15,6 +15,8 @@ use taustream_messages::{FaultReason, Phase, Report};
 
 /// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it judges no speed.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
+/// The recorder's file in the folder of a scenario.
+const RECORDING: &str = "bus.log";
 /// Pause between two looks.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -145,7 +147,7 @@ pub struct TestBench {
     pub streamer: Process,
     /// The planner.
     pub planner: Process,
-    candump: Process,
+    recorder: Process,
     reports: ReportSubscriber,
     _wire: Wire,
 }
@@ -164,7 +166,7 @@ pub struct Place {
 }
 
 impl TestBench {
-    /// Starts candump, simulator, streamer and planner, in this order, and waits until the arm is ready to be enabled.
+    /// Starts recorder, simulator, streamer and planner, in this order, and waits until the arm is ready to be enabled.
     ///
     /// # Errors
     /// When one of them does not come up.
@@ -175,9 +177,14 @@ impl TestBench {
         let settings_arg = place.settings.to_str().context("the settings' path is not UTF-8")?;
         let program = |name: &str| place.programs.join(name);
 
-        // "any" goes on recording when an interface is deleted and made anew.
-        let candump_args = ["-L", "-r", "33554432", "any"];
-        let candump = Process::start(Path::new("candump"), &candump_args, &dir, "candump")?;
+        let recording = dir.join(RECORDING);
+        let recording = recording.to_str().context("the recording's path is not UTF-8")?;
+        let program_file = program("bus-recorder");
+        let program_file = program_file.to_str().context("the programs' path is not UTF-8")?;
+        // Above ordinary programs, far below the cycle: frames then never wait for the machine's other work.
+        let recorder_args = ["--fifo", "10", program_file, recording];
+        let mut recorder = Process::start(Path::new("chrt"), &recorder_args, &dir, "bus-recorder")?;
+        recorder.await_words("bus-recorder ready")?;
         let simulator_args =
             ["--settings", settings_arg, "--link", "socketcan", "--start-rad", &place.start_rad];
         let mut simulator =
@@ -213,7 +220,7 @@ impl TestBench {
             simulator,
             streamer,
             planner,
-            candump,
+            recorder,
             reports,
             _wire: wire,
         };
@@ -265,12 +272,14 @@ impl TestBench {
         self.streamer.await_words("taustream-streamer ready")
     }
 
-    /// What candump has written so far.
+    /// What the recorder has written so far, in whole lines.
     ///
     /// # Errors
     /// When it cannot be read.
     pub fn recorded(&self) -> Result<String> {
-        Ok(fs::read_to_string(&self.candump.stdout)?)
+        let mut text = fs::read_to_string(self.dir.join(RECORDING))?;
+        text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
+        Ok(text)
     }
 
     /// Starts another streamer on the same bus and waits for its end.
@@ -494,7 +503,7 @@ impl TestBench {
         report.stalls > 0 || (all_late && bus_well) || report.fault() == Some(FaultReason::Stall)
     }
 
-    /// Ends everything in order and leaves the recording: the candump text and the path of the cycle log.
+    /// Ends everything in order and leaves the recording: its text and the path of the cycle log.
     ///
     /// # Errors
     /// When the streamer does not end well.
@@ -517,10 +526,14 @@ impl TestBench {
     }
 
     fn leave(mut self) -> Result<(String, PathBuf)> {
-        for process in [&mut self.planner, &mut self.simulator, &mut self.candump] {
+        for process in [&mut self.planner, &mut self.simulator] {
             process.signal(Signal::TERM)?;
             process.await_end()?;
         }
-        Ok((fs::read_to_string(self.dir.join("candump.out"))?, self.dir.join("cycles.jsonl")))
+        // Nobody sends any more: what the recorder still has to take is all there is.
+        self.recorder.signal(Signal::TERM)?;
+        let status = self.recorder.await_end()?;
+        ensure!(status.success(), "the recorder ended with {status}: {}", self.recorder.said());
+        Ok((fs::read_to_string(self.dir.join(RECORDING))?, self.dir.join("cycles.jsonl")))
     }
 }

@@ -56,7 +56,13 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
     let mut frames = Vec::new();
     let mut log = vec![
         Event::Start { format: 1, robot: "ur5".into(), digest: "00".into(), joints: JOINTS, period_us: 1000 },
-        Event::Trajectory { tick: 1, trajectory_id: 5, generation: 1, file: file(&trajectory) },
+        Event::Trajectory {
+            tick: 1,
+            trajectory_id: 5,
+            generation: 1,
+            file: file(&trajectory),
+            start_offset_rad: Vec::new(),
+        },
     ];
     for tick in 1..=CYCLES {
         let s = f64::from(tick) * PERIOD_S;
@@ -82,6 +88,8 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             s,
             sigma: 1.0,
             position_rad,
+            off_path_rad: vec![0.0; JOINTS],
+            joint_sent: vec![true; JOINTS],
             sent: vec![7],
             lost: vec![0],
         }));

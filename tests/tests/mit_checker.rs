@@ -62,7 +62,13 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
         "version": 1, "robot": "arm", "joints": MOTORS, "base_rad": trajectory.base_rad()[..MOTORS],
         "strokes": strokes.collect::<Vec<_>>(),
     });
-    let mut log = vec![Event::Trajectory { tick: 1, trajectory_id: 5, generation: 1, file }];
+    let mut log = vec![Event::Trajectory {
+        tick: 1,
+        trajectory_id: 5,
+        generation: 1,
+        file,
+        start_offset_rad: Vec::new(),
+    }];
     let mut frames: Vec<BusFrame> =
         (1..=3).map(|node| BusFrame { id: 0x7FF, data: vec![node, 0, 0xCC, 0, 0, 0, 0, 0] }).collect();
     for tick in 1..=CYCLES {
@@ -85,6 +91,8 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             s,
             sigma: 1.0,
             position_rad: sample.position_rad[..MOTORS].to_vec(),
+            off_path_rad: vec![0.0; MOTORS],
+            joint_sent: vec![true; MOTORS],
             sent: vec![3],
             lost: vec![0],
         }));

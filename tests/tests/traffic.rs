@@ -49,6 +49,8 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             s: 0.0,
             sigma: 0.0,
             position_rad: q,
+            off_path_rad: vec![0.0; 4],
+            joint_sent: vec![true; 4],
             sent: vec![2],
             lost: vec![0],
         }));

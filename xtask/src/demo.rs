@@ -49,8 +49,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.vm {
         words.push(programs.join("vcan-machine").into());
         words.extend(["--limit-s".into(), (arguments.seconds + MACHINE_S).to_string().into()]);
-        // The machine emulates a kernel with ordinary processes: without priority on the host its clock stutters.
-        words.extend(["--realtime".into(), "40".into()]);
         words.extend(["--writable".into(), output.clone().into(), "--".into()]);
     }
     words.push(programs.join("taustream").into());

@@ -28,8 +28,8 @@ enum Task {
     Demo(demo::Arguments),
     /// Write manual pages and shell completions.
     Man(manual::Arguments),
-    /// Check everything: format, lints, tests, documentation, and the scenarios on a real vcan0.
-    Test,
+    /// Check everything or a part: format, lints, tests, documentation, and the scenarios on a real vcan0.
+    Test(test::Arguments),
     /// Install programs, units, rules and shipped configuration below a root directory, as a package would.
     Install(install::Arguments),
     /// Remove what `install` has installed; settings of this machine in /etc/taustream stay.
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     let (verdict, outcome) = match Arguments::parse().task {
         Task::Demo(arguments) => ("DEMO FAILED", demo::run(&arguments)),
         Task::Man(arguments) => ("MAN FAILED", manual::run(&arguments)),
-        Task::Test => ("TEST FAILED", test::run()),
+        Task::Test(arguments) => ("TEST FAILED", test::run(&arguments)),
         Task::Install(arguments) => ("NOT INSTALLED", install::run(&arguments)),
         Task::Uninstall(arguments) => ("NOT UNINSTALLED", install::undo(&arguments)),
     };

@@ -6,18 +6,22 @@ use std::process::{Command, Stdio};
 /// What the vcan machine needs.
 pub(crate) const MACHINE: [&str; 4] = ["user-mode-linux", "iproute2", "can-utils", "kmod"];
 
-/// What the independent master needs besides.
+/// What runs other people's libraries.
 pub(crate) const PEERS: [&str; 2] = ["python3", "python3-venv"];
 
-/// What formats the manual pages, so that a test sees whether they can be.
-pub(crate) const MANUAL: [&str; 1] = ["groff-base"];
+/// What runs other people's masters and devices in the machine.
+pub(crate) const MACHINE_AND_PEERS: [&str; 6] =
+    ["user-mode-linux", "iproute2", "can-utils", "kmod", "python3", "python3-venv"];
 
-/// What a Debian root for the machine is made with.
-pub(crate) const SERVICES: [&str; 2] = ["mmdebstrap", "squashfs-tools-ng"];
+/// What the machine boots a whole Debian with, and what formats the manual pages that are installed there.
+pub(crate) const SERVICES: [&str; 7] =
+    ["user-mode-linux", "iproute2", "can-utils", "kmod", "mmdebstrap", "squashfs-tools-ng", "groff-base"];
 
-/// Makes sure that all packages are there. What is missing is installed, as root or with sudo, after saying so.
+/// Makes sure that all packages are there. What is missing is named in one list and installed, as root or with sudo.
 pub(crate) fn ensure(packages: &[&str]) -> Result<()> {
-    let missing: Vec<&str> = packages.iter().copied().filter(|p| !is_installed(p)).collect();
+    let mut missing: Vec<&str> = packages.iter().copied().filter(|p| !is_installed(p)).collect();
+    missing.sort_unstable();
+    missing.dedup();
     if missing.is_empty() {
         return Ok(());
     }
@@ -31,7 +35,8 @@ pub(crate) fn ensure(packages: &[&str]) -> Result<()> {
         &["sudo"]
     } else {
         bail!(
-            "packages are missing and this is neither root nor is there sudo; as root: apt-get install {list}"
+            "packages are missing and this is neither root nor is there sudo; as root: \
+             apt-get install --no-install-recommends {list}"
         );
     };
     println!("installing Debian packages: {list}");
@@ -72,12 +77,14 @@ fn is_installed(package: &str) -> bool {
     said.is_ok_and(|output| output.stdout == b"installed")
 }
 
-fn exists(program: &str) -> bool {
+/// Whether a program is on the path.
+pub(crate) fn exists(program: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).any(|directory| directory.join(program).is_file())
 }
 
-fn is_root() -> bool {
+/// Whether this is root.
+pub(crate) fn is_root() -> bool {
     use std::os::unix::fs::MetadataExt;
     Path::new("/proc/self").metadata().is_ok_and(|own| own.uid() == 0)
 }

@@ -8,8 +8,6 @@ use std::time::Instant;
 
 /// How long one run in the machine may take before it counts as hung, s.
 const MACHINE_LIMIT_S: &str = "900";
-/// Priority of the machine on the host: its one processor runs everything, so it must not wait for others.
-pub(crate) const MACHINE_PRIORITY: &str = "40";
 
 /// A source tree with its built programs.
 pub(crate) struct Place {
@@ -41,7 +39,7 @@ impl Place {
         let output = self.target.join(folder);
         std::fs::create_dir_all(&output).with_context(|| format!("{} cannot be made", output.display()))?;
         let mut words = vec![self.programs.join("vcan-machine")];
-        let options = ["--limit-s", MACHINE_LIMIT_S, "--realtime", MACHINE_PRIORITY, "--writable"];
+        let options = ["--limit-s", MACHINE_LIMIT_S, "--writable"];
         words.extend(options.map(PathBuf::from));
         words.extend([output, "--".into()]);
         Ok(words)

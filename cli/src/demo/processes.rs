@@ -82,11 +82,18 @@ impl Processes {
 
     fn add(&mut self, form: Form, name: &'static str, words: &[OsString]) -> Result<(), Failure> {
         let mut process = Process::spawn(name, words, &self.output)?;
-        let ready = process.wait_until_ready();
-        // Kept even when it is not ready: what was started is ended.
-        self.children.push(process);
-        form.progress(ready?);
-        Ok(())
+        match process.wait_until_ready() {
+            Ok(ready) => {
+                self.children.push(process);
+                form.progress(ready);
+                Ok(())
+            }
+            Err(failure) => {
+                // Its failure is told already; how it ends after that is no failure of the demo's end.
+                let _told = process.end();
+                Err(failure)
+            }
+        }
     }
 
     /// Ends planner, streamer and servos in this order; the streamer stops the arm by itself if it still moves.

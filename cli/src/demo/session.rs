@@ -12,12 +12,12 @@ use crate::live::replan::ask_while;
 use crate::output::{Form, note};
 use crate::plot::recording::Sample;
 use crate::view::Scale;
-use crate::words::fault_sentence;
+use crate::words::{fault_sentence, pause_sentence};
 use std::cell::RefCell;
 use std::thread;
 use std::time::Duration;
 use taustream_messages::plan::{CheckedPlanRequest, When};
-use taustream_messages::{Command, Phase, Report};
+use taustream_messages::{Command, PauseReason, Phase, Report};
 use taustream_motion::{JointArray, Setpoint};
 
 /// Deadline of each plan; the shipped goals need a fraction of it.
@@ -46,6 +46,9 @@ pub(crate) struct Session<'a> {
     limit: Limit,
     moves: Vec<Move>,
     faults: Vec<String>,
+    pauses: RefCell<Vec<String>>,
+    /// The count of stalls in the report that was last answered with a resume.
+    resumed_at_stall: RefCell<u64>,
 }
 
 impl<'a> Session<'a> {
@@ -69,6 +72,8 @@ impl<'a> Session<'a> {
             limit: Limit::after_s(limit_s),
             moves: Vec::new(),
             faults: Vec::new(),
+            pauses: RefCell::default(),
+            resumed_at_stall: RefCell::default(),
         };
         session.wait_for(Phase::Disabled, "find and configure all drives")?;
         Ok(session)
@@ -104,8 +109,28 @@ impl<'a> Session<'a> {
         let planned = ask_while(&self.client, self.arm, &request, &mut || self.look())?;
         let executed = follow(&self.client, self.arm, planned.trajectory_id, |report, phase| {
             self.seen.borrow_mut().note(report, phase);
+            self.check_time()?;
+            self.resume_after_stall(report, phase)
         })?;
         Ok(Move::new(number, planned, executed))
+    }
+
+    /// A computer that is busy with other things may leave the arm paused. Then the demo does what an operator would, and
+    /// says so. A pause by command is somebody else's wish.
+    fn resume_after_stall(&self, report: &Report, phase: Phase) -> Result<(), Failure> {
+        let stalled = report.pause().is_some_and(|pause| pause.reason == PauseReason::Stall);
+        let mut resumed_at = self.resumed_at_stall.borrow_mut();
+        if phase != Phase::Paused || !stalled || *resumed_at == report.stalls {
+            return Ok(());
+        }
+        *resumed_at = report.stalls;
+        let why = pause_sentence(report).unwrap_or_default();
+        note(format_args!("PAUSED: {why}. Resuming .."));
+        match execute(&self.client, self.arm, Command::Resume, 0.0) {
+            // It has stopped in the meantime: the next report says why.
+            Err(Failure::Refused(_)) => Ok(()),
+            done => done.inspect(|()| self.pauses.borrow_mut().push(why)),
+        }
     }
 
     /// A computer that is busy with other things may hold the simulated servos up until the streamer stops the arm. Then
@@ -137,7 +162,8 @@ impl<'a> Session<'a> {
         self.look()?;
         let seen = self.seen.into_inner();
         let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
-        Ok(Summary::new(&last, self.moves, self.faults, seen.samples).with_tracking_error(moved))
+        Ok(Summary::new(&last, self.moves, (self.faults, self.pauses.into_inner()), seen.samples)
+            .with_tracking_error(moved))
     }
 
     /// A failure while the arm is in a fault is told with the fault: it is the cause.
@@ -199,10 +225,12 @@ impl<'a> Session<'a> {
     }
 
     fn check_time(&self) -> Result<(), Failure> {
-        if self.limit.is_over() {
-            return Err(Failure::Failed("the demo takes longer than --limit-s allows".to_owned()));
+        if !self.limit.is_over() {
+            return Ok(());
         }
-        Ok(())
+        let paused = self.seen.borrow().last.as_ref().and_then(pause_sentence);
+        let why = paused.map_or_else(String::new, |why| format!("; the arm is {why}"));
+        Err(Failure::Failed(format!("the demo takes longer than --limit-s allows{why}")))
     }
 }
 

@@ -53,6 +53,8 @@ pub(crate) struct Summary {
     tracking_error_rad_max: f64,
     /// Faults that were recovered from, in words.
     faults: Vec<String>,
+    /// Pauses by stalls of the computer that were ended by a resume, in words.
+    pauses: Vec<String>,
     frames_sent: u64,
     frames_lost: u64,
     frames_received: u64,
@@ -76,7 +78,12 @@ pub(crate) struct Summary {
 
 impl Summary {
     /// Sums up what was seen until the last report.
-    pub(crate) fn new(last: &Report, moves: Vec<Move>, faults: Vec<String>, samples: Vec<Sample>) -> Self {
+    pub(crate) fn new(
+        last: &Report,
+        moves: Vec<Move>,
+        (faults, pauses): (Vec<String>, Vec<String>),
+        samples: Vec<Sample>,
+    ) -> Self {
         let mut summary = Self {
             verdict: "DEMO OK",
             planned_s: 0.0,
@@ -84,6 +91,7 @@ impl Summary {
             clearance_m: moves.iter().map(|m| m.clearance_m).fold(f64::INFINITY, f64::min),
             tracking_error_rad_max: 0.0,
             faults,
+            pauses,
             frames_sent: last.frames_sent,
             frames_lost: last.frames_lost,
             frames_received: last.frames_received,
@@ -195,6 +203,9 @@ impl fmt::Display for Summary {
             self.lateness_ns_p99 / 1000,
             self.lateness_ns_max / 1000
         )?;
+        for pause in &self.pauses {
+            writeln!(f, "resumed                  {pause}")?;
+        }
         for fault in &self.faults {
             writeln!(f, "fault, recovered from    {fault}")?;
         }

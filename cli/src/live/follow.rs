@@ -3,7 +3,8 @@ use super::client::{Client, Limit};
 use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::words::fault_sentence;
+use crate::output::Form;
+use crate::words::{fault_sentence, pause_sentence};
 use serde::Serialize;
 use std::fmt;
 use std::thread;
@@ -31,15 +32,28 @@ impl fmt::Display for Executed {
     }
 }
 
-/// Waits until the motion has ended; `see` gets every report on the way.
+/// Says once for each pause why the arm is paused, for a command that waits for its motion.
+pub(crate) fn say_pauses(form: Form) -> impl FnMut(&Report, Phase) -> Result<(), Failure> {
+    let mut before = None;
+    move |report, _| {
+        let now = pause_sentence(report);
+        if let Some(text) = now.as_ref().filter(|_| now != before) {
+            form.progress(text);
+        }
+        before = now;
+        Ok(())
+    }
+}
+
+/// Waits until the motion has ended; `see` gets every report on the way and may end the wait.
 ///
 /// # Errors
-/// When it does not reach its end: fault, stop, another motion, no reports any more, or Ctrl-C.
+/// When it does not reach its end: fault, stop, another motion, no reports any more, Ctrl-C, or what `see` says.
 pub(crate) fn follow(
     client: &Client,
     arm: &ArmName,
     trajectory_id: u64,
-    mut see: impl FnMut(&Report, Phase),
+    mut see: impl FnMut(&Report, Phase) -> Result<(), Failure>,
 ) -> Result<Executed, Failure> {
     let mut watch = Watch::of(trajectory_id);
     let mut silence = Limit::after_s(SILENCE_S_MAX);
@@ -48,7 +62,7 @@ pub(crate) fn follow(
         let mut news = Vec::new();
         client.drain_reports(|report, phase| news.push((*report, phase)))?;
         for (report, phase) in &news {
-            see(report, *phase);
+            see(report, *phase)?;
             if let Some(executed) = watch.evaluate(report, *phase, arm)? {
                 return Ok(executed);
             }

@@ -1,6 +1,6 @@
 //! `taustream replan`: asks the running planner for a motion to a new goal.
 use super::client::{Client, PLANNER};
-use super::follow::{Executed, follow};
+use super::follow::{Executed, follow, say_pauses};
 use crate::args::ReplanArgs;
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
@@ -104,7 +104,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     })?;
     let executed = if args.wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
-        Some(follow(&client, &arm, planned.trajectory_id, |_, _| {})?)
+        Some(follow(&client, &arm, planned.trajectory_id, say_pauses(form))?)
     } else {
         None
     };

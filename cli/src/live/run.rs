@@ -1,6 +1,6 @@
 //! `taustream run`: executes a saved trajectory from its base pose, after verification.
 use super::client::Client;
-use super::follow::{Executed, follow};
+use super::follow::{Executed, follow, say_pauses};
 use super::replan::accepted;
 use crate::args::RunArgs;
 use crate::arm::{self, ArmName};
@@ -76,7 +76,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
     let (from_s, tick) = accepted(&receipt, &arm)?;
     let executed = if args.wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", proof.duration_s));
-        Some(follow(&client, &arm, sent.trajectory_id, |_, _| {})?)
+        Some(follow(&client, &arm, sent.trajectory_id, say_pauses(form))?)
     } else {
         None
     };

@@ -3,7 +3,7 @@ use super::client::Client;
 use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::output::Form;
-use crate::words::fault_sentence;
+use crate::words::{fault_sentence, pause_sentence};
 use serde::Serialize;
 use std::fmt;
 use taustream_drivers::ErrorFrame;
@@ -43,6 +43,15 @@ struct FaultStatus {
     message: String,
 }
 
+/// Why the arm is paused.
+#[derive(Debug, Serialize)]
+struct PauseStatus {
+    /// "operator" or "stall".
+    reason: &'static str,
+    gap_s: f64,
+    message: String,
+}
+
 /// One bus.
 #[derive(Debug, Serialize)]
 struct BusStatus {
@@ -79,6 +88,7 @@ pub(crate) struct Status {
     phase: &'static str,
     energised: bool,
     fault: Option<FaultStatus>,
+    paused: Option<PauseStatus>,
     sigma: f64,
     speed_percent: f64,
     /// The speed is still that of the start.
@@ -141,6 +151,7 @@ impl Status {
             phase: phase.word(),
             energised: r.energised == 1,
             fault,
+            paused: paused(r),
             sigma: r.sigma,
             speed_percent: r.speed_percent,
             first_speed: r.first_speed == 1,
@@ -169,6 +180,11 @@ impl Status {
             cycle_ns_max: r.cycle_ns_max,
         }
     }
+}
+
+fn paused(r: &Report) -> Option<PauseStatus> {
+    let (pause, message) = (r.pause()?, pause_sentence(r)?);
+    Some(PauseStatus { reason: pause.reason.word(), gap_s: pause.gap_s, message })
 }
 
 fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
@@ -235,6 +251,18 @@ impl Status {
     }
 }
 
+impl Status {
+    fn why_it_rests(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(fault) = &self.fault {
+            writeln!(f, "fault: {}", fault.message)?;
+        }
+        if let Some(pause) = &self.paused {
+            writeln!(f, "{}", pause.message)?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let energised = if self.energised { "energised" } else { "not energised" };
@@ -244,9 +272,7 @@ impl fmt::Display for Status {
             self.arm, self.phase, self.speed_percent, self.sigma
         )?;
         self.trust(f)?;
-        if let Some(fault) = &self.fault {
-            writeln!(f, "fault: {}", fault.message)?;
-        }
+        self.why_it_rests(f)?;
         match &self.motion {
             Some(m) => writeln!(
                 f,

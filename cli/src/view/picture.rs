@@ -3,7 +3,7 @@ use super::bar::{Ink, progress};
 use super::joints::{JointScale, table};
 use super::{Line, Span, Tone};
 use crate::arm::ArmName;
-use crate::words::fault_sentence;
+use crate::words::{fault_sentence, pause_sentence};
 use std::time::Duration;
 use taustream_arm::Settings;
 use taustream_messages::{Phase, Report};
@@ -101,7 +101,7 @@ impl Picture {
 
     fn fault(&self, r: &Report, phase: Phase) -> Line {
         if r.fault_reason == 0 {
-            return Line::default();
+            return pause_sentence(r).map_or_else(Line::default, |text| Line::of(text, Tone::Warning));
         }
         let way_out = match phase {
             Phase::Fault => "; then `taustream clear-fault`",
@@ -184,8 +184,11 @@ fn timing(r: &Report) -> [Line; 2] {
 /// A report in one line of a log, faults in words.
 pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
     let pose: Vec<String> = r.measured_rad.iter().take(r.joints()).map(|q| format!("{q:+.3}")).collect();
-    let fault =
-        if r.fault_reason == 0 { String::new() } else { format!("  FAULT: {}", fault_sentence(r, arm)) };
+    let fault = if r.fault_reason == 0 {
+        pause_sentence(r).map_or_else(String::new, |text| format!("  {text}"))
+    } else {
+        format!("  FAULT: {}", fault_sentence(r, arm))
+    };
     format!(
         "{:<13} sigma {:.2}  at {:.2} of {:.2} s  q {} rad  lateness p99 {} us, late {}  frames lost {}{fault}",
         phase.word(),

@@ -1,6 +1,7 @@
 //! `taustream watch` beside a streamer that the test plays: nothing moves, reports come as a real one sends them.
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 use crate::common::Scratch;
+use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -194,8 +195,7 @@ fn watch_ends_well_on_ctrl_c() {
     let stage = Stage::new("int");
     let (mut child, mut out) = stage.start("watch --settings settings.toml --json");
     assert_eq!(next(&mut out)["phase"], "moving");
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(killed.success());
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let mut rest = String::new();
     out.read_to_string(&mut rest).unwrap();
     assert!(rest.is_empty() || rest.ends_with('\n'), "half a line: {rest:?}");

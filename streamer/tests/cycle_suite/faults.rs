@@ -2,7 +2,7 @@
 use crate::harness::{CycleHarness, HOME_RAD, JOINTS, World, swing};
 use crate::{arrived, assert_on_path, assert_within_stop_limits};
 use taustream_drivers::{DriveState, DriveTarget, LinkFault};
-use taustream_messages::{Command, FaultReason, Phase};
+use taustream_messages::{Command, FaultReason, PauseReason, Phase};
 use taustream_motion::{Stroke, Trajectory};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle_state::Decision;
@@ -165,8 +165,18 @@ fn stall_longer_than_allowed_stays_paused_until_resume() {
     harness.run(600);
     harness.step_after(40);
     assert_eq!(harness.phase(), Phase::Paused);
+    let pause = harness.core.supervisor().paused_by().expect("a pause has a reason");
+    assert_eq!(pause.reason, PauseReason::Stall);
+    assert!((pause.gap_s - 0.04).abs() < 1e-9, "{pause:?}");
     harness.run(300);
     assert_eq!(harness.phase(), Phase::Paused);
+    assert_eq!(harness.core.supervisor().paused_by(), Some(pause));
+    harness.accept(Command::Resume);
+    assert_eq!(harness.core.supervisor().paused_by(), None);
+    harness.accept(Command::Pause);
+    assert_eq!(harness.core.supervisor().paused_by().map(|pause| pause.reason), Some(PauseReason::Operator));
+    harness.run_until(Phase::Paused, 2_000);
+    assert_eq!(harness.core.supervisor().paused_by().map(|pause| pause.reason), Some(PauseReason::Operator));
     harness.accept(Command::Resume);
     harness.run_until(Phase::Holding, 6_000);
     assert_on_path(&harness, &trajectory);

@@ -32,9 +32,6 @@ enum What {
         /// Where the journal and the reports of systemd-analyze are left.
         #[arg(long)]
         output: PathBuf,
-        /// Priority of the machine on the host.
-        #[arg(long)]
-        realtime: Option<u8>,
         /// How long the trials may take, s.
         #[arg(long, default_value_t = 240)]
         limit_s: u32,
@@ -72,7 +69,7 @@ fn perform(what: What) -> Result<usize> {
     match what {
         What::Check { only } => checks::run(&only),
         What::Stall { process, thread } => stall::hold(process, &thread).map(|()| 0),
-        What::Boot { bench, cache, output, realtime, limit_s, only } => {
+        What::Boot { bench, cache, output, limit_s, only } => {
             let stop = Arc::new(AtomicBool::new(false));
             for number in [SIGINT, SIGTERM, SIGHUP] {
                 signal_hook::flag::register(number, Arc::clone(&stop))?;
@@ -86,8 +83,7 @@ fn perform(what: What) -> Result<usize> {
             }
             let controller = cache.join("controller");
             files::lay_out(&controller, &bench)?;
-            let booted =
-                Booted { image: &image, files: &[&bench, &controller], output: &output, realtime, limit_s };
+            let booted = Booted { image: &image, files: &[&bench, &controller], output: &output, limit_s };
             let status = booted.run(&["/opt/services", "check", &only], &stop)?;
             println!("booted, tried and ended in {:.0} s", since.elapsed().as_secs_f64());
             if status == machine::TIMED_OUT {

@@ -34,7 +34,11 @@ struct Arguments {
     /// Directory that stays writable through to the host (repeatable).
     #[arg(long, value_name = "DIR")]
     writable: Vec<PathBuf>,
-    /// Run the machine at this SCHED_FIFO priority of the host, if that is permitted.
+    /// Nice value of the machine on the host, if that is permitted.
+    #[arg(long, value_name = "N", default_value_t = -15, allow_hyphen_values = true, value_parser = clap::value_parser!(i8).range(-20..=19))]
+    nice: i8,
+    /// Run the machine at this SCHED_FIFO priority of the host instead, if that is permitted. Only for commands that
+    /// sleep most of the time: the host stops busy real-time processes for 50 ms of every second.
     #[arg(long, value_name = "PRIO", value_parser = clap::value_parser!(u8).range(1..=99))]
     realtime: Option<u8>,
     /// CPU of the host to bind the machine to [default: the last].
@@ -60,6 +64,7 @@ fn main() -> anyhow::Result<ExitCode> {
         .limit_s(arguments.limit_s)
         .memory_mib(arguments.memory)
         .interfaces(arguments.interfaces)
+        .nice(arguments.nice)
         .realtime(arguments.realtime);
     if arguments.cpu.is_some() {
         machine = machine.cpu(arguments.cpu);

@@ -1,0 +1,70 @@
+//! Our numbers against those of other people's libraries, and of programs written from the papers.
+use super::{Outcome, Part, Step};
+use crate::packages::PEERS;
+use crate::place::{Place, perform};
+use anyhow::Result;
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
+    Step { name, part: Part::Peers, packages: &PEERS, programs: true, run }
+}
+
+pub(super) const STEPS: &[Step] = &[
+    step("forward kinematics", kinematics),
+    step("optimisers step by step", walks),
+    step("optimisers by their results", optimisers),
+    step("frames of Damiao motors", damiao_frames),
+];
+
+/// Where the published planning problems are, if they are at hand: their files stay outside of this project.
+fn published_problems(root: &Path) -> PathBuf {
+    env::var_os("TAUSTREAM_MBM_DIR").map_or_else(|| root.join("../shared/mbm"), PathBuf::from)
+}
+
+/// Somebody else's forward kinematics, in pinned versions, against ours.
+fn kinematics(place: &Place) -> Result<Outcome> {
+    let problems = published_problems(&place.root);
+    let python = place.python("venv-kinematics", "kinematics-requirements.txt", &["--no-deps"])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join("kinematics.py")).arg(place.programs.join("frames"));
+    command.arg(&place.root).arg(&problems).current_dir(&place.root);
+    perform("forward kinematics against an independent library", &mut command)?;
+    Ok(if problems.join("ur5_spherized.urdf").is_file() {
+        Outcome::Passed
+    } else {
+        let looked = problems.display();
+        Outcome::Skipped(format!(
+            "ur5_spherized of the published problems (not part of this project; looked in {looked}, TAUSTREAM_MBM_DIR names another folder)"
+        ))
+    })
+}
+
+/// The optimisers against programs that walk them from their papers.
+fn walks(place: &Place) -> Result<Outcome> {
+    let mut walks = Command::new("python3");
+    walks.arg(place.root.join("planner/tests/oracles/walks.py")).arg("--check");
+    perform("walks of the optimisers by programs written from the papers", &mut walks)?;
+    Ok(Outcome::Passed)
+}
+
+/// The optimisers against somebody else's library.
+fn optimisers(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv-optimisers", "mealpy-requirements.txt", &[])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join("optimisers_mealpy.py"));
+    command.arg(place.programs.join("examples/benchmarks"));
+    perform("optimisers against an independent library", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// Frames of Damiao motors as somebody else's library packs them.
+fn damiao_frames(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv", "requirements.txt", &[])?;
+    let mut frames = Command::new(python);
+    frames.arg(place.peers().join("damiao_frames.py")).arg("--check");
+    frames.arg(place.root.join("drivers/tests/damiao_suite/frames.csv"));
+    perform("frames of Damiao motors by an independent library", &mut frames)?;
+    Ok(Outcome::Passed)
+}

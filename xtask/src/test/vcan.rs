@@ -1,0 +1,108 @@
+//! What needs a kernel with CAN: everything here runs in the test machine.
+use super::{Outcome, Part, Step};
+use crate::packages::{MACHINE, MACHINE_AND_PEERS};
+use crate::place::{Place, perform};
+use anyhow::Result;
+
+const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
+    Step { name, part: Part::Vcan, packages: &MACHINE, programs: true, run }
+}
+
+const fn with_python(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
+    Step { packages: &MACHINE_AND_PEERS, ..step(name, run) }
+}
+
+pub(super) const STEPS: &[Step] = &[
+    step("test machine", machine),
+    step("links", links),
+    with_python("CANopen master", canopen_master),
+    with_python("CANopen devices", canopen_devices),
+    with_python("Damiao master", damiao_master),
+    step("scenarios", |place| scenarios(place, "scenarios", &[])),
+    // Ways to carry setpoints: over two buses with modelled bit rates, and packed, staggered and rarer over one.
+    step("scenarios with dual-bus", |place| three_goals(place, "dual-bus")),
+    step("scenarios with one-bus", |place| three_goals(place, "one-bus")),
+    step("scenarios of Damiao motors", |place| scenarios(place, "damiao-scenarios", &[])),
+    step("scenarios of Damiao motors over CAN FD", |place| {
+        scenarios(place, "damiao-scenarios", &["--fd", "--only", "goals"])
+    }),
+    step("figures", figures),
+];
+
+/// The machine keeps its promises. Cargo starts it.
+fn machine(place: &Place) -> Result<Outcome> {
+    let mut command = place.cargo();
+    command.args(["test", "--locked", "--workspace", "--test", "machine"]);
+    perform("the test machine itself", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// The links' tests, which cargo starts through the machine as their runner.
+fn links(place: &Place) -> Result<Outcome> {
+    let words = place.machine("on-vcan")?;
+    let words: Vec<String> = words.iter().map(|word| format!("{:?}", word.display().to_string())).collect();
+    let runner = format!("target.'cfg(all())'.runner = [{}]", words.join(", "));
+    let mut command = place.cargo();
+    command.args(["test", "--locked", "--workspace", "--test", "on_vcan"]);
+    command.args(["--config", &runner, "--", "--test-threads", "1"]);
+    perform("links on a real vcan0", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// Somebody else's CANopen master drives the simulated drives.
+fn canopen_master(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv", "requirements.txt", &[])?;
+    let mut command = place.in_machine("peers", &python)?;
+    command.arg(place.peers().join("canopen_master.py")).arg(place.programs.join("taustream-servosim"));
+    command.arg("config/settings/vcan6.toml");
+    perform("an independent CANopen master on a real vcan0", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// Somebody else's CANopen devices are brought up and moved by our own programs.
+fn canopen_devices(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv", "requirements.txt", &[])?;
+    let mut command = place.in_machine("peers", &python)?;
+    command.arg(place.peers().join("durand_drives.py")).arg(&place.programs);
+    command.arg(place.peers().join("durand.toml"));
+    perform("independent CANopen devices on a real vcan0", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// Somebody else's master of Damiao motors drives the simulated ones.
+fn damiao_master(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv", "requirements.txt", &[])?;
+    let mut command = place.in_machine("peers", &python)?;
+    command.arg(place.peers().join("damiao_master.py")).arg(place.programs.join("taustream-servosim"));
+    command.arg("config/settings/damiao6.toml");
+    perform("an independent Damiao master on a real vcan0", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+fn three_goals(place: &Place, settings: &str) -> Result<Outcome> {
+    let file = format!("config/settings/{settings}.toml");
+    scenarios(place, "scenarios", &["--settings", &file, "--only", "three_goals"])
+}
+
+fn scenarios(place: &Place, program: &str, further: &[&str]) -> Result<Outcome> {
+    let mut command = place.in_machine(program, &place.programs.join(program))?;
+    command.arg("--output").arg(place.target.join(program)).args(further);
+    perform(&format!("{program} {} on a real vcan0", further.join(" ")), &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// The cycle beside bare loops, for the record: figures of a shared machine are printed, not judged.
+fn figures(place: &Place) -> Result<Outcome> {
+    let figures: [(&str, &[&str]); 2] = [
+        ("figures of the cycle on a real vcan0 (not judged)", &["cycle", "--seconds", "8"]),
+        (
+            "figures of two buses beside one on a real vcan (not judged)",
+            &["compare", "vcan6", "dual-bus", "one-bus", "--seconds", "6"],
+        ),
+    ];
+    for (what, words) in figures {
+        let mut command = place.in_machine("figures", &place.programs.join("taustream"))?;
+        perform(what, command.arg("bench").args(words).args(["--link", "socketcan"]))?;
+    }
+    Ok(Outcome::Passed)
+}
