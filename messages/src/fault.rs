@@ -107,11 +107,13 @@ pub enum BusFault {
     ErrorPassive = 7,
     /// Another error of the operating system for too many cycles.
     System = 8,
+    /// Frames of the bus are received, but this computer reads them too late or loses them.
+    ReceiveBehind = 9,
 }
 
 impl BusFault {
     /// Every trouble.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::QueueFull,
         Self::Unconfirmed,
         Self::Down,
@@ -120,6 +122,7 @@ impl BusFault {
         Self::Restarted,
         Self::ErrorPassive,
         Self::System,
+        Self::ReceiveBehind,
     ];
     /// The code that stands in messages; 0 stands for none.
     #[must_use]
@@ -143,6 +146,7 @@ impl BusFault {
             Self::Restarted => "controller restarted after bus-off",
             Self::ErrorPassive => "controller is error-passive",
             Self::System => "operating system refuses its frames",
+            Self::ReceiveBehind => "this computer reads its frames too late",
         }
     }
     /// What to do about it, before `clear-fault`.
@@ -161,6 +165,10 @@ impl BusFault {
             Self::Restarted => "mend cable, termination or bit rate: it will leave the bus again".to_owned(),
             Self::ErrorPassive => {
                 "see cable, termination, bit rate and the power of the drives: bus-off is next".to_owned()
+            }
+            Self::ReceiveBehind => {
+                "the bus carries frames, so leave its cables alone: run `taustream doctor`, and see what else loads this computer"
+                    .to_owned()
             }
             Self::System => format!("see `ip -details link show {interface}` and the log"),
         }

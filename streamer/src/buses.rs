@@ -100,10 +100,12 @@ impl Buses {
 
     /// Hands every bus's frames over, all of them before anything is read.
     ///
-    /// Real time: one system call a bus, never waits.
+    /// Real time: one system call a bus, one more while own frames are overdue; never waits.
     pub fn send(&mut self, cycle_state: &mut CycleState) {
         for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
             let frames = bus.outgoing.frames();
+            let asks = bus.health.asks_for_queue();
+            found.queued = bus.link.as_ref().filter(|_| asks).map(|link| link.has_queued());
             let sent = match &mut bus.link {
                 Some(link) if !frames.is_empty() => link.send(frames),
                 Some(_) | None => Default::default(),
@@ -136,7 +138,7 @@ impl Buses {
     pub fn receive(&mut self, now: Nanos, cycle_state: &mut CycleState) {
         for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
             let Bus { link, driver, health, incoming, live, .. } = bus;
-            let mut confirmed = None;
+            let mut seen = BusActivity { live: *live, queued: found.queued, ..BusActivity::default() };
             if let Some(link) = link {
                 for _ in 0..RECEIVES_MAX {
                     let fault = link.receive(incoming);
@@ -148,13 +150,15 @@ impl Buses {
                         }
                     }
                     found.received = found.received.saturating_add(count(incoming.frames().len()));
-                    if !incoming.may_have_more() {
+                    seen.more = incoming.may_have_more();
+                    if !seen.more {
                         break;
                     }
                 }
-                confirmed = link.confirmed();
+                (seen.confirmed, seen.from_wire) = (link.confirmed(), link.confirms_from_wire());
+                seen.overflowed = link.overflowed();
             }
-            health.evaluate(BusActivity { live: *live, confirmed }, found);
+            health.evaluate(seen, found);
             for joint in driver.joints() {
                 if let Some(servo) = cycle_state.servos.get_mut(*joint) {
                     *servo = driver.status(*joint);

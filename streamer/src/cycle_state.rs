@@ -119,6 +119,16 @@ pub struct BusState {
     pub consecutive_lost: u32,
     /// Frames handed over and not yet seen on the wire.
     pub in_flight: u32,
+    /// Frames handed over whose echo was lost in this computer, since the link was opened.
+    pub echoes_missing: u64,
+    /// Frames that were lost because they arrived faster than they were read, since the link was opened.
+    pub overflowed: u64,
+    /// Frames were read late, or lost, in the time that feedback may take.
+    pub receive_behind: bool,
+    /// Frames have waited to be read for longer than feedback may take.
+    pub unread: bool,
+    /// Whether frames of earlier cycles waited in the interface's queue; `None` when nobody asked.
+    pub queued: Option<bool>,
     /// The newest error frame since start.
     pub newest_error: ErrorFrame,
     /// Error frames since start.

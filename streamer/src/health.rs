@@ -41,11 +41,7 @@ pub(crate) struct Health {
     consecutive_lost: u32,
     failed: Option<BusFault>,
     passive: bool,
-    /// Frames handed over since the link was opened.
-    sent: u64,
-    /// The same at the end of each of the last cycles, as a ring.
-    history: [u64; CYCLES_MAX],
-    slot: usize,
+    echoes: Echoes,
     newest_error: ErrorFrame,
     error_frames: u64,
 }
@@ -57,6 +53,112 @@ pub(crate) struct BusActivity {
     pub(crate) live: bool,
     /// Own frames that came back, since the link was opened; `None` where none do.
     pub(crate) confirmed: Option<u64>,
+    /// They come back when they were on the wire ([`taustream_drivers::CanLink::confirms_from_wire`]).
+    pub(crate) from_wire: bool,
+    /// Frames that were lost in receiving, since the link was opened.
+    pub(crate) overflowed: u64,
+    /// More has arrived than this cycle took.
+    pub(crate) more: bool,
+    /// Whether frames of earlier cycles waited in the interface's queue; `None` when nobody asked.
+    pub(crate) queued: Option<bool>,
+}
+
+/// Own frames on their way back.
+///
+/// Their count alone does not tell a bus that nobody acknowledges from a computer that reads too slowly: frames that
+/// come back are lost where a receive queue overflows, and then the count is off for good. So frames that are
+/// overdue are held against the bus only while the interface's queue holds them, or while none comes back at all from
+/// an interface that has put them on the wire itself. All others were sent, and are written off.
+#[derive(Debug)]
+struct Echoes {
+    /// Frames handed over since the link was opened.
+    sent: u64,
+    /// Frames that will not come back any more.
+    missing: u64,
+    /// [`Self::sent`], and what had come back, at the end of each of the last cycles, as a ring.
+    history: [(u64, u64); CYCLES_MAX],
+    slot: usize,
+    /// Cycles in a row in which frames were overdue.
+    overdue_cycles: u32,
+    /// Cycles in a row in which old frames waited in the interface's queue.
+    queued_cycles: u32,
+    overflowed: u64,
+    /// Cycles for which the receive path still counts as behind.
+    behind_cycles: usize,
+}
+
+/// What overdue frames say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Overdue {
+    /// Nothing: there are none, or it is too early.
+    No,
+    /// Nobody acknowledges them.
+    Unconfirmed,
+    /// They came back, or will, but this computer reads them too slowly.
+    Unread,
+}
+
+impl Echoes {
+    const NONE: Self = Self {
+        sent: 0,
+        missing: 0,
+        history: [(0, 0); CYCLES_MAX],
+        slot: 0,
+        overdue_cycles: 0,
+        queued_cycles: 0,
+        overflowed: 0,
+        behind_cycles: 0,
+    };
+
+    /// Takes in one cycle, in which so many frames were handed over; frames are overdue after `depth` cycles.
+    fn observe(&mut self, sent: u32, depth: usize, seen: BusActivity) -> Overdue {
+        self.sent = self.sent.saturating_add(u64::from(sent));
+        let confirmed = seen.confirmed.unwrap_or(self.sent);
+        // Those that were written off and come back after all are late, not lost.
+        self.missing = self.missing.min(self.sent.saturating_sub(confirmed));
+        self.slot = (self.slot + 1) % CYCLES_MAX;
+        self.history[self.slot] = (self.sent, confirmed);
+        let (sent_then, confirmed_then) = self.history[(self.slot + CYCLES_MAX - depth) % CYCLES_MAX];
+        let overdue = sent_then > confirmed.saturating_add(self.missing);
+        self.overdue_cycles = if overdue { self.overdue_cycles.saturating_add(1) } else { 0 };
+        self.queued_cycles =
+            if overdue && seen.queued == Some(true) { self.queued_cycles.saturating_add(1) } else { 0 };
+        let found = if overdue { self.explain(confirmed > confirmed_then, depth, seen) } else { Overdue::No };
+        self.behind_cycles = self.behind_cycles.saturating_sub(1);
+        if seen.more || seen.overflowed != self.overflowed || found == Overdue::Unread {
+            self.behind_cycles = 2 * depth;
+        }
+        self.overflowed = seen.overflowed;
+        found
+    }
+
+    /// Why frames are overdue. `some_came` tells that others came back meanwhile.
+    fn explain(&mut self, some_came: bool, depth: usize, seen: BusActivity) -> Overdue {
+        // A bus that is nearly full still holds some of the last cycle's frames when the next one begins.
+        if usize::try_from(self.queued_cycles).is_ok_and(|cycles| cycles >= depth) {
+            return Overdue::Unconfirmed;
+        }
+        if seen.more {
+            // They may be among those that wait to be read.
+            let long = usize::try_from(self.overdue_cycles).is_ok_and(|cycles| cycles > depth);
+            return if long { Overdue::Unread } else { Overdue::No };
+        }
+        match (seen.from_wire, seen.queued) {
+            (true, Some(_)) if !some_came => Overdue::Unconfirmed,
+            // The queue is asked first, before the next cycle's frames are in it.
+            (true, None | Some(true)) => Overdue::No,
+            (true, Some(false)) | (false, _) => {
+                self.missing = self.sent.saturating_sub(seen.confirmed.unwrap_or(self.sent));
+                Overdue::Unread
+            }
+        }
+    }
+
+    /// Frames handed over that may still come back.
+    fn in_flight(&self) -> u64 {
+        let (sent, confirmed) = self.history[self.slot];
+        sent.saturating_sub(confirmed).saturating_sub(self.missing)
+    }
 }
 
 impl Health {
@@ -71,9 +173,7 @@ impl Health {
             consecutive_lost: 0,
             failed: None,
             passive: false,
-            sent: 0,
-            history: [0; CYCLES_MAX],
-            slot: 0,
+            echoes: Echoes::NONE,
             newest_error: ErrorFrame::default(),
             error_frames: 0,
         }
@@ -82,6 +182,11 @@ impl Health {
     /// Nothing may leave but torque off.
     pub(crate) fn is_silent(&self) -> bool {
         self.failed.is_some()
+    }
+
+    /// Whether frames are overdue: then [`BusActivity::queued`] is worth a system call.
+    pub(crate) fn asks_for_queue(&self) -> bool {
+        self.echoes.overdue_cycles > 0
     }
 
     /// Why, once it has failed.
@@ -117,27 +222,26 @@ impl Health {
     ///
     /// Real time: arithmetic only.
     pub(crate) fn evaluate(&mut self, seen: BusActivity, found: &mut BusState) {
-        self.sent = self.sent.saturating_add(u64::from(found.sent));
-        let confirmed = seen.confirmed.unwrap_or(self.sent);
         let complete = found.sent == found.requested;
         self.consecutive_lost = if complete { 0 } else { self.consecutive_lost.saturating_add(1) };
-        // What was sent so many cycles ago and is not confirmed now is as good as lost.
-        let depth = self.tolerance.unconfirmed_cycles;
-        self.slot = (self.slot + 1) % CYCLES_MAX;
-        self.history[self.slot] = self.sent;
-        let overdue = self.history[(self.slot + CYCLES_MAX - depth) % CYCLES_MAX] > confirmed;
+        let overdue = self.echoes.observe(found.sent, self.tolerance.unconfirmed_cycles, seen);
+        let unread_at_length = overdue == Overdue::Unread && seen.more;
         match found.fault {
             Some(LinkFault::Gone) => self.fail(BusFault::Gone),
             Some(LinkFault::Down) => self.fail(BusFault::Down),
             Some(LinkFault::QueueFull) if self.is_lost(seen) => self.fail(BusFault::QueueFull),
             Some(LinkFault::Os(_)) if self.is_lost(seen) => self.fail(BusFault::System),
-            Some(LinkFault::QueueFull | LinkFault::Os(_)) | None if overdue && seen.live => {
+            Some(LinkFault::QueueFull | LinkFault::Os(_)) | None
+                if overdue == Overdue::Unconfirmed && seen.live =>
+            {
                 self.fail(BusFault::Unconfirmed);
             }
             Some(LinkFault::QueueFull | LinkFault::Os(_)) | None => {}
         }
         found.consecutive_lost = self.consecutive_lost;
-        found.in_flight = u32::try_from(self.sent.saturating_sub(confirmed)).unwrap_or(u32::MAX);
+        found.in_flight = u32::try_from(self.echoes.in_flight()).unwrap_or(u32::MAX);
+        (found.echoes_missing, found.overflowed) = (self.echoes.missing, self.echoes.overflowed);
+        (found.receive_behind, found.unread) = (self.echoes.behind_cycles > 0, unread_at_length);
         found.failed = self.failed;
         found.passive = self.passive;
         (found.newest_error, found.error_frames) = (self.newest_error, self.error_frames);
@@ -160,7 +264,11 @@ impl Health {
 /// How much a trouble tells of its cause.
 fn severity(bus_fault: BusFault) -> u8 {
     match bus_fault {
-        BusFault::QueueFull | BusFault::Unconfirmed | BusFault::System | BusFault::ErrorPassive => 0,
+        BusFault::QueueFull
+        | BusFault::Unconfirmed
+        | BusFault::System
+        | BusFault::ErrorPassive
+        | BusFault::ReceiveBehind => 0,
         BusFault::Down | BusFault::BusOff | BusFault::Restarted => 1,
         BusFault::Gone => 2,
     }

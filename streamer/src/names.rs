@@ -85,6 +85,10 @@ impl Names {
         let count = match bus_fault {
             BusFault::QueueFull | BusFault::System => format!(" for {} cycles in a row", cause.value),
             BusFault::Unconfirmed => format!(", {} in flight", cause.value),
+            BusFault::ReceiveBehind if cause.limit > 0.0 => {
+                format!(": no feedback was read for {:.6} s, {:.6} s are tolerated", cause.value, cause.limit)
+            }
+            BusFault::ReceiveBehind => format!(", {} of its own are unread", cause.value),
             BusFault::Down
             | BusFault::Gone
             | BusFault::BusOff

@@ -149,17 +149,17 @@ mod tests {
     /// The table as the documentation draws it, one line a phase, written independently of the match above.
     const TABLE: &str = "
         configuring: DrivesReady>disabled HoldAdopted>locked HardFault>fault
-        disabled: DrivesLost>configuring HoldAdopted>locked EnableAsked>enabling HardFault>fault
-        enabling: DrivesEnabled>holding DisableAsked>disabling StopFault>fault HardFault>fault
-        holding: Accepted>moving DisableAsked>disabling StopFault>fault HardFault>fault
-        moving: EndReached>holding PauseAsked>pausing StopAsked>stopping StalledLong>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
-        pausing: EndReached>holding ResumeAsked>moving StopAsked>stopping AtRest>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
-        paused: ResumeAsked>moving StopAsked>holding DisableAsked>disabling StopFault>fault HardFault>fault
+        disabled: DrivesLost>configuring HoldAdopted>locked EnableRequested>enabling HardFault>fault
+        enabling: DrivesEnabled>holding DisableRequested>disabling StopFault>fault HardFault>fault
+        holding: Accepted>moving DisableRequested>disabling StopFault>fault HardFault>fault
+        moving: EndReached>holding PauseRequested>pausing StopRequested>stopping StalledLong>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
+        pausing: EndReached>holding ResumeRequested>moving StopRequested>stopping AtRest>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
+        paused: ResumeRequested>moving StopRequested>holding DisableRequested>disabling StopFault>fault HardFault>fault
         stopping: EndReached>holding AtRest>holding StopFault>fast-stopping GuardTrip>braking HardFault>fault
         fast-stopping: EndReached>fault AtRest>fault GuardTrip>braking HardFault>fault
         braking: AtRest>fault HardFault>fault
         fault: ClearedHolding>locked ClearedOff>disabled
-        locked: EnableAsked>holding TakeOverAsked>enabling DisableAsked>disabling StopFault>fault HardFault>fault
+        locked: EnableRequested>holding AdoptRequested>enabling DisableRequested>disabling StopFault>fault HardFault>fault
         disabling: DrivesDisabled>disabled HardFault>fault";
 
     fn drawn(phase: Phase, event: Event) -> Option<&'static str> {

@@ -384,6 +384,7 @@ impl Reporter {
             bus.bus_fault = found.failed.or(passive).map_or(0, BusFault::code);
             bus.silent = u32::from(found.failed.is_some());
             bus.in_flight = found.in_flight;
+            (bus.receive_lost, bus.echoes_missing) = (found.overflowed, found.echoes_missing);
             (bus.error_class, bus.error_data) = (found.newest_error.class, found.newest_error.data);
         }
         r.energised = u32::from(cycle_state.servos.iter().take(joints).any(|s| is_energised(s.state)));

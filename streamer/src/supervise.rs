@@ -410,7 +410,7 @@ impl Supervisor {
                 let sag_rad = (servo.position_rad - servo.hold_position_rad).abs();
                 let limit = rules.tracking_error_rad_max;
                 let far = Cause::new(FaultReason::TrackingError).at_joint(joint).amount(sag_rad, limit);
-                let late = self.watch.late_cause(joint);
+                let late = self.watch.late_cause(cycle_state, joint);
                 late.or_else(|| (sag_rad.is_nan() || sag_rad > limit).then_some(far))
             }
             DriveState::Absent

@@ -4,7 +4,7 @@
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
 //! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
 //! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
-use crate::cycle_state::{Cause, CycleState};
+use crate::cycle_state::{BUSES_MAX, BusState, Cause, CycleState};
 use taustream_arm::Settings;
 use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};
 use taustream_drivers::{DriveState, Nanos};
@@ -61,6 +61,8 @@ pub struct Watch {
     joints: usize,
     velocity_rad_s_max: JointArray,
     period_s: f64,
+    /// Index of each joint's bus.
+    bus_of: [usize; MAX_JOINTS],
     /// Cycles from a command to the measured position that answers it, by joint.
     transport_cycles: [usize; MAX_JOINTS],
     commands_rad: [JointArray; COMMANDS],
@@ -81,6 +83,7 @@ impl Watch {
             joints: settings.robot.joints.len(),
             velocity_rad_s_max: settings.robot.limits().map(|l| l.stop.velocity_rad_s),
             period_s: f64::from(settings.cycle.period_us) * 1e-6,
+            bus_of: bus_of(settings),
             transport_cycles: transport_cycles(settings),
             commands_rad: [[0.0; MAX_JOINTS]; COMMANDS],
             answers: [Answers::NONE; MAX_JOINTS],
@@ -149,7 +152,9 @@ impl Watch {
     pub fn find_cause(&self, cycle_state: &CycleState, enabling: bool) -> Option<Cause> {
         self.bus_cause(cycle_state).or_else(|| {
             (0..self.joints).find_map(|joint| {
-                drive_cause(cycle_state, joint, enabling).or_else(|| self.feedback_cause(joint))
+                let cause =
+                    drive_cause(cycle_state, joint, enabling).or_else(|| self.feedback_cause(joint))?;
+                Some(self.blame_receive_path(cycle_state, cause))
             })
         })
     }
@@ -159,10 +164,32 @@ impl Watch {
     pub fn bus_cause(&self, cycle_state: &CycleState) -> Option<Cause> {
         cycle_state.failed_bus().map(|(bus, bus_fault)| self.failed(cycle_state, bus, bus_fault)).or_else(
             || {
-                let bus = cycle_state.buses.iter().position(|b| b.passive)?;
-                Some(Cause::bus(bus, BusFault::ErrorPassive, 0.0, 0.0))
+                let found = |test: fn(&BusState) -> bool| cycle_state.buses.iter().position(test);
+                let passive = found(|b| b.passive).map(|bus| (bus, BusFault::ErrorPassive));
+                let (bus, bus_fault) =
+                    passive.or_else(|| found(|b| b.unread).map(|bus| (bus, BusFault::ReceiveBehind)))?;
+                Some(self.failed(cycle_state, bus, bus_fault))
             },
         )
+    }
+
+    /// Feedback that is late from all joints of a bus whose frames this computer reads too late is no fault of the
+    /// drives or of the bus.
+    fn blame_receive_path(&self, cycle_state: &CycleState, cause: Cause) -> Cause {
+        let late = |joint: usize| self.no_feedback_s(joint) > 0.5 * cause.limit;
+        let bus = cause.joint.and_then(|joint| self.bus_of.get(joint)).copied().unwrap_or(BUSES_MAX);
+        let all_late = || self.bus_of.iter().take(self.joints).enumerate().all(|(j, b)| *b != bus || late(j));
+        let behind = cycle_state.buses.get(bus).is_some_and(|found| found.receive_behind);
+        if cause.reason != FaultReason::FeedbackLate || !behind || !all_late() {
+            return cause;
+        }
+        Cause { joint: cause.joint, ..Cause::bus(bus, BusFault::ReceiveBehind, cause.value, cause.limit) }
+    }
+
+    /// For how long nothing was heard of a joint while the loop ran, s.
+    fn no_feedback_s(&self, joint: usize) -> f64 {
+        let answer = self.answers.get(joint).filter(|answer| answer.received.is_some());
+        answer.map_or(f64::INFINITY, |answer| self.attended_s - answer.attended_s)
     }
 
     /// The cause that a failed bus is, with what was counted.
@@ -173,7 +200,9 @@ impl Watch {
             BusFault::QueueFull | BusFault::System => {
                 Cause::bus(bus, bus_fault, f64::from(found.consecutive_lost), limit)
             }
-            BusFault::Unconfirmed => Cause::bus(bus, bus_fault, f64::from(found.in_flight), 0.0),
+            BusFault::Unconfirmed | BusFault::ReceiveBehind => {
+                Cause::bus(bus, bus_fault, f64::from(found.in_flight), 0.0)
+            }
             BusFault::Down
             | BusFault::Gone
             | BusFault::BusOff
@@ -187,9 +216,8 @@ impl Watch {
     pub fn feedback_cause(&self, joint: usize) -> Option<Cause> {
         let answer = self.answers.get(joint)?;
         let rules = &self.rules;
-        let no_feedback_s = answer.received.map_or(f64::INFINITY, |_| self.attended_s - answer.attended_s);
         let checks = [
-            (FaultReason::FeedbackLate, no_feedback_s, rules.feedback_age_s_max),
+            (FaultReason::FeedbackLate, self.no_feedback_s(joint), rules.feedback_age_s_max),
             (FaultReason::PositionJump, answer.jump_rad, answer.jump_limit_rad),
             (FaultReason::TrackingError, answer.tracking_rad, rules.tracking_error_rad_max),
         ];
@@ -200,8 +228,9 @@ impl Watch {
 
     /// Feedback of one joint that is late or jumps; for a drive that follows no commands of ours.
     #[must_use]
-    pub(crate) fn late_cause(&self, joint: usize) -> Option<Cause> {
-        self.feedback_cause(joint).filter(|cause| cause.reason != FaultReason::TrackingError)
+    pub(crate) fn late_cause(&self, cycle_state: &CycleState, joint: usize) -> Option<Cause> {
+        let cause = self.feedback_cause(joint).filter(|cause| cause.reason != FaultReason::TrackingError)?;
+        Some(self.blame_receive_path(cycle_state, cause))
     }
 
     /// Why a drive is not where it should be.
@@ -250,6 +279,17 @@ impl Watch {
     pub fn tracking_rad(&self) -> (JointArray, JointArray) {
         (self.answers.map(|a| a.tracking_rad), self.answers.map(|a| a.tracking_rad_max))
     }
+}
+
+/// Index of each joint's bus.
+fn bus_of(settings: &Settings) -> [usize; MAX_JOINTS] {
+    let mut buses = [BUSES_MAX; MAX_JOINTS];
+    for servo in &settings.servos {
+        if let Some(slot) = buses.get_mut(servo.joint) {
+            *slot = servo.bus;
+        }
+    }
+    buses
 }
 
 /// Cycles from a command to the position that answers it, by joint.

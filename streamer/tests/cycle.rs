@@ -16,6 +16,8 @@ mod harness;
 mod motion;
 #[path = "cycle_suite/power.rs"]
 mod power;
+#[path = "cycle_suite/receive_path.rs"]
+mod receive_path;
 #[path = "cycle_suite/trust.rs"]
 mod trust;
 

@@ -65,6 +65,8 @@ struct BusStatus {
     frames_received: u64,
     cycles_lost: u64,
     in_flight: u32,
+    receive_lost: u64,
+    echoes_missing: u64,
     error_frames: u64,
     /// What the newest error frame says; null when there was none.
     newest_error: Option<String>,
@@ -225,6 +227,8 @@ fn buses(r: &Report, arm: &ArmName) -> Vec<BusStatus> {
             frames_received: bus.frames_received,
             cycles_lost: bus.cycles_lost,
             in_flight: bus.in_flight,
+            receive_lost: bus.receive_lost,
+            echoes_missing: bus.echoes_missing,
             error_frames: bus.error_frames,
             newest_error: (bus.error_frames > 0).then(|| error.sentence()),
         }
@@ -258,6 +262,31 @@ impl Status {
         }
         if let Some(pause) = &self.paused {
             writeln!(f, "{}", pause.message)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for BusStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "bus {} ({}): {}; {} sent, {} lost in {} cycles, {} received, {} in flight",
+            self.name,
+            self.interface,
+            self.state,
+            self.frames_sent,
+            self.frames_lost,
+            self.cycles_lost,
+            self.frames_received,
+            self.in_flight
+        )?;
+        if self.receive_lost + self.echoes_missing > 0 {
+            writeln!(
+                f,
+                "  this computer read too slowly: {} frames were lost in receiving, {} of its own did not come back",
+                self.receive_lost, self.echoes_missing
+            )?;
         }
         Ok(())
     }
@@ -300,18 +329,7 @@ impl fmt::Display for Status {
             )?;
         }
         for b in &self.buses {
-            writeln!(
-                f,
-                "bus {} ({}): {}; {} sent, {} lost in {} cycles, {} received, {} in flight",
-                b.name,
-                b.interface,
-                b.state,
-                b.frames_sent,
-                b.frames_lost,
-                b.cycles_lost,
-                b.frames_received,
-                b.in_flight
-            )?;
+            write!(f, "{b}")?;
         }
         writeln!(
             f,

@@ -50,6 +50,15 @@ pub(super) fn send(socket: BorrowedFd<'_>, frames: &[CanFrame]) -> Sent {
     Sent { count, fault }
 }
 
+/// Whose socket it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SocketKind {
+    /// `CAN_RAW`: the kernel counts what it had to drop.
+    Can,
+    /// `SOCK_SEQPACKET` of the local link.
+    Local,
+}
+
 /// What one call took from a socket.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Received {
@@ -57,6 +66,9 @@ pub(super) struct Received {
     pub(super) frames: usize,
     /// This socket's own frames, come back when they were on the wire. They never enter the batch.
     pub(super) confirmed: u64,
+    /// The kernel's count of packets that found this socket's receive buffer full, where a packet carried it. It counts
+    /// from the opening of the socket and wraps.
+    pub(super) dropped: Option<u32>,
 }
 
 /// How a packet came.
@@ -64,6 +76,7 @@ pub(super) struct Received {
 struct Packet {
     size: usize,
     own: bool,
+    dropped: Option<u32>,
 }
 
 /// Replaces the batch by what has arrived, oldest first. Packets that are no frames by their size are left out, and
@@ -71,17 +84,22 @@ struct Packet {
 /// before it, else by the next call.
 ///
 /// Real time: one system call, never waits.
-pub(super) fn receive(socket: BorrowedFd<'_>, into: &mut FrameBatch) -> Result<Received, LinkFault> {
+pub(super) fn receive(
+    socket: BorrowedFd<'_>,
+    kind: SocketKind,
+    into: &mut FrameBatch,
+) -> Result<Received, LinkFault> {
     into.clear();
     let mut packets = [Packet::default(); BATCH_MAX];
-    let taken = match receive_some(socket, into.slots(), &mut packets) {
+    let taken = match receive_some((socket, kind), into.slots(), &mut packets) {
         Ok(taken) => taken,
         Err(libc::EAGAIN | libc::EINTR) => return Ok(Received::default()),
         Err(errno) => return Err(fault_of(errno)),
     };
     let slots = into.slots();
-    let (mut count, mut confirmed) = (0, 0);
-    for (from, Packet { size, own }) in packets.iter().take(taken).copied().enumerate() {
+    let (mut count, mut confirmed, mut newest_dropped) = (0, 0, None);
+    for (from, Packet { size, own, dropped }) in packets.iter().take(taken).copied().enumerate() {
+        newest_dropped = dropped.or(newest_dropped);
         if own {
             confirmed += 1;
             continue;
@@ -100,7 +118,7 @@ pub(super) fn receive(socket: BorrowedFd<'_>, into: &mut FrameBatch) -> Result<R
     }
     into.set_count(count);
     into.set_more(taken == BATCH_MAX);
-    Ok(Received { frames: count, confirmed })
+    Ok(Received { frames: count, confirmed, dropped: newest_dropped })
 }
 
 /// Bytes of kernel memory that frames of this socket still hold: those that wait in the interface's queue. What a
@@ -174,34 +192,63 @@ fn send_some(socket: BorrowedFd<'_>, frames: &[CanFrame]) -> Result<usize, i32> 
 
 /// One `recvmmsg`: how many packets came (at least one) and how, or the errno.
 fn receive_some(
-    socket: BorrowedFd<'_>,
+    (socket, kind): (BorrowedFd<'_>, SocketKind),
     slots: &mut [CanFrame; BATCH_MAX],
     packets: &mut [Packet; BATCH_MAX],
 ) -> Result<usize, i32> {
     let (mut parts, mut headers) = empty_headers();
+    let mut controls = [Control::default(); BATCH_MAX];
     let mut requested: libc::c_uint = 0;
-    for ((part, header), slot) in parts.iter_mut().zip(headers.iter_mut()).zip(slots) {
+    let buffers = slots.iter_mut().zip(&mut controls);
+    for ((part, header), (slot, control)) in parts.iter_mut().zip(headers.iter_mut()).zip(buffers) {
         part.iov_base = (&raw mut *slot).cast();
         part.iov_len = FD_SIZE;
         header.msg_hdr.msg_iov = part;
         header.msg_hdr.msg_iovlen = 1;
+        // Only a CAN socket writes control messages of ours; a unix peer could hand descriptors over in them.
+        if kind == SocketKind::Can {
+            header.msg_hdr.msg_control = (&raw mut *control).cast();
+            header.msg_hdr.msg_controllen = size_of::<Control>();
+        }
         requested += 1;
     }
     // MSG_TRUNC: the true size of a packet that is too long, so that it is not taken for an FD frame.
     let flags = libc::MSG_DONTWAIT | libc::MSG_TRUNC;
     // SAFETY: each of the `requested` headers points at one live `iovec` of `parts`, which points at a whole slot of 72
-    // bytes, exclusively borrowed; any bytes make a valid `CanFrame` (integers without padding). The kernel writes
-    // no more than `iov_len` there, and the lengths into `headers`. The null time-out means none.
+    // bytes, exclusively borrowed; any bytes make a valid `CanFrame` (integers without padding). On a CAN socket each points
+    // at a live `Control` too, with its size. The kernel writes no more than `iov_len` and `msg_controllen` there, and the
+    // lengths into `headers`. The null time-out means none.
     let taken = unsafe {
         libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), requested, flags, std::ptr::null_mut())
     };
     let taken = usize::try_from(taken).map_err(|_| errno())?;
-    for (packet, header) in packets.iter_mut().zip(&headers).take(taken) {
+    for ((packet, header), control) in packets.iter_mut().zip(&headers).zip(&controls).take(taken) {
+        packet.dropped = control.dropped(header.msg_hdr.msg_controllen);
         packet.size = usize::try_from(header.msg_len).unwrap_or(usize::MAX);
         // can.rst: set on frames that this very socket has sent; MSG_DONTROUTE on those of any socket of this host.
         packet.own = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
     }
     Ok(taken)
+}
+
+/// One control message of 4 bytes: the header and the value of `SO_RXQ_OVFL`, aligned as the kernel wants it.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+struct Control {
+    length: usize,
+    level: libc::c_int,
+    kind: libc::c_int,
+    value: [u32; 2],
+}
+
+impl Control {
+    /// The count of dropped packets, when the kernel has written one into the first `written` bytes. It writes none while
+    /// nothing was dropped.
+    fn dropped(&self, written: usize) -> Option<u32> {
+        const LEAST: usize = std::mem::offset_of!(Control, value) + size_of::<u32>();
+        let is_count = self.level == libc::SOL_SOCKET && self.kind == libc::SO_RXQ_OVFL;
+        (written >= LEAST && self.length >= LEAST && is_count).then_some(self.value[0])
+    }
 }
 
 /// Headers that point at nothing.

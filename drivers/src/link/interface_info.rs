@@ -25,6 +25,8 @@ pub(super) struct InterfaceInfo {
     pub(super) is_can: bool,
     /// True when it is administratively up.
     pub(super) is_up: bool,
+    /// True when it hands back what was on the wire; without, the kernel hands back what the interface is given.
+    pub(super) echoes: bool,
     /// The driver's kind ("vcan", "vxcan", "can"), if it states one.
     pub(super) kind: Option<String>,
     /// Nominal bit rate, if the driver states one.
@@ -61,13 +63,9 @@ pub(super) fn of(interface: &str) -> Result<InterfaceInfo, OpenError> {
     // Drivers without a controller (vcan) state neither.
     let bitrate_bit_s = controller.as_ref().and_then(|c| c.bit_rate().ok().flatten());
     let state = controller.as_ref().and_then(|c| c.state().ok().flatten());
-    Ok(InterfaceInfo {
-        is_can,
-        is_up: info.ifi_flags().contains(Iff::UP),
-        kind: kind_of(info),
-        bitrate_bit_s,
-        state,
-    })
+    let flags = info.ifi_flags();
+    let (is_up, echoes) = (flags.contains(Iff::UP), flags.contains(Iff::ECHO));
+    Ok(InterfaceInfo { is_can, is_up, echoes, kind: kind_of(info), bitrate_bit_s, state })
 }
 
 /// The index of an interface.

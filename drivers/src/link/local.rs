@@ -3,6 +3,7 @@
 //! The simulated servos own a `SOCK_SEQPACKET` socket under the runtime directory; the master connects to it. Packets are
 //! frames at their kernel size, so both links share their hot path. Unlike a bus, it joins exactly two ends; like vcan,
 //! it has no bit rate, and frames that the servos send while no master is there are lost without a fault.
+use super::batch::SocketKind;
 use super::lock::FileLock;
 use super::open::{Holder, OpenError};
 use super::{CanLink, LinkFault, Sent, batch};
@@ -120,7 +121,7 @@ impl CanLink for LocalMaster {
 
     fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
         // What the servos sent before they went is still read: `gone` by a failed send does not stop it.
-        match batch::receive(self.peer.as_fd(), into) {
+        match batch::receive(self.peer.as_fd(), SocketKind::Local, into) {
             Ok(received) if received.frames == 0 && self.gone => Some(LinkFault::Gone),
             Ok(_) => None,
             Err(fault) => {
@@ -235,7 +236,7 @@ impl CanLink for LocalServos {
         into.clear();
         self.welcome();
         let master = self.master.as_ref()?;
-        match batch::receive(master.as_fd(), into) {
+        match batch::receive(master.as_fd(), SocketKind::Local, into) {
             Ok(_) => None,
             Err(LinkFault::Gone) => {
                 self.part();

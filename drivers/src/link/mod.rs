@@ -75,6 +75,25 @@ pub trait CanLink: Send {
         None
     }
 
+    /// Whether [`Self::confirmed`] counts what was on the wire. On an interface without an echo of its own it counts what
+    /// came back through this computer's receive path, and a frame that stays away says nothing about the bus.
+    fn confirms_from_wire(&self) -> bool {
+        true
+    }
+
+    /// Frames, own ones among them, that were lost because they arrived faster than they were read, since the link was
+    /// opened or reopened.
+    fn overflowed(&self) -> u64 {
+        0
+    }
+
+    /// Whether frames of this link still wait in the interface's queue; those in a controller's mailboxes do not count.
+    ///
+    /// Real time: at most one system call, never waits.
+    fn has_queued(&self) -> bool {
+        false
+    }
+
     /// After a fault: starts over on the interface, or the peer, that has come back. What was received before is
     /// forgotten, and frames that still wait to be sent are a refusal: they are old. The lock is kept all the while, so that
     /// no other master slips in. Harmless on a link that is well.

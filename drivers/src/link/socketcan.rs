@@ -1,5 +1,5 @@
 //! The kernel's CAN: a raw socket on an interface.
-use super::batch::{self, InterfaceName, Received};
+use super::batch::{self, InterfaceName, Received, SocketKind};
 use super::error_frame::ERROR_CLASSES;
 use super::interface_info::CanState;
 use super::lock::InterfaceLock;
@@ -27,6 +27,12 @@ pub(super) struct SocketCan {
     role: LinkRole,
     /// Own frames that came back.
     confirmed: u64,
+    /// The interface itself hands them back, when they were on the wire.
+    echoes: bool,
+    /// Packets that found the receive buffer full.
+    overflowed: u64,
+    /// The kernel's own count of them, which wraps.
+    overflow_count: u32,
     _lock: Option<InterfaceLock>,
 }
 
@@ -43,13 +49,30 @@ impl SocketCan {
             LinkRole::Master => Some(InterfaceLock::take(interface)?),
             LinkRole::Servos => None,
         };
-        let socket = open_socket(interface, role)?;
-        Ok(Self { bus: bus.clone(), socket, name, gone: false, down: false, role, confirmed: 0, _lock: lock })
+        let (socket, echoes) = open_socket(interface, role)?;
+        Ok(Self {
+            bus: bus.clone(),
+            socket,
+            name,
+            gone: false,
+            down: false,
+            role,
+            confirmed: 0,
+            echoes,
+            overflowed: 0,
+            overflow_count: 0,
+            _lock: lock,
+        })
     }
 
     fn take(&mut self, into: &mut FrameBatch) -> Result<(), LinkFault> {
-        let Received { frames: _, confirmed } = batch::receive(self.socket.as_fd(), into)?;
+        let Received { frames: _, confirmed, dropped } =
+            batch::receive(self.socket.as_fd(), SocketKind::Can, into)?;
         self.confirmed += confirmed;
+        if let Some(count) = dropped {
+            self.overflowed += u64::from(count.wrapping_sub(self.overflow_count));
+            self.overflow_count = count;
+        }
         Ok(())
     }
 
@@ -118,6 +141,19 @@ impl CanLink for SocketCan {
         (self.role == LinkRole::Master).then_some(self.confirmed)
     }
 
+    fn confirms_from_wire(&self) -> bool {
+        self.echoes
+    }
+
+    fn overflowed(&self) -> u64 {
+        self.overflowed
+    }
+
+    fn has_queued(&self) -> bool {
+        // A kernel that does not say is taken for one that holds nothing.
+        !self.gone && batch::queued_bytes(self.socket.as_fd()).is_ok_and(|bytes| bytes > 0)
+    }
+
     fn reopen(&mut self) -> Result<(), OpenError> {
         let interface = &self.bus.interface;
         check(&self.bus)?;
@@ -131,8 +167,9 @@ impl CanLink for SocketCan {
             }
         }
         // A new socket: the old one may be dead, and holds what was received before the fault.
-        self.socket = open_socket(interface, self.role)?;
+        (self.socket, self.echoes) = open_socket(interface, self.role)?;
         (self.gone, self.down, self.confirmed) = (false, false, 0);
+        (self.overflowed, self.overflow_count) = (0, 0);
         Ok(())
     }
 }
@@ -227,8 +264,8 @@ fn up_command(bus: &Bus) -> String {
 }
 
 /// Opens and sets up the socket: FD frames too, error frames, never waiting. A master's own frames come back to it as
-/// confirmations that they were on the wire.
-fn open_socket(interface: &str, role: LinkRole) -> Result<CanFdSocket, OpenError> {
+/// confirmations that they were on the wire, if the interface hands them back itself, which is told beside the socket.
+fn open_socket(interface: &str, role: LinkRole) -> Result<(CanFdSocket, bool), OpenError> {
     let failed = |doing| move |source| OpenError::System { interface: interface.to_owned(), doing, source };
     let socket = CanFdSocket::open(interface).map_err(failed("open"))?;
     socket.set_nonblocking(true).map_err(failed("set up"))?;
@@ -236,11 +273,12 @@ fn open_socket(interface: &str, role: LinkRole) -> Result<CanFdSocket, OpenError
     // Loopback to other sockets of this host stays on: recorders and simulators live there.
     socket.set_loopback(true).map_err(failed("set up"))?;
     socket.set_error_filter(ERROR_CLASSES).map_err(failed("set up"))?;
+    socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1).map_err(failed("set up"))?;
     // Beyond the host's limit only with CAP_NET_ADMIN; without it, as much as the limit gives.
     set_socket_recv_buffer_size_force(&socket, RECEIVE_BUFFER_BYTES)
         .or_else(|_| set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER_BYTES))
         .map_err(|errno| failed("set up")(errno.into()))?;
-    Ok(socket)
+    Ok((socket, interface_info::of(interface)?.echoes))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use taustream_drivers::{
     CanFrame, CanId, CanLink, DriveState, DriveTarget, FrameBatch, JointCommand, LinkFault, Nanos,
     ServoDriver, ServoStatus,
 };
-use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
+use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces, Report};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
@@ -49,6 +49,16 @@ pub struct World {
     pub error_state: u8,
     /// Frames that were taken come back as seen on the wire.
     pub confirms: bool,
+    /// They come back from the wire, not from the kernel in front of it.
+    pub from_wire: bool,
+    /// Of those that come back, so many are lost on the way.
+    pub echoes_lost: u64,
+    /// Frames of earlier cycles wait in the interface's queue.
+    pub queued: bool,
+    /// Frames that were lost in receiving.
+    pub overflowed: u64,
+    /// Frames keep coming faster than they are read, and none of them is new.
+    pub flooded: bool,
     /// A link that is reopened comes back.
     pub reopens: bool,
     /// Frames that left.
@@ -179,7 +189,7 @@ impl CanLink for FakeLink {
         into.clear();
         let mut world = self.0.lock().unwrap();
         if world.confirms {
-            world.confirmed = world.frames;
+            world.confirmed = world.frames - world.echoes_lost;
         }
         if let Some(class) = world.error_frame {
             into.push(CanFrame::classic(
@@ -187,7 +197,8 @@ impl CanLink for FakeLink {
                 &[0, world.error_state, 0, 0, 0, 0, 0, 0],
             ));
         }
-        if world.link_fault.is_none() {
+        into.set_more(world.flooded);
+        if world.link_fault.is_none() && !world.flooded {
             into.push(CanFrame::classic(CanId::standard(0x181), &[0; 6]));
         }
         world.link_fault.filter(|_| world.link_takes == 0)
@@ -199,12 +210,21 @@ impl CanLink for FakeLink {
         let world = self.0.lock().unwrap();
         Some(world.confirmed)
     }
+    fn confirms_from_wire(&self) -> bool {
+        self.0.lock().unwrap().from_wire
+    }
+    fn overflowed(&self) -> u64 {
+        self.0.lock().unwrap().overflowed
+    }
+    fn has_queued(&self) -> bool {
+        self.0.lock().unwrap().queued
+    }
     fn reopen(&mut self) -> Result<(), OpenError> {
         let mut world = self.0.lock().unwrap();
         if !world.reopens {
             return Err(OpenError::NotCan { interface: "scripted".into() });
         }
-        (world.frames, world.confirmed) = (0, 0);
+        (world.frames, world.confirmed, world.echoes_lost) = (0, 0, 0);
         Ok(())
     }
 }
@@ -219,6 +239,8 @@ pub struct CycleHarness {
     pub tick: u64,
     pub cycles: Vec<CycleRecord>,
     pub phases: Vec<(Phase, Phase)>,
+    /// The newest report.
+    pub report: Option<Report>,
     /// Notes of error frames.
     pub error_notes: u32,
     sequence: u64,
@@ -262,6 +284,11 @@ impl CycleHarness {
             error_frame: None,
             error_state: 0x20,
             confirms: true,
+            from_wire: true,
+            echoes_lost: 0,
+            queued: false,
+            overflowed: 0,
+            flooded: false,
             reopens: true,
             frames: 0,
             confirmed: 0,
@@ -295,6 +322,7 @@ impl CycleHarness {
             tick: 0,
             cycles: Vec::new(),
             phases: Vec::new(),
+            report: None,
             error_notes: 0,
             sequence: 0,
             generation: 0,
@@ -324,7 +352,9 @@ impl CycleHarness {
             }
         }
         while self.readers.timings.pop().is_some() {}
-        while self.readers.reports.pop().is_some() {}
+        while let Some(report) = self.readers.reports.pop() {
+            self.report = Some(report);
+        }
         while let Some(note) = self.readers.notes.pop() {
             self.error_notes += u32::from(matches!(note, Note::BusError { .. }));
         }
