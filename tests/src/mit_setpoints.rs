@@ -1,7 +1,7 @@
 //! The judge of a recording of Damiao motors in MIT mode: was every command on the bus the one that the log claims?
 //!
 //! It shares no packing with the product: bits are taken from the bytes by their printed places, and a value is right when
-//! it lies at most one step above what the bits say, as truncation leaves it. There is no SYNC on such a bus, so the log's
+//! it lies at most half a step from what the bits say. There is no SYNC on such a bus, so the log's
 //! count of frames tells which frames of the recording are a cycle's.
 //!
 //! For each cycle of the log: each motor has one frame; outside of enabling and faults that is a command with the whole
@@ -69,11 +69,11 @@ fn value(code: u32, count: u32, [low, high]: [f64; 2]) -> f64 {
     low + (high - low) / (f64::from(2_u32.pow(count)) - 1.0) * f64::from(code)
 }
 
-/// Whether `wanted` packs to this code: it lies in the step above it, or outside the range on its side.
+/// Whether `wanted` packs to this code: it lies within half a step of it, or outside the range on its side.
 fn packs(wanted: f64, code: u32, count: u32, [low, high]: [f64; 2]) -> bool {
     let step = (high - low) / (f64::from(2_u32.pow(count)) - 1.0);
-    let above = (wanted.clamp(low, high) - value(code, count, [low, high])) / step;
-    (-1e-6..1.0 + 1e-6).contains(&above)
+    let off = (wanted.clamp(low, high) - value(code, count, [low, high])) / step;
+    off.abs() <= 0.5 + 1e-6
 }
 
 /// One MIT command on the bus.

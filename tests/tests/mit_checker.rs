@@ -40,7 +40,7 @@ fn moves() -> Trajectory {
 )]
 fn code(value: f64, low: f64, high: f64, bits: u32) -> u64 {
     let top = 2_f64.powi(i32::try_from(bits).expect("few bits")) - 1.0;
-    ((value - low) * top / (high - low)).floor() as u64
+    ((value - low) * top / (high - low)).round() as u64
 }
 
 fn packed(position: f64, velocity: f64, gains: [f64; 2]) -> Vec<u8> {

@@ -35,10 +35,10 @@ fn requests_are_the_bytes_of_the_manual() {
 }
 
 #[test]
-fn mit_commands_pack_known_numbers_and_truncate() {
+fn mit_commands_pack_known_numbers_and_round_to_the_nearest() {
     let middle = MitCommand::default().encode(&DM4310).unwrap();
-    // Zero lies between two codes of a symmetric range; the lower one is sent. Gains of 0 are exact.
-    assert_eq!(middle, [0x7F, 0xFF, 0x7F, 0xF0, 0x00, 0x00, 0x07, 0xFF]);
+    // Zero lies between two codes of a symmetric range; the higher one is sent. Gains of 0 are exact.
+    assert_eq!(middle, [0x80, 0x00, 0x80, 0x00, 0x00, 0x00, 0x08, 0x00]);
     let ends = MitCommand {
         position_rad: 99.0,
         velocity_rad_s: -99.0,
@@ -48,11 +48,9 @@ fn mit_commands_pack_known_numbers_and_truncate() {
     };
     assert_eq!(ends.encode(&DM4310).unwrap(), [0xFF, 0xFF, 0x00, 0x0F, 0xFF, 0xFF, 0xF0, 0x00]);
     let below = Span::new(0.0, 4095.0, 12);
-    assert_eq!(
-        (below.encode(1.999_999), below.encode(2.0)),
-        (Some(1), Some(2)),
-        "truncated, never rounded up"
-    );
+    for (value, code) in [(1.499_999, 1), (1.5, 2), (1.999_999, 2), (2.499_999, 2), (4094.7, 4095)] {
+        assert_eq!(below.encode(value), Some(code), "{value}");
+    }
     for field in 0..5 {
         let mut numbers = [0.0; 5];
         numbers[field] = f64::NAN;
@@ -65,7 +63,8 @@ fn mit_commands_pack_known_numbers_and_truncate() {
 }
 
 #[test]
-fn decoded_values_lie_at_most_one_step_below_what_was_encoded() {
+fn decoded_values_lie_at_most_half_a_step_from_what_was_encoded_and_on_both_sides() {
+    let mut sides = [0_u32; 2];
     for seed in 0..20_000_u32 {
         let part =
             |shift: u32| f64::from(seed.wrapping_mul(2_654_435_761).rotate_left(shift)) / f64::from(u32::MAX);
@@ -84,8 +83,9 @@ fn decoded_values_lie_at_most_one_step_below_what_was_encoded() {
             (command.damping_nm_s_rad, back.damping_nm_s_rad, DM4310.damping),
             (command.torque_nm, back.torque_nm, DM4310.torque),
         ] {
-            let below = (sent - got) / span.step();
-            assert!((-1e-9..1.0 + 1e-9).contains(&below), "seed {seed}: {sent} came back as {got}");
+            let off_steps = (sent - got) / span.step();
+            assert!(off_steps.abs() <= 0.5 + 1e-9, "seed {seed}: {sent} came back as {got}");
+            sides[usize::from(off_steps > 0.0)] += 1;
         }
         let state = MitState {
             position_rad: command.position_rad,
@@ -98,6 +98,7 @@ fn decoded_values_lie_at_most_one_step_below_what_was_encoded() {
             + (received.torque_nm - back.torque_nm).abs();
         assert!(differs < 1e-12, "seed {seed}: commands and answers pack alike");
     }
+    assert!(sides.iter().all(|count| *count > 40_000), "one side is preferred: {sides:?}");
 }
 
 #[test]
