@@ -1,7 +1,7 @@
 //! Settings that only make sense together.
 //!
 //! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
-use crate::bus_load::{BusLoad, REFUSED_PERCENT};
+use crate::bus_load::{BusLoad, HEARTBEAT_MS, REFUSED_PERCENT};
 use crate::protocol::DamiaoMode;
 use crate::reader::FaultList;
 use crate::settings::{CycleSettings, Settings, Supervision, Traffic};
@@ -20,6 +20,15 @@ pub(crate) fn check_times(fault_list: &FaultList, cycle: &CycleSettings, supervi
     if stall_ms > watchdog_ms {
         let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
         fault_list.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
+    }
+    // A stall of ours is to be told as such before the drives count their master as lost. Its last heartbeat may have left
+    // a whole heartbeat's time before the stall.
+    let heartbeat_ms = watchdog_ms.saturating_add(u32::from(HEARTBEAT_MS));
+    if u32::from(cycle.heartbeat_lost_ms) <= heartbeat_ms {
+        let expected = format!(
+            "more than {heartbeat_ms} ms: drive_watchdog_ms = {watchdog_ms} and the {HEARTBEAT_MS} ms between two heartbeats"
+        );
+        fault_list.add(None, "cycle.heartbeat_lost_ms", &cycle.heartbeat_lost_ms.to_string(), &expected);
     }
     // Our own stop keeps the arm on its path; the drives' does not, so ours must come first.
     let lost_ms = f64::from(supervision.lost_cycles_max) * period_ms;

@@ -125,6 +125,8 @@ pub struct CycleSettings {
     pub stall_resume_ms: u32,
     /// Gap after which the drives' own watchdog has tripped.
     pub drive_watchdog_ms: u32,
+    /// Time without this master's heartbeat after which the drives count it as lost (CANopen: object 0x1016).
+    pub heartbeat_lost_ms: u16,
     /// `SCHED_FIFO` priority.
     pub priority: u8,
     /// CPU that the real-time thread is bound to; none: not bound.
@@ -179,6 +181,8 @@ pub struct Settings {
 mod default {
     /// One late cycle is bridged by every drive that interpolates; the design's number.
     pub(super) const TOLERATED_GAP_PERIODS: i64 = 2;
+    /// By how much the drives' heartbeat time is longer than their watchdog over setpoints.
+    pub(super) const HEARTBEAT_BEYOND_WATCHDOG_MS: i64 = 250;
     pub(super) const STALL_RESUME_MS: i64 = 20;
     /// Below the kernel's own threads for timers, above everything ordinary.
     pub(super) const PRIORITY: i64 = 80;
@@ -296,6 +300,7 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
     let gap = table.integer_or("tolerated_gap_periods", default::TOLERATED_GAP_PERIODS, 1, 100);
     let stall = table.integer_or("stall_resume_ms", default::STALL_RESUME_MS, 0, 10_000);
     let watchdog = table.integer("drive_watchdog_ms", 1, 10_000);
+    let heartbeat = table.has("heartbeat_lost_ms").then(|| table.integer("heartbeat_lost_ms", 1, 60_000));
     let priority = table.integer_or("priority", default::PRIORITY, 1, 99);
     let cpu = table.has("cpu").then(|| table.integer("cpu", 0, 1023));
     let report_rate_hz = table.number_or("report_rate_hz", default::REPORT_RATE_HZ, &RATE_HZ);
@@ -305,6 +310,11 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
         tolerated_gap_periods: u32::try_from(gap?).ok()?,
         stall_resume_ms: u32::try_from(stall?).ok()?,
         drive_watchdog_ms: u32::try_from(watchdog?).ok()?,
+        heartbeat_lost_ms: u16::try_from(match heartbeat {
+            Some(heartbeat) => heartbeat?,
+            None => watchdog?.saturating_add(default::HEARTBEAT_BEYOND_WATCHDOG_MS),
+        })
+        .ok()?,
         priority: u8::try_from(priority?).ok()?,
         cpu: match cpu {
             Some(cpu) => Some(usize::try_from(cpu?).ok()?),

@@ -2,7 +2,7 @@
 use crate::bring_up::explain;
 use crate::codec::cia402::{Cia402Driver, Cia402Error};
 use crate::codec::damiao::{DamiaoDriver, DamiaoError};
-use crate::frame::{CanFrame, FrameBatch};
+use crate::frame::{CanFrame, CanId, FrameBatch};
 use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
 use taustream_arm::{Protocol, Settings};
 use taustream_motion::MAX_JOINTS;
@@ -65,11 +65,6 @@ impl ServoDriver for BusDriver {
         &self.joints
     }
 
-    fn carries(&self, joint: usize) -> bool {
-        let driver = self.drivers.iter().find(|driver| driver.joints().contains(&joint));
-        driver.is_some_and(|driver| driver.carries(joint))
-    }
-
     fn status(&self, joint: usize) -> ServoStatus {
         let driver = self.drivers.iter().find(|driver| driver.joints().contains(&joint));
         driver.map_or(ServoStatus::UNKNOWN, |driver| driver.status(joint))
@@ -86,6 +81,10 @@ impl ServoDriver for BusDriver {
     fn set_zero(&mut self, joint: usize) -> Result<(), ZeroRefused> {
         let driver = self.drivers.iter_mut().find(|driver| driver.joints().contains(&joint));
         driver.map_or(Err(ZeroRefused::NoSuchJoint), |driver| driver.set_zero(joint))
+    }
+
+    fn other_master(&self) -> Option<CanId> {
+        self.drivers.iter().find_map(|driver| driver.other_master())
     }
 
     fn explain(&self, error_code: u32) -> String {

@@ -1,4 +1,5 @@
 //! CAN frames, classic and FD, in one fixed-size type.
+use taustream_motion::MAX_JOINTS;
 
 /// Flag of a remote request in [`CanId`].
 const REMOTE: u32 = 0x4000_0000;
@@ -145,10 +146,39 @@ const _: () = assert!(size_of::<CanFrame>() == FD_SIZE);
 /// Most frames that one bus sends, or hands over, in one cycle.
 pub const BATCH_MAX: usize = 64;
 
+/// Joints of an arm, by index.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JointSet(u16);
+
+impl JointSet {
+    /// No joint.
+    pub const EMPTY: Self = Self(0);
+
+    /// One joint; none for an index beyond [`MAX_JOINTS`].
+    #[must_use]
+    pub const fn of(joint: usize) -> Self {
+        if joint < MAX_JOINTS { Self(1 << joint) } else { Self::EMPTY }
+    }
+    /// The joints of both.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+    /// Whether a joint is in it.
+    #[must_use]
+    pub const fn contains(self, joint: usize) -> bool {
+        self.0 & Self::of(joint).0 != 0
+    }
+}
+
+const _: () = assert!(MAX_JOINTS <= 16, "a joint set has a bit for each joint");
+
 /// The frames of one cycle on one bus, in sending order. Fixed capacity, no allocation.
 #[derive(Clone, Debug)]
 pub struct FrameBatch {
     frames: [CanFrame; BATCH_MAX],
+    /// The joints whose setpoints each frame holds.
+    joints: [JointSet; BATCH_MAX],
     count: usize,
     more: bool,
 }
@@ -157,18 +187,36 @@ impl FrameBatch {
     /// Empty.
     #[must_use]
     pub fn new() -> Self {
-        Self { frames: [CanFrame::default(); BATCH_MAX], count: 0, more: false }
+        Self {
+            frames: [CanFrame::default(); BATCH_MAX],
+            joints: [JointSet::EMPTY; BATCH_MAX],
+            count: 0,
+            more: false,
+        }
     }
     /// Forgets all frames.
     pub fn clear(&mut self) {
         (self.count, self.more) = (0, false);
     }
-    /// Appends a frame; false when the batch is full.
+    /// Appends a frame without a setpoint; false when the batch is full.
     pub fn push(&mut self, frame: CanFrame) -> bool {
-        let Some(slot) = self.frames.get_mut(self.count) else { return false };
-        *slot = frame;
+        self.push_setpoints(frame, JointSet::EMPTY)
+    }
+    /// Appends a frame that holds the setpoints of `joints`; false when the batch is full.
+    pub fn push_setpoints(&mut self, frame: CanFrame, joints: JointSet) -> bool {
+        let at = self.count;
+        let (Some(slot), Some(set)) = (self.frames.get_mut(at), self.joints.get_mut(at)) else {
+            return false;
+        };
+        (*slot, *set) = (frame, joints);
         self.count += 1;
         true
+    }
+    /// The joints whose setpoints are in the first `count` frames.
+    #[must_use]
+    pub fn setpoints_in(&self, count: usize) -> JointSet {
+        let joints = self.joints.iter().take(count.min(self.count));
+        joints.fold(JointSet::EMPTY, |all, set| all.union(*set))
     }
     /// The frames.
     #[must_use]

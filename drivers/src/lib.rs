@@ -12,6 +12,6 @@ pub mod link;
 pub mod servo;
 pub mod sim;
 
-pub use frame::{CanFrame, CanId, FrameBatch};
+pub use frame::{CanFrame, CanId, FrameBatch, JointSet};
 pub use link::{CanLink, ErrorFrame, LinkFault};
 pub use servo::{DriveState, DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};

@@ -3,7 +3,7 @@
 //! A driver serves the joints of one bus that speak one protocol. It is pure: frames in, frames out, time as an
 //! argument. Bring-up (finding, configuring, energising) is a state machine inside the driver, advanced once a
 //! cycle by `encode`; the streamer only wishes and watches.
-use crate::frame::{CanFrame, FrameBatch};
+use crate::frame::{CanFrame, CanId, FrameBatch};
 use taustream_motion::MAX_JOINTS;
 
 /// `CLOCK_MONOTONIC` in nanoseconds.
@@ -112,6 +112,8 @@ pub struct ServoStatus {
     pub refused_object: u32,
     /// The drive warns.
     pub warning: bool,
+    /// The drive has stopped because it heard nothing of its master for too long.
+    pub lost_master: bool,
 }
 
 impl ServoStatus {
@@ -126,6 +128,7 @@ impl ServoStatus {
         error_code: 0,
         refused_object: 0,
         warning: false,
+        lost_master: false,
     };
 }
 
@@ -145,7 +148,8 @@ pub enum ZeroRefused {
 
 /// A protocol's master side for the joints of one bus.
 pub trait ServoDriver: Send {
-    /// Writes this cycle's frames, in sending order (SYNC first). `commands` is indexed by joint of the arm.
+    /// Writes this cycle's frames, in sending order (SYNC first). `commands` is indexed by joint of the arm; a frame that
+    /// holds commands is pushed with their joints ([`FrameBatch::push_setpoints`]).
     ///
     /// Real time: no allocation, no I/O, bounded work.
     fn encode(
@@ -163,14 +167,6 @@ pub trait ServoDriver: Send {
 
     /// The arm's joints that this driver serves.
     fn joints(&self) -> &[usize];
-
-    /// Whether the frames of the newest [`Self::encode`] hold the command of a joint of [`Self::joints`]; a driver
-    /// that sends every command in every cycle need not say so.
-    ///
-    /// Real time: no allocation.
-    fn carries(&self, _joint: usize) -> bool {
-        true
-    }
 
     /// What is known of a joint of [`Self::joints`]; [`ServoStatus::UNKNOWN`] for any other.
     fn status(&self, joint: usize) -> ServoStatus;
@@ -196,6 +192,13 @@ pub trait ServoDriver: Send {
     fn set_zero(&mut self, joint: usize) -> Result<(), ZeroRefused> {
         let _ = joint;
         Err(ZeroRefused::NotOffered)
+    }
+
+    /// The newest frame by which another master commands these drives, when it came less than half a second ago.
+    ///
+    /// Real time: arithmetic only.
+    fn other_master(&self) -> Option<CanId> {
+        None
     }
 
     /// The sentence for an error code of this protocol: "0x8611 following error too large".

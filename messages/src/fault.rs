@@ -109,11 +109,15 @@ pub enum BusFault {
     System = 8,
     /// Frames of the bus are received, but this computer reads them too late or loses them.
     ReceiveBehind = 9,
+    /// The queue took some frames of the cycles, and left out setpoints of a joint too often.
+    SetpointsLost = 10,
+    /// Frames that only a master sends came from elsewhere: SYNC, NMT commands, or setpoints of this arm's drives.
+    OtherMaster = 11,
 }
 
 impl BusFault {
     /// Every trouble.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::QueueFull,
         Self::Unconfirmed,
         Self::Down,
@@ -123,6 +127,8 @@ impl BusFault {
         Self::ErrorPassive,
         Self::System,
         Self::ReceiveBehind,
+        Self::SetpointsLost,
+        Self::OtherMaster,
     ];
     /// The code that stands in messages; 0 stands for none.
     #[must_use]
@@ -147,15 +153,20 @@ impl BusFault {
             Self::ErrorPassive => "controller is error-passive",
             Self::System => "operating system refuses its frames",
             Self::ReceiveBehind => "this computer reads its frames too late",
+            Self::SetpointsLost => "setpoints of a joint are lost (queue full)",
+            Self::OtherMaster => "another master commands the drives",
         }
     }
     /// What to do about it, before `clear-fault`.
     #[must_use]
     pub fn remedy(self, interface: &str) -> String {
         match self {
-            Self::QueueFull | Self::Unconfirmed => {
+            Self::QueueFull | Self::Unconfirmed | Self::SetpointsLost => {
                 "see that the drives are powered, the cable is whole, both ends are terminated and the bit rate is theirs"
                     .to_owned()
+            }
+            Self::OtherMaster => {
+                format!("find and end the other program or device: candump {interface} shows its frames")
             }
             Self::Down => format!("bring it up: ip link set {interface} up"),
             Self::Gone => "bring the interface (or the simulated servos of a local link) back".to_owned(),

@@ -121,10 +121,9 @@ impl Buses {
             (found.syncs, found.frames) = (bus.syncs, bus.frames);
             // Known before the commanded pose is: a bus that is silent has carried nothing.
             found.failed = bus.health.failed();
+            cycle_state.due = cycle_state.due.union(bus.outgoing.setpoints_in(frames.len()));
+            cycle_state.taken = cycle_state.taken.union(bus.outgoing.setpoints_in(taken.len()));
             for joint in bus.driver.joints() {
-                if let Some(not_sent) = cycle_state.not_sent.get_mut(*joint) {
-                    *not_sent = taken.is_empty() || !bus.driver.carries(*joint);
-                }
                 if let Some(out) = cycle_state.unreachable.get_mut(*joint) {
                     *out = found.failed.is_some();
                 }
@@ -159,6 +158,7 @@ impl Buses {
                 seen.overflowed = link.overflowed();
             }
             health.evaluate(seen, found);
+            found.other_master = driver.other_master();
             for joint in driver.joints() {
                 if let Some(servo) = cycle_state.servos.get_mut(*joint) {
                     *servo = driver.status(*joint);

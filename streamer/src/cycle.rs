@@ -7,6 +7,7 @@ use crate::buses::Buses;
 use crate::cycle_state::CycleState;
 use crate::guard::Guard;
 use crate::intake::{Answers, Handover, Intake};
+use crate::last_sent::Ledger;
 use crate::referencing::LastPoses;
 use crate::report::Reporter;
 use crate::supervise::{Actions, Supervisor};
@@ -87,6 +88,7 @@ impl Probe for NoProbe {
 #[derive(Debug)]
 pub struct Core {
     intake: Intake,
+    ledger: Ledger,
     track: Track,
     guard: Guard,
     buses: Buses,
@@ -103,6 +105,7 @@ impl Core {
         let (cycle, rules) = (&settings.cycle, &settings.supervision);
         Self {
             intake,
+            ledger: Ledger::new(settings),
             track: Track::new(&limits, joints, cycle, rules),
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
@@ -134,7 +137,7 @@ impl Core {
     }
 
     /// Carries out what the judgement asks of the other stages.
-    fn apply(&mut self, actions: &Actions) {
+    fn apply(&mut self, tick: Tick, actions: &Actions) {
         if let Some(order) = actions.speed {
             self.track.change_speed(order);
         }
@@ -142,9 +145,11 @@ impl Core {
             let spare = self.track.drop_trajectory();
             self.intake.recycle(spare);
             self.guard.release();
+            self.ledger.rest(tick.number);
         }
         if let Some(pose_rad) = &actions.pose_rad {
-            self.track.set_pose(pose_rad);
+            self.ledger.set_pose(pose_rad, tick.number);
+            self.track.restart();
         }
         if actions.clear_faults {
             self.buses.clear_faults();
@@ -183,20 +188,21 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     let restored = core.intake.reclaim(&mut cycle_state);
     probe.ended(Stage::Subscribe);
     let (phase, speed) = (core.supervisor.phase(), core.supervisor.speed());
-    let spare = core.track.splice(offer, phase, speed, &mut cycle_state);
+    let spare = core.track.splice(offer, (phase, speed), &core.ledger, &mut cycle_state);
     core.intake.recycle(spare);
     probe.ended(Stage::Splice);
-    let requested = core.track.sample(drive_target == DriveTarget::Enabled, &mut cycle_state);
+    core.ledger.find_stopped(&mut cycle_state);
+    let requested = core.track.sample(drive_target == DriveTarget::Enabled, &core.ledger, &mut cycle_state);
     probe.ended(Stage::Sample);
-    let command = core.guard.limit(&requested, &mut cycle_state); // The last gate before metal.
+    let command = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last gate before metal.
     probe.ended(Stage::Guard);
 
     let drive_commands = core.supervisor.referencing().to_drives(command.joints());
     core.buses.encode(tick.wake_time, drive_target, &drive_commands);
     probe.ended(Stage::Encode);
     core.buses.send(&mut cycle_state);
-    core.track.commit(&command.setpoint().position_rad, &mut cycle_state);
-    core.guard.commit(&cycle_state);
+    core.ledger.record(command.setpoint(), requested.restart, &mut cycle_state);
+    core.track.commit(&command.setpoint().position_rad, &core.ledger, &mut cycle_state);
     probe.ended(Stage::Send);
     core.buses.receive(tick.wake_time, &mut cycle_state);
     core.supervisor.referencing_mut().read(&mut cycle_state);
@@ -207,7 +213,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     probe.ended(Stage::Supervise);
     core.reporter.write(&cycle_state, &command, &core.track, (&core.supervisor, &actions));
     core.intake.answer(cycle_state.trajectory_result, &answers);
-    core.apply(&actions);
+    core.apply(tick, &actions);
     if let Some(back) = restored {
         core.buses.reclaim(back.links, back.recovered);
     }

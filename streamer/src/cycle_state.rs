@@ -1,7 +1,7 @@
 //! What one cycle has found out: every stage writes down what happened, `supervise` alone draws conclusions.
 use crate::phases::Event;
 use crate::tick::Tick;
-use taustream_drivers::{ErrorFrame, LinkFault, ServoStatus};
+use taustream_drivers::{CanId, ErrorFrame, JointSet, LinkFault, ServoStatus};
 pub use taustream_messages::{BUSES_MAX, Cause};
 use taustream_messages::{BusFault, Command, Phase};
 use taustream_motion::limits::Quantity;
@@ -127,6 +127,8 @@ pub struct BusState {
     pub receive_behind: bool,
     /// Frames have waited to be read for longer than feedback may take.
     pub unread: bool,
+    /// The newest frame by which another master commands drives of this arm, for half a second.
+    pub other_master: Option<CanId>,
     /// Whether frames of earlier cycles waited in the interface's queue; `None` when nobody asked.
     pub queued: Option<bool>,
     /// The newest error frame since start.
@@ -137,6 +139,17 @@ pub struct BusState {
     pub syncs: u64,
     /// Frames handed over so far.
     pub frames: u64,
+}
+
+/// Setpoints of one joint that were due and that the kernel did not take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LostSetpoints {
+    /// Zero-based joint.
+    pub joint: usize,
+    /// How many: in a row, or of the last 32.
+    pub count: u32,
+    /// How many of the last 32 may be lost; `None` when they were lost in a row, so that the drive has stopped.
+    pub tolerated: Option<u32>,
 }
 
 /// What became of starting the failed buses over.
@@ -204,11 +217,15 @@ pub struct CycleState {
     pub restored: Option<Restored>,
     /// Joints on failed buses: what is known of them is old, and no command reaches them.
     pub unreachable: [bool; MAX_JOINTS],
-    /// Joints whose setpoint did not leave: it was not their turn, or their bus took nothing.
-    pub not_sent: [bool; MAX_JOINTS],
+    /// Joints whose setpoints were to leave in this cycle.
+    pub due: JointSet,
+    /// Those of them whose setpoints the kernel took.
+    pub taken: JointSet,
+    /// A joint that lost more setpoints than its drive bridges.
+    pub lost: Option<LostSetpoints>,
     /// The drives, after receiving.
     pub servos: [ServoStatus; MAX_JOINTS],
-    /// Pose of the last setpoint that left.
+    /// What the joints were commanded last ([`crate::last_sent::Ledger::commanded_rad`]).
     pub commanded_rad: JointArray,
 }
 
@@ -236,7 +253,9 @@ impl CycleState {
             buses: [BusState::default(); BUSES_MAX],
             restored: None,
             unreachable: [false; MAX_JOINTS],
-            not_sent: [false; MAX_JOINTS],
+            due: JointSet::EMPTY,
+            taken: JointSet::EMPTY,
+            lost: None,
             servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
             commanded_rad: [0.0; MAX_JOINTS],
         }

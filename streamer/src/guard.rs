@@ -11,11 +11,12 @@
 //!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
 use crate::cycle_state::{Braking, CycleState, Trip, TripKind};
+use crate::last_sent::{LastSent, Ledger};
 use crate::track::RequestedSetpoint;
 use taustream_drivers::JointCommand;
 use taustream_motion::brake::{Brake, JointState};
 use taustream_motion::limits::Quantity;
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
+use taustream_motion::{JointLimits, MAX_JOINTS, Setpoint};
 
 /// Relative excess over a limit that is taken for rounding.
 const SLACK: f64 = 1e-3;
@@ -23,8 +24,6 @@ const SLACK: f64 = 1e-3;
 const POSITION_SLACK_RAD: f64 = 1e-6;
 /// Excess of a velocity, acceleration or jerk that is taken for rounding, in their SI units.
 const RATE_SLACK: f64 = 1e-3;
-/// Commands that the third difference needs besides the new one.
-const PAST: usize = 3;
 
 /// A command that has passed the guard. Only [`Guard`] makes one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,48 +61,36 @@ impl GuardedCommand {
     }
 }
 
-/// One joint's last commands, newest first, with the time to the one after each.
-#[derive(Clone, Copy, Debug, Default)]
-struct Past {
-    position_rad: [f64; PAST],
-    step_s: [f64; PAST],
-    /// Time since the newest of them at the last command that left for any joint.
-    waited_s: f64,
-}
-
 /// A joint's derivatives as the commands themselves show them.
 #[derive(Clone, Copy, Debug)]
 struct Differences {
     velocity_rad_s: f64,
     acceleration_rad_s2: f64,
     jerk_rad_s3: f64,
+    /// Time that the first difference spans.
+    step_s: f64,
     /// Time that the second difference spans.
     span_s: f64,
 }
 
-impl Past {
-    fn at_rest(position_rad: f64, period_s: f64) -> Self {
-        Self { position_rad: [position_rad; PAST], step_s: [period_s; PAST], waited_s: 0.0 }
-    }
-
-    fn differences(&self, position_rad: f64, step_s: f64) -> Differences {
-        let [q1, q2, q3] = self.position_rad;
-        let [h2, h3, _] = self.step_s;
-        let h1 = step_s;
-        let (v1, v2, v3) = ((position_rad - q1) / h1, (q1 - q2) / h2, (q2 - q3) / h3);
-        let (a1, a2) = (2.0 * (v1 - v2) / (h1 + h2), 2.0 * (v2 - v3) / (h2 + h3));
-        Differences {
-            velocity_rad_s: v1,
-            acceleration_rad_s2: a1,
-            jerk_rad_s3: 3.0 * (a1 - a2) / (h1 + h2 + h3),
-            span_s: h1 + h2,
-        }
-    }
-
-    fn push(&mut self, position_rad: f64, step_s: f64) {
-        let [q1, q2, _] = self.position_rad;
-        let [h1, h2, _] = self.step_s;
-        *self = Self { position_rad: [position_rad, q1, q2], step_s: [step_s, h1, h2], waited_s: 0.0 };
+/// The derivatives that a new position shows against the last three that were sent, `period_s` apart or more.
+fn differences(last: &LastSent, position_rad: f64, tick: u64, period_s: f64) -> Differences {
+    let seconds = |from: u64, to: u64| {
+        #[expect(clippy::cast_precision_loss, reason = "periods between two commands")]
+        let periods = to.saturating_sub(from).max(1) as f64;
+        periods * period_s
+    };
+    let [q1, q2, q3] = last.position_rad;
+    let [t1, t2, t3] = last.tick;
+    let (h1, h2, h3) = (seconds(t1, tick), seconds(t2, t1), seconds(t3, t2));
+    let (v1, v2, v3) = ((position_rad - q1) / h1, (q1 - q2) / h2, (q2 - q3) / h3);
+    let (a1, a2) = (2.0 * (v1 - v2) / (h1 + h2), 2.0 * (v2 - v3) / (h2 + h3));
+    Differences {
+        velocity_rad_s: v1,
+        acceleration_rad_s2: a1,
+        jerk_rad_s3: 3.0 * (a1 - a2) / (h1 + h2 + h3),
+        step_s: h1,
+        span_s: h1 + h2,
     }
 }
 
@@ -111,113 +98,71 @@ impl Past {
 #[derive(Clone, Copy, Debug)]
 struct Running {
     brakes: [Brake; MAX_JOINTS],
-    /// Time since the last good state, at the last command that left.
-    sent_s: f64,
+    /// The cycle in which each joint was commanded the state that its brake begins with.
+    begun: [u64; MAX_JOINTS],
 }
 
-/// The guard, with its memory of the commands that left.
+/// The guard.
 #[derive(Debug)]
 pub struct Guard {
     limits: [JointLimits; MAX_JOINTS],
     joints: usize,
     period_s: f64,
-    past: [Past; MAX_JOINTS],
-    good: Setpoint,
-    next: Setpoint,
-    next_step_s: f64,
-    restarted: bool,
     brake: Option<Running>,
 }
 
 impl Guard {
-    /// A guard that remembers the zero pose at rest.
+    /// A guard of an arm with these limits.
     #[must_use]
     pub fn new(limits: [JointLimits; MAX_JOINTS], joints: usize, period_us: u32) -> Self {
         let period_s = f64::from(period_us.max(1)) * 1e-6;
-        Self {
-            limits,
-            joints,
-            period_s,
-            past: [Past::at_rest(0.0, period_s); MAX_JOINTS],
-            good: Setpoint::default(),
-            next: Setpoint::default(),
-            next_step_s: period_s,
-            restarted: false,
-            brake: None,
-        }
+        Self { limits, joints, period_s, brake: None }
     }
 
     /// Lets a setpoint pass, or replaces it by a braking command and says why.
     ///
     /// Real time: closed forms, no allocation.
-    pub fn limit(&mut self, requested: &RequestedSetpoint, cycle_state: &mut CycleState) -> GuardedCommand {
-        #[expect(clippy::cast_precision_loss, reason = "periods between two commands")]
-        let step_s = requested.periods as f64 * self.period_s;
-        self.next_step_s = step_s;
-        self.restarted = requested.restart;
+    pub fn limit(
+        &mut self,
+        requested: &RequestedSetpoint,
+        ledger: &Ledger,
+        cycle_state: &mut CycleState,
+    ) -> GuardedCommand {
+        let tick = cycle_state.tick.number;
+        let mut past = *ledger.joints();
         if requested.restart && self.brake.is_none() {
-            self.remember_at_rest(&requested.setpoint.position_rad);
+            for (last, position_rad) in past.iter_mut().zip(&requested.setpoint.position_rad) {
+                // A pose that is not finite is none; the check of the setpoint itself will refuse it.
+                let at_rad = if position_rad.is_finite() { *position_rad } else { last.position_rad[0] };
+                *last = last.at_rest(at_rad, tick.saturating_sub(1));
+            }
         }
         if requested.live
             && self.brake.is_none()
-            && let Some(trip) = self.find_trip(requested, step_s)
+            && let Some(trip) = self.find_trip(requested, &past, tick)
         {
             cycle_state.trip = Some(trip);
-            self.brake = Some(self.begin_brake());
+            self.brake = Some(self.begin_brake(&past));
         }
-        self.next = match self.brake {
+        GuardedCommand::new(match self.brake {
             None => requested.setpoint,
-            Some(running) => self.braking_command(&running, step_s, cycle_state),
-        };
-        GuardedCommand::new(self.next)
+            Some(running) => self.braking_command(&running, ledger, cycle_state),
+        })
     }
 
-    /// Notes that the command has left.
+    /// Forgets a brake that has ended.
     ///
-    /// Real time: a copy.
-    pub fn commit(&mut self, cycle_state: &CycleState) {
-        if !cycle_state.setpoints_sent() {
-            return;
-        }
-        let joints = self.past.iter_mut().zip(self.next.position_rad).zip(cycle_state.not_sent);
-        for ((past, position_rad), not_sent) in joints {
-            if self.restarted {
-                *past = Past::at_rest(position_rad, self.period_s);
-            } else if not_sent {
-                past.waited_s += self.next_step_s;
-            } else {
-                past.push(position_rad, past.waited_s + self.next_step_s);
-            }
-        }
-        self.good = self.next;
-        if let Some(running) = &mut self.brake {
-            running.sent_s += self.next_step_s;
-        }
-    }
-
-    /// Forgets a brake that has ended; the last command is the pose at rest.
-    ///
-    /// Real time: a copy.
+    /// Real time: a store.
     pub fn release(&mut self) {
         self.brake = None;
-        let pose_rad = self.good.position_rad;
-        self.remember_at_rest(&pose_rad);
     }
 
-    fn remember_at_rest(&mut self, position_rad: &JointArray) {
-        // A pose that is not finite is no memory; the check of the setpoint itself will refuse it.
-        for ((past, good), position) in
-            self.past.iter_mut().zip(&mut self.good.position_rad).zip(position_rad)
-        {
-            if position.is_finite() {
-                *past = Past::at_rest(*position, self.period_s);
-                *good = *position;
-            }
-        }
-        self.good = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
-    }
-
-    fn find_trip(&self, requested: &RequestedSetpoint, step_s: f64) -> Option<Trip> {
+    fn find_trip(
+        &self,
+        requested: &RequestedSetpoint,
+        past: &[LastSent; MAX_JOINTS],
+        tick: u64,
+    ) -> Option<Trip> {
         let w = &requested.setpoint;
         let values = w.position_rad.iter().zip(&w.velocity_rad_s).zip(&w.acceleration_rad_s2);
         let states = values.map(|((position, velocity), acceleration)| JointState {
@@ -225,48 +170,52 @@ impl Guard {
             velocity_rad_s: *velocity,
             acceleration_rad_s2: *acceleration,
         });
-        let joints = states.zip(&self.past).zip(&self.limits).take(self.joints);
-        joints.enumerate().find_map(|(joint, ((state, past), limits))| {
-            let (kind, value, limit) = refuse(&state, past, limits, past.waited_s + step_s)?;
+        let joints = states.zip(past).zip(&self.limits).take(self.joints);
+        joints.enumerate().find_map(|(joint, ((state, last), limits))| {
+            let seen = differences(last, state.position_rad, tick, self.period_s);
+            let (kind, value, limit) = refuse(&state, last.position_rad[0], limits, &seen)?;
             Some(Trip { joint, kind, value, limit })
         })
     }
 
-    fn begin_brake(&self) -> Running {
+    /// Each joint brakes from the state that it was commanded last itself.
+    fn begin_brake(&self, past: &[LastSent; MAX_JOINTS]) -> Running {
         let mut brakes = [Brake::default(); MAX_JOINTS];
-        let g = &self.good;
-        let values = g.position_rad.iter().zip(&g.velocity_rad_s).zip(&g.acceleration_rad_s2);
-        for ((brake, ((position, velocity), acceleration)), limits) in
-            brakes.iter_mut().zip(values).zip(&self.limits)
-        {
+        for ((brake, last), limits) in brakes.iter_mut().zip(past).zip(&self.limits) {
             let start = JointState {
-                position_rad: *position,
-                velocity_rad_s: *velocity,
-                acceleration_rad_s2: *acceleration,
+                position_rad: last.position_rad[0],
+                velocity_rad_s: last.velocity_rad_s,
+                acceleration_rad_s2: last.acceleration_rad_s2,
             };
             *brake = Brake::from_state(start, limits.stop.acceleration_rad_s2, limits.stop.jerk_rad_s3);
         }
-        Running { brakes, sent_s: 0.0 }
+        Running { brakes, begun: past.map(|last| last.tick[0]) }
     }
 
-    fn braking_command(&self, running: &Running, step_s: f64, cycle_state: &mut CycleState) -> Setpoint {
+    fn braking_command(&self, running: &Running, ledger: &Ledger, cycle_state: &mut CycleState) -> Setpoint {
+        let mut setpoint = Setpoint { position_rad: ledger.position_rad(), ..Setpoint::default() };
         // Behind a stall the drives stand still at the last command: the brake is over there.
         if cycle_state.frozen {
             cycle_state.braking = Braking::Rested;
-            let position_rad = self.past.map(|past| past.position_rad[0]);
-            return Setpoint { position_rad, ..Setpoint::default() };
+            return setpoint;
         }
-        let now_s = running.sent_s + step_s;
-        let mut setpoint = Setpoint { position_rad: self.good.position_rad, ..Setpoint::default() };
+        let tick = cycle_state.tick.number;
         let mut rested = true;
-        for (joint, brake) in running.brakes.iter().enumerate().take(self.joints) {
+        let brakes = running.brakes.iter().zip(&running.begun).zip(ledger.joints());
+        for (joint, ((brake, begun), last)) in brakes.enumerate().take(self.joints) {
+            cycle_state.sweep_rad[joint] = brake.sweep_rad();
+            // A drive that has stopped for want of setpoints stands already.
+            if last.stopped {
+                continue;
+            }
+            #[expect(clippy::cast_precision_loss, reason = "periods of a brake")]
+            let now_s = tick.saturating_sub(*begun) as f64 * self.period_s;
             let (state, jerk_rad_s3) = brake.sample(now_s);
             rested &= now_s >= brake.duration_s();
             setpoint.position_rad[joint] = state.position_rad;
             setpoint.velocity_rad_s[joint] = state.velocity_rad_s;
             setpoint.acceleration_rad_s2[joint] = state.acceleration_rad_s2;
             setpoint.jerk_rad_s3[joint] = jerk_rad_s3;
-            cycle_state.sweep_rad[joint] = brake.sweep_rad();
         }
         cycle_state.braking = if rested { Braking::Rested } else { Braking::Running };
         cycle_state.trajectory_id = 0;
@@ -277,21 +226,20 @@ impl Guard {
 type Refusal = (TripKind, f64, f64);
 
 /// The first thing that is wrong with one joint's setpoint.
-fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) -> Option<Refusal> {
+fn refuse(state: &JointState, last_rad: f64, limits: &JointLimits, seen: &Differences) -> Option<Refusal> {
     let (q, v, a) = (state.position_rad, state.velocity_rad_s, state.acceleration_rad_s2);
     if let Some(value) = [q, v, a].into_iter().find(|x| !x.is_finite()) {
         return Some((TripKind::NotFinite, value, 0.0));
     }
     let [lowest, highest] = limits.position_rad;
     // A joint that rests outside its range (it was moved there by a brake, say) may stay; it may not move there.
-    let moved = (q - past.position_rad[0]).abs() > 0.0;
+    let moved = (q - last_rad).abs() > 0.0;
     if moved && q < lowest - POSITION_SLACK_RAD {
         return Some((TripKind::Limit(Quantity::Position), q, lowest));
     }
     if moved && q > highest + POSITION_SLACK_RAD {
         return Some((TripKind::Limit(Quantity::Position), q, highest));
     }
-    let seen = past.differences(q, step_s);
     let stop = &limits.stop;
     let beyond = |value: f64, limit: f64| value.abs() > limit * (1.0 + SLACK) + RATE_SLACK;
     for (quantity, value, limit) in [
@@ -306,7 +254,7 @@ fn refuse(state: &JointState, past: &Past, limits: &JointLimits, step_s: f64) ->
         }
     }
     // The state from which a brake would start must be the one that the commands show.
-    let lag_rad_s = stop.acceleration_rad_s2 * step_s;
+    let lag_rad_s = stop.acceleration_rad_s2 * seen.step_s;
     if beyond(v - seen.velocity_rad_s, lag_rad_s) {
         return Some((TripKind::Inconsistent(Quantity::Velocity), v, seen.velocity_rad_s));
     }
@@ -347,6 +295,7 @@ fn reach_rad(v: f64, a: f64, a_max: f64, j: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::tick::Tick;
+    use taustream_drivers::JointSet;
     use taustream_motion::LimitSet;
 
     const PERIOD_S: f64 = 1e-3;
@@ -393,20 +342,20 @@ mod tests {
         motion: impl Fn(f64) -> JointState,
         ticks: u32,
     ) -> Option<(u32, Trip)> {
-        let mut guard = Guard::new(limits(), 6, 1_000);
+        let (mut guard, mut ledger) = (Guard::new(limits(), 6, 1_000), Ledger::of_joints(6));
         (0..ticks).find_map(|tick| {
             let state = motion(f64::from(tick) * PERIOD_S);
-            let mut cycle_state = CycleState::begin(Tick::default());
-            cycle_state.not_sent[2] = !tick.is_multiple_of(every);
+            let mut cycle_state = CycleState::begin(Tick { number: u64::from(tick) + 10, ..Tick::default() });
+            let joints = if tick.is_multiple_of(every) { JointSet::of(2) } else { JointSet::EMPTY };
+            (cycle_state.due, cycle_state.taken) = (joints, joints);
             let mut setpoint = Setpoint::default();
             setpoint.position_rad[2] = state.position_rad;
             setpoint.velocity_rad_s[2] = state.velocity_rad_s;
             setpoint.acceleration_rad_s2[2] = state.acceleration_rad_s2;
-            guard.limit(
-                &RequestedSetpoint { setpoint, periods: 1, restart: tick == 0, live: true },
-                &mut cycle_state,
-            );
-            guard.commit(&cycle_state);
+            let restart = tick == 0;
+            let command =
+                guard.limit(&RequestedSetpoint { setpoint, restart, live: true }, &ledger, &mut cycle_state);
+            ledger.record(command.setpoint(), restart, &mut cycle_state);
             cycle_state.trip.map(|trip| (tick, trip))
         })
     }

@@ -268,7 +268,9 @@ fn severity(bus_fault: BusFault) -> u8 {
         | BusFault::Unconfirmed
         | BusFault::System
         | BusFault::ErrorPassive
-        | BusFault::ReceiveBehind => 0,
+        | BusFault::ReceiveBehind
+        | BusFault::OtherMaster
+        | BusFault::SetpointsLost => 0,
         BusFault::Down | BusFault::BusOff | BusFault::Restarted => 1,
         BusFault::Gone => 2,
     }

@@ -19,6 +19,7 @@ pub mod cycle_state;
 pub mod guard;
 mod health;
 pub mod intake;
+pub mod last_sent;
 pub mod log;
 pub mod names;
 mod operator;

@@ -88,6 +88,15 @@ impl Names {
             BusFault::ReceiveBehind if cause.limit > 0.0 => {
                 format!(": no feedback was read for {:.6} s, {:.6} s are tolerated", cause.value, cause.limit)
             }
+            BusFault::OtherMaster => {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an identifier")]
+                let id = cause.value as u32;
+                format!(" (identifier {id:#05X}), which is this arm's own")
+            }
+            BusFault::SetpointsLost if cause.limit > 0.0 => {
+                format!(": {} of its last 32, {} are tolerated", cause.value, cause.limit)
+            }
+            BusFault::SetpointsLost => format!(": {} in a row, more than its drive bridges", cause.value),
             BusFault::ReceiveBehind => format!(", {} of its own are unread", cause.value),
             BusFault::Down
             | BusFault::Gone

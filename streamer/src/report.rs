@@ -143,8 +143,6 @@ pub struct Reporter {
     records_lost: u64,
     last_running: Running,
     noted: [NotedBus; BUSES_MAX],
-    /// The last command of each joint that could reach it.
-    reached_rad: JointArray,
     counts: Report,
 }
 
@@ -202,7 +200,6 @@ impl Reporter {
             records_lost: 0,
             last_running: Running::default(),
             noted: [NotedBus::default(); BUSES_MAX],
-            reached_rad: [0.0; MAX_JOINTS],
             counts,
         }
     }
@@ -226,13 +223,6 @@ impl Reporter {
         let (supervisor, actions) = supervision;
         let stalls = self.stalls_now(cycle_state);
         self.count(cycle_state, stalls);
-        let joints =
-            self.reached_rad.iter_mut().zip(&cycle_state.commanded_rad).zip(&cycle_state.unreachable);
-        for ((reached_rad, commanded_rad), unreachable) in joints {
-            if !unreachable {
-                *reached_rad = *commanded_rad;
-            }
-        }
         if let Some(running) = track.running() {
             let duration_s = running.trajectory.duration_s();
             self.last_running =
@@ -348,7 +338,7 @@ impl Reporter {
                 sigma: cycle_state.scale.sigma,
                 position_rad: command.setpoint().position_rad,
                 off_path_rad: cycle_state.off_path_rad,
-                joint_sent: cycle_state.not_sent.map(|not_sent| !not_sent),
+                joint_sent: std::array::from_fn(|joint| cycle_state.taken.contains(joint)),
                 sent: cycle_state.buses.map(|b| b.sent),
                 lost: cycle_state.buses.map(|b| lost_frames(&b)),
             }));
@@ -393,7 +383,7 @@ impl Reporter {
         (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
         r.end_rad = track.running().map_or(cycle_state.commanded_rad, |t| t.trajectory.end_rad());
         (r.sigma, r.speed_percent) = (cycle_state.scale.sigma, supervisor.speed() * 100.0);
-        r.command_rad = self.reached_rad;
+        r.command_rad = cycle_state.commanded_rad;
         r.command_velocity_rad_s = setpoint.velocity_rad_s;
         r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
         r.command_jerk_rad_s3 = setpoint.jerk_rad_s3;

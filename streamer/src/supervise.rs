@@ -18,6 +18,8 @@ use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// How long the drives may take to come to rest after a stall before the arm stays paused, s.
 const STALL_REST_S: f64 = 1.0;
+/// How long after a stall a drive that has lost its master may say so, s: some tell by their next heartbeat but one.
+const STALL_BLAME_S: f64 = 1.0;
 /// How long leaving orderly may take: the longest ramp, the drives' time-out and a margin, s.
 const SHUTDOWN_S_MAX: f64 = 10.0;
 /// How long torque off is repeated before leaving at once, s.
@@ -48,6 +50,7 @@ pub struct Supervisor {
     pub(crate) rules: Supervision,
     pub(crate) limits: [JointLimits; MAX_JOINTS],
     pub(crate) joints: usize,
+    tolerated_s: f64,
     stall_resume_s: f64,
     watchdog_s: f64,
     pub(crate) watch: Watch,
@@ -69,6 +72,8 @@ pub struct Supervisor {
     stall_gap_s: f64,
     /// Why the arm is paused, or about to be.
     paused_by: Option<Pause>,
+    /// The newest gap that the drives do not bridge: when it ended, and how long it was, s.
+    stall: Option<(Nanos, f64)>,
     pub(crate) resetting_since: Option<Nanos>,
     /// Failed buses are being started over, for this `clear-fault`.
     pub(crate) restoring: Option<u64>,
@@ -87,6 +92,7 @@ impl Supervisor {
             rules: *rules,
             limits,
             joints,
+            tolerated_s: f64::from(cycle.tolerated_gap_periods) * f64::from(cycle.period_us) * 1e-6,
             stall_resume_s: f64::from(cycle.stall_resume_ms) * 1e-3,
             watchdog_s: f64::from(cycle.drive_watchdog_ms) * 1e-3,
             watch: Watch::new(settings),
@@ -102,6 +108,7 @@ impl Supervisor {
             stalled_since: None,
             stall_gap_s: 0.0,
             paused_by: None,
+            stall: None,
             resetting_since: None,
             restoring: None,
             shutting_down: Shutdown::No,
@@ -243,6 +250,7 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) {
+        let cause = self.blame_stall(cause, cycle_state);
         // Drives that were on their way to energised go back; drives that carry the arm hold.
         let requested = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep);
         let holds = requested && (self.phase != Phase::Enabling || self.adopted);
@@ -254,6 +262,18 @@ impl Supervisor {
         self.holds = holds && event != Event::HardFault;
         self.adopted &= self.holds;
         self.step(event, cycle_state, actions);
+    }
+
+    /// A drive that has stopped because its master was silent is not to blame when this loop has just stalled.
+    fn blame_stall(&self, cause: Cause, cycle_state: &CycleState) -> Cause {
+        let lost_master = |joint: usize| cycle_state.servos.get(joint).is_some_and(|servo| servo.lost_master);
+        let is_recent = |at: Nanos| cycle_state.tick.wake_time.since_s(at) <= STALL_BLAME_S;
+        match (cause.joint, self.stall) {
+            (Some(joint), Some((at, gap_s))) if lost_master(joint) && is_recent(at) => {
+                Cause::new(FaultReason::Stall).at_joint(joint).amount(gap_s, 0.0)
+            }
+            _ => cause,
+        }
     }
 
     fn evaluate_motion(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
@@ -280,7 +300,11 @@ impl Supervisor {
 
     /// Gaps beyond what the drives bridge (design section 4).
     fn evaluate_stall(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
-        let energised = self.drive_target() == DriveTarget::Enabled && self.phase != Phase::Fault;
+        let energised = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep)
+            && self.phase != Phase::Fault;
+        if cycle_state.gap_s > self.tolerated_s {
+            self.stall = Some((cycle_state.tick.wake_time, cycle_state.gap_s));
+        }
         if energised && cycle_state.gap_s > self.watchdog_s {
             let cause = Cause::new(FaultReason::Stall).amount(cycle_state.gap_s, self.watchdog_s);
             self.raise(Event::StopFault, cause, cycle_state, actions);

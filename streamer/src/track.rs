@@ -6,6 +6,7 @@
 use crate::approach::Approach;
 use crate::cycle_state::{CycleState, Decision, TrajectoryResult};
 use crate::intake::Boxed;
+use crate::last_sent::Ledger;
 use taustream_arm::settings::{CycleSettings, Supervision};
 use taustream_messages::Phase;
 use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
@@ -20,8 +21,6 @@ const AXIS_PERIODS_MAX: u64 = 60_000;
 pub struct RequestedSetpoint {
     /// The setpoint, its derivatives by real time.
     pub setpoint: Setpoint,
-    /// Periods since the last setpoint that left.
-    pub periods: u64,
     /// The drives stand still at this pose: earlier commands do not count.
     pub restart: bool,
     /// The drives follow what is commanded.
@@ -46,7 +45,6 @@ struct TrackState {
     axis: u64,
     /// Periods since the approach began.
     approach: u64,
-    position_rad: JointArray,
 }
 
 /// The trajectory that runs, or the pose that is held.
@@ -66,9 +64,6 @@ pub struct Track {
     newest_generation: u64,
     sent: TrackState,
     next: TrackState,
-    /// What each joint was last told; older than `sent` for one whose turn has not come, or whose bus is lost. When the
-    /// drives have come to stand, they stand there, and the approach brings the joints together again.
-    last_sent_rad: JointArray,
 }
 
 impl Track {
@@ -97,7 +92,6 @@ impl Track {
             newest_generation: 0,
             sent: TrackState::default(),
             next: TrackState::default(),
-            last_sent_rad: [0.0; MAX_JOINTS],
         }
     }
 
@@ -109,12 +103,13 @@ impl Track {
     pub fn splice(
         &mut self,
         offer: Option<Boxed>,
-        phase: Phase,
-        sigma: f64,
+        (phase, sigma): (Phase, f64),
+        ledger: &Ledger,
         cycle_state: &mut CycleState,
     ) -> Option<Boxed> {
         let offer = offer?;
-        let decision = self.decide(&offer, phase, cycle_state.tick.number);
+        let hold_position_rad = ledger.position_rad();
+        let decision = self.decide(&offer, phase, &hold_position_rad, cycle_state.tick.number);
         cycle_state.trajectory_result = Some(TrajectoryResult {
             trajectory_id: offer.trajectory_id,
             generation: offer.generation,
@@ -127,20 +122,20 @@ impl Track {
         self.cursor = Cursor::at_start(&offer.trajectory);
         self.scale = TimeScale::settled(sigma, self.ramp_s);
         (self.sent.s, self.sent.axis) = (0.0, 0);
-        self.approach = Approach::new(&self.sent.position_rad, offer.trajectory.base_rad(), self.ramp_s);
+        self.approach = Approach::new(&hold_position_rad, offer.trajectory.base_rad(), self.ramp_s);
         self.sent.approach = 0;
         (self.starting, self.restart) = (true, true);
         self.running.replace(offer)
     }
 
-    fn decide(&self, offer: &Boxed, phase: Phase, tick: u64) -> Decision {
+    fn decide(&self, offer: &Boxed, phase: Phase, hold_position_rad: &JointArray, tick: u64) -> Decision {
         if offer.generation <= self.newest_generation {
             return Decision::Stale { newest: self.newest_generation };
         }
         if phase != Phase::Holding {
             return Decision::NotReady { phase };
         }
-        let base = offer.trajectory.base_rad().iter().zip(&self.sent.position_rad);
+        let base = offer.trajectory.base_rad().iter().zip(hold_position_rad);
         for (joint, (base_rad, hold_position_rad)) in base.enumerate().take(self.joints) {
             let by_rad = (base_rad - hold_position_rad).abs();
             if by_rad.is_nan() || by_rad > self.base_tolerance_rad {
@@ -153,14 +148,14 @@ impl Track {
     /// The setpoint of this tick.
     ///
     /// Real time: touches only the strokes that run.
-    pub fn sample(&mut self, live: bool, cycle_state: &mut CycleState) -> RequestedSetpoint {
+    pub fn sample(&mut self, live: bool, ledger: &Ledger, cycle_state: &mut CycleState) -> RequestedSetpoint {
         let tick = cycle_state.tick.number;
         let periods = tick.saturating_sub(self.sent.tick).max(1);
         self.shorten_axis();
         cycle_state.gap_s = self.seconds(periods);
         cycle_state.live = live;
         self.next = TrackState { tick, ..self.sent };
-        let mut setpoint = Setpoint { position_rad: self.sent.position_rad, ..Setpoint::default() };
+        let mut setpoint = Setpoint { position_rad: ledger.position_rad(), ..Setpoint::default() };
         let mut restart = self.restart;
         if let Some(running) = &self.running {
             cycle_state.trajectory_id = running.trajectory_id;
@@ -168,11 +163,9 @@ impl Track {
                 self.scale = TimeScale::settled(0.0, self.ramp_s);
                 (self.sent.axis, self.next.axis) = (0, 0);
                 (cycle_state.frozen, restart) = (true, true);
-                self.sent.position_rad = self.last_sent_rad;
-                self.next.position_rad = self.sent.position_rad;
-                setpoint.position_rad = self.sent.position_rad;
+                // The drives stand where each was commanded last; the approach brings the joints together again.
                 let reached_rad = running.trajectory.sample(self.sent.s).position_rad;
-                self.approach = Approach::new(&self.sent.position_rad, &reached_rad, self.ramp_s);
+                self.approach = Approach::new(&setpoint.position_rad, &reached_rad, self.ramp_s);
                 (self.sent.approach, self.next.approach) = (0, 0);
             } else {
                 let step = if self.starting { 0 } else { periods };
@@ -186,14 +179,14 @@ impl Track {
                 setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), cycle_state.scale);
                 cycle_state.off_path_rad = self.approach.add_to(&mut setpoint, approach_s);
                 cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
-                self.next.position_rad = setpoint.position_rad;
+                keep_stopped(ledger, &mut setpoint);
             }
             let now_s = self.seconds(self.next.axis);
             let approached = self.approach.has_ended(self.seconds(self.next.approach));
             cycle_state.at_rest = self.scale.requested() <= 0.0 && self.scale.is_settled(now_s) && approached;
         }
         cycle_state.trajectory_s = self.next.s;
-        RequestedSetpoint { setpoint, periods, restart, live }
+        RequestedSetpoint { setpoint, restart, live }
     }
 
     /// How far the pose that was held is from the base of the trajectory that runs, rad.
@@ -205,23 +198,20 @@ impl Track {
     /// Notes what left: `position_rad` is what the guard let pass.
     ///
     /// Real time: a copy.
-    pub fn commit(&mut self, position_rad: &JointArray, cycle_state: &mut CycleState) {
+    pub fn commit(&mut self, position_rad: &JointArray, ledger: &Ledger, cycle_state: &mut CycleState) {
         if cycle_state.setpoints_sent() {
-            self.sent = TrackState { position_rad: *position_rad, ..self.next };
-            let last_sent = self.last_sent_rad.iter_mut().zip(position_rad).zip(&cycle_state.not_sent);
-            last_sent
-                .filter(|(_, not_sent)| !**not_sent)
-                .for_each(|((last_sent, position), _)| *last_sent = *position);
+            self.sent = self.next;
             (self.starting, self.restart) = (false, false);
         }
-        // Where setpoints take turns, the last ones of a motion are still on their way: it ends when all are told.
-        let last_sent = self.last_sent_rad.iter().zip(&self.sent.position_rad).zip(&cycle_state.unreachable);
-        let all_sent = last_sent
-            .take(self.joints)
-            .all(|((last_sent, sent), unreachable)| *unreachable || last_sent.to_bits() == sent.to_bits());
+        // Where setpoints take turns, the last ones of a motion are still to come: it ends when all are sent.
+        let tick = cycle_state.tick.number;
+        let joints = position_rad.iter().zip(&cycle_state.unreachable).enumerate().take(self.joints);
+        let all_sent = !joints
+            .filter(|(_, (_, unreachable))| !**unreachable)
+            .any(|(joint, (position_rad, _))| ledger.awaits(joint, *position_rad, tick));
         cycle_state.end_reached &= all_sent;
         cycle_state.at_rest &= all_sent;
-        cycle_state.commanded_rad = self.sent.position_rad;
+        cycle_state.commanded_rad = *ledger.commanded_rad();
         let mut trial = self.scale;
         cycle_state.can_ramp = trial.request(1.0, self.seconds(self.sent.axis)).is_ok();
     }
@@ -245,19 +235,16 @@ impl Track {
     /// Real time: nothing is freed.
     pub fn drop_trajectory(&mut self) -> Option<Boxed> {
         (self.starting, self.restart) = (false, true);
-        self.sent.position_rad = self.last_sent_rad;
         self.sent.s = 0.0;
         self.scale = TimeScale::settled(0.0, self.ramp_s);
         self.sent.axis = 0;
         self.running.take()
     }
 
-    /// Makes a pose the commanded one: only while drives are de-energised, or as they are being energised.
+    /// The commanded pose was set from outside: earlier commands do not count.
     ///
-    /// Real time: a copy.
-    pub fn set_pose(&mut self, position_rad: &JointArray) {
-        self.sent.position_rad = *position_rad;
-        self.last_sent_rad = *position_rad;
+    /// Real time: stores a flag.
+    pub fn restart(&mut self) {
         self.restart = true;
     }
 
@@ -299,5 +286,15 @@ impl Track {
         #[expect(clippy::cast_precision_loss, reason = "2^53 periods are longer than any machine lives")]
         let count = periods as f64;
         count * self.period_s
+    }
+}
+
+/// A drive that has stopped for want of setpoints gets none but that of where it stands: any other would be a step.
+fn keep_stopped(ledger: &Ledger, setpoint: &mut Setpoint) {
+    for (joint, last) in ledger.joints().iter().enumerate().filter(|(_, last)| last.stopped) {
+        setpoint.position_rad[joint] = last.position_rad[0];
+        setpoint.velocity_rad_s[joint] = 0.0;
+        setpoint.acceleration_rad_s2[joint] = 0.0;
+        setpoint.jerk_rad_s3[joint] = 0.0;
     }
 }

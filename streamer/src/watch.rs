@@ -4,7 +4,7 @@
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
 //! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
 //! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
-use crate::cycle_state::{BUSES_MAX, BusState, Cause, CycleState};
+use crate::cycle_state::{BUSES_MAX, BusState, Cause, CycleState, LostSetpoints};
 use taustream_arm::Settings;
 use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};
 use taustream_drivers::{DriveState, Nanos};
@@ -166,11 +166,25 @@ impl Watch {
             || {
                 let found = |test: fn(&BusState) -> bool| cycle_state.buses.iter().position(test);
                 let passive = found(|b| b.passive).map(|bus| (bus, BusFault::ErrorPassive));
+                let commanded = |(bus, found): (usize, &BusState)| Some((bus, found.other_master?));
+                if let Some((bus, id)) = cycle_state.buses.iter().enumerate().find_map(commanded) {
+                    return Some(Cause::bus(bus, BusFault::OtherMaster, f64::from(id.raw()), 0.0));
+                }
+                if let Some(lost) = cycle_state.lost {
+                    return Some(self.lost_cause(lost));
+                }
                 let (bus, bus_fault) =
                     passive.or_else(|| found(|b| b.unread).map(|bus| (bus, BusFault::ReceiveBehind)))?;
                 Some(self.failed(cycle_state, bus, bus_fault))
             },
         )
+    }
+
+    /// The kernel did not take the setpoints of a joint.
+    fn lost_cause(&self, lost: LostSetpoints) -> Cause {
+        let bus = self.bus_of.get(lost.joint).copied().unwrap_or(BUSES_MAX);
+        let (value, limit) = (f64::from(lost.count), lost.tolerated.map_or(0.0, f64::from));
+        Cause { joint: Some(lost.joint), ..Cause::bus(bus, BusFault::SetpointsLost, value, limit) }
     }
 
     /// Feedback that is late from all joints of a bus whose frames this computer reads too late is no fault of the
@@ -207,6 +221,8 @@ impl Watch {
             | BusFault::Gone
             | BusFault::BusOff
             | BusFault::Restarted
+            | BusFault::SetpointsLost
+            | BusFault::OtherMaster
             | BusFault::ErrorPassive => Cause::bus(bus, bus_fault, 0.0, 0.0),
         }
     }

@@ -14,6 +14,8 @@ mod faults;
 mod harness;
 #[path = "cycle_suite/motion.rs"]
 mod motion;
+#[path = "cycle_suite/partial_send.rs"]
+mod partial_send;
 #[path = "cycle_suite/power.rs"]
 mod power;
 #[path = "cycle_suite/receive_path.rs"]

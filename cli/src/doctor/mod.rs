@@ -34,6 +34,7 @@ const USUAL_CYCLE: CycleSettings = CycleSettings {
     tolerated_gap_periods: 2,
     stall_resume_ms: 20,
     drive_watchdog_ms: 100,
+    heartbeat_lost_ms: 350,
     priority: 80,
     cpu: None,
     report_rate_hz: 100.0,

@@ -10,7 +10,7 @@ use crate::bring_up::power::{Power, Received, TargetSource};
 use crate::bring_up::timing::{BringUpCycle, Timeouts};
 use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
 use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING};
-use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
+use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT, EMCY_HEARTBEAT};
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
 use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
@@ -168,6 +168,12 @@ impl Node {
     #[must_use]
     pub const fn warns(&self) -> bool {
         self.status & STATUS_WARNING != 0
+    }
+
+    /// The drive says, or shows by leaving NMT operational, that it has lost its master.
+    #[must_use]
+    pub fn lost_master(&self) -> bool {
+        self.emcy == EMCY_HEARTBEAT || self.stage == NodeStage::Gone(BringUpFault::LeftOperational)
     }
 
     /// Where the drive is.

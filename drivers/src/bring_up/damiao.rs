@@ -9,7 +9,9 @@ use crate::bring_up::damiao_fault::{DamiaoFault, differs, register_object, statu
 use crate::bring_up::damiao_plan::{CONFIGURE, CheckResult, Job, MotorPlan, VERIFY};
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::timing::{BringUpCycle, Timeouts};
-use crate::codec::damiao_frames::{Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, Special};
+use crate::codec::damiao_frames::{
+    Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, STATUS_LOST_COMMUNICATION, Special,
+};
 use crate::codec::mit::{MitCommand, MitState};
 use crate::servo::{DriveState, DriveTarget, Nanos};
 use taustream_arm::DamiaoMode;
@@ -134,6 +136,12 @@ impl Motor {
     pub const fn status_word(&self) -> u32 {
         let Feedback { status, stage_celsius, winding_celsius, .. } = self.feedback;
         status as u32 | (stage_celsius as u32) << 8 | (winding_celsius as u32) << 16
+    }
+
+    /// It let go because no command came for longer than its watchdog.
+    #[must_use]
+    pub const fn lost_master(&self) -> bool {
+        self.received && self.feedback.status == STATUS_LOST_COMMUNICATION
     }
 
     /// Where the motor is.

@@ -88,6 +88,8 @@ pub struct NodePlan {
     pub reaction: Reaction,
     /// Its targets.
     pub target: TargetPdo,
+    /// Time without the master's heartbeat after which it counts the master as lost (object 0x1016).
+    pub heartbeat_lost_ms: u16,
     /// It answers every so many SYNCs, 1 to 240 (transmission type of its TPDO).
     pub feedback_every: u8,
 }
@@ -177,7 +179,7 @@ impl NodePlan {
             Reaction::Hold | Reaction::Ramp => ON_LOST_MASTER_QUICK_STOP,
             Reaction::Limp => ON_LOST_MASTER_TORQUE_OFF,
         };
-        let consumer = u32::from(MASTER_NODE) << 16 | u32::from(HEARTBEAT_LOST_MS);
+        let consumer = u32::from(MASTER_NODE) << 16 | u32::from(self.heartbeat_lost_ms);
         steps.write(object::PRODUCER_HEARTBEAT_MS, SdoBytes::from_u16(HEARTBEAT_MS));
         steps.write(object::CONSUMER_HEARTBEAT, SdoBytes::from_u32(consumer));
         steps.write(object::ABORT_CONNECTION_OPTION, SdoBytes::from_i16(lost_master));

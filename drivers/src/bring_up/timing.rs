@@ -1,4 +1,5 @@
 //! What every bring-up knows of time: how long to wait, and a clock that does not count our own stalls as waiting.
+use crate::frame::CanId;
 use crate::servo::{DriveTarget, Nanos};
 
 /// Limits of waiting.
@@ -32,7 +33,8 @@ pub struct StepTimer {
     step: Nanos,
     now: Nanos,
     ticked: Option<Nanos>,
-    other_master_at: Option<Nanos>,
+    /// When another master has spoken last, and by which frame.
+    other_master: Option<(Nanos, CanId)>,
 }
 
 impl StepTimer {
@@ -40,15 +42,14 @@ impl StepTimer {
     #[must_use]
     pub fn new(period_us: u32) -> Self {
         let step = Nanos(u64::from(period_us) * 1_000 * STEP_PERIODS);
-        Self { step, now: Nanos(0), ticked: None, other_master_at: None }
+        Self { step, now: Nanos(0), ticked: None, other_master: None }
     }
     /// One cycle at `time`, with this wish.
     pub fn tick(&mut self, time: Nanos, drive_target: DriveTarget) -> BringUpCycle {
         let passed = self.ticked.map_or(0, |then| time.0.saturating_sub(then.0));
         self.now = Nanos(self.now.0.saturating_add(passed.min(self.step.0)));
         self.ticked = Some(time);
-        let received = |at: Nanos| self.now.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0;
-        BringUpCycle { now: self.now, drive_target, other_master: self.other_master_at.is_some_and(received) }
+        BringUpCycle { now: self.now, drive_target, other_master: self.other_master().is_some() }
     }
     /// Its time.
     #[must_use]
@@ -57,11 +58,17 @@ impl StepTimer {
     }
     /// The bus is another one now.
     pub fn forget_other_master(&mut self) {
-        self.other_master_at = None;
+        self.other_master = None;
     }
-    /// Another master has spoken.
-    pub fn note_other_master(&mut self) {
-        self.other_master_at = Some(self.now);
+    /// Another master has spoken, by this frame.
+    pub fn note_other_master(&mut self, id: CanId) {
+        self.other_master = Some((self.now, id));
+    }
+    /// The newest frame of another master, when it came a short while ago.
+    #[must_use]
+    pub fn other_master(&self) -> Option<CanId> {
+        let is_recent = |at: Nanos| self.now.0.saturating_sub(at.0) < OTHER_MASTER_QUIET.0;
+        self.other_master.filter(|(at, _)| is_recent(*at)).map(|(_, id)| id)
     }
 }
 

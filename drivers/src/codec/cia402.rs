@@ -7,10 +7,12 @@ use crate::bring_up::cia402::{DriveSetpoint, Node, Target};
 use crate::bring_up::fault;
 use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan, TargetPdo};
 use crate::bring_up::timing::{self, BringUpCycle, StepTimer, Timeouts};
-use crate::codec::canopen::{Emcy, MASTER_NODE, NODE_MAX, NmtState, decode_sync, sync};
+use crate::codec::canopen::{
+    COB_PDO_STEP, COB_RPDO1, Emcy, MASTER_NODE, NODE_MAX, Nmt, NmtState, decode_sync, node_of, sync,
+};
 use crate::codec::sdo::SdoResponse;
 use crate::codec::setpoint_frames::{Group, SendSchedule, encode_control, encode_pair, groups};
-use crate::frame::{CanFrame, FrameBatch};
+use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
 use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
 use taustream_arm::{Servo, Settings};
 use taustream_motion::MAX_JOINTS;
@@ -87,8 +89,6 @@ struct Drive {
     received: Option<Nanos>,
     /// Controlword of the newest frame that held one.
     control: Option<u16>,
-    /// This cycle's frames hold its target.
-    carried: bool,
 }
 
 /// The master of all CiA 402 drives of one bus.
@@ -153,6 +153,7 @@ impl Cia402Driver {
                 interpolation,
                 reaction: servo.reaction,
                 target: target_pdo(&driver.groups, &nodes, at),
+                heartbeat_lost_ms: settings.cycle.heartbeat_lost_ms,
                 feedback_every,
             };
             driver.add(servo, scale, Node::new(plan, timeouts))?;
@@ -173,15 +174,7 @@ impl Cia402Driver {
             return Err(Cia402Error::NodeTwice { joint, other, node_id });
         }
         *slot = Some(self.drives.len());
-        self.drives.push(Drive {
-            joint,
-            node_id,
-            scale,
-            node,
-            received: None,
-            control: None,
-            carried: false,
-        });
+        self.drives.push(Drive { joint, node_id, scale, node, received: None, control: None });
         self.joints.push(joint);
         Ok(())
     }
@@ -249,6 +242,17 @@ impl Cia402Driver {
         }
     }
 
+    /// Whether a frame is one that only a master sends to these drives: SYNC, an NMT command, a setpoint. Own frames are
+    /// never received.
+    fn is_of_a_master(&self, frame: &CanFrame) -> bool {
+        let is_ours = |node: u8| self.by_node.get(usize::from(node)).is_some_and(Option::is_some);
+        // The second RPDO is what two drives share.
+        let rpdo = |base: u16| node_of(frame, base).is_some_and(is_ours);
+        let setpoint = || rpdo(COB_RPDO1) || rpdo(COB_RPDO1 + COB_PDO_STEP);
+        let command = || Nmt::decode(frame).is_some_and(|nmt| nmt.node == 0 || is_ours(nmt.node));
+        decode_sync(frame).is_some() || setpoint() || command()
+    }
+
     /// Drives watch for this (object 0x1016) and stop by themselves when it ends.
     fn push_heartbeat(&mut self, now: Nanos, out: &mut FrameBatch) {
         let due = self
@@ -309,8 +313,8 @@ impl ServoDriver for Cia402Driver {
 
     fn decode(&mut self, now: Nanos, frame: &CanFrame) {
         let patient = self.clock.now();
-        if decode_sync(frame).is_some() {
-            self.clock.note_other_master();
+        if self.is_of_a_master(frame) {
+            self.clock.note_other_master(frame.id());
         } else if let Some((node, status, position)) = decode_tpdo(frame) {
             if let Some(drive) = self.drive_mut(node)
                 && drive.node.take_tpdo(patient, status, position)
@@ -336,10 +340,6 @@ impl ServoDriver for Cia402Driver {
         &self.joints
     }
 
-    fn carries(&self, joint: usize) -> bool {
-        self.drives.iter().any(|drive| drive.joint == joint && drive.carried)
-    }
-
     fn status(&self, joint: usize) -> ServoStatus {
         let Some(drive) = self.drives.iter().find(|drive| drive.joint == joint) else {
             return ServoStatus::UNKNOWN;
@@ -357,6 +357,7 @@ impl ServoDriver for Cia402Driver {
             error_code,
             refused_object,
             warning: node.warns(),
+            lost_master: node.lost_master(),
         }
     }
 
@@ -376,6 +377,10 @@ impl ServoDriver for Cia402Driver {
         self.clock.forget_other_master();
     }
 
+    fn other_master(&self) -> Option<CanId> {
+        self.clock.other_master()
+    }
+
     fn explain(&self, error_code: u32) -> String {
         fault::explain(error_code)
     }
@@ -385,12 +390,15 @@ impl ServoDriver for Cia402Driver {
 /// drive was last told; while nobody knows that, nothing is sent, for a drive that listens would go wherever it says.
 fn push_shared(first: &mut Drive, second: &mut Drive, due: bool, out: &mut FrameBatch) {
     let works = [&*first, &*second].map(|drive| drive.control.is_some());
-    let commanded = (first.node.commanded(), second.node.commanded());
-    let carried = match commanded {
-        (Some(a), Some(b)) if due && works != [false; 2] => out.push(encode_pair(first.node_id, [a, b])),
-        _ => false,
-    };
-    (first.carried, second.carried) = (carried && works[0], carried && works[1]);
+    let joints = [(works[0], first.joint), (works[1], second.joint)];
+    let at_work = joints.iter().filter(|(works, _)| *works);
+    let joints = at_work.fold(JointSet::EMPTY, |all, (_, joint)| all.union(JointSet::of(*joint)));
+    if let (Some(a), Some(b)) = (first.node.commanded(), second.node.commanded())
+        && due
+        && joints != JointSet::EMPTY
+    {
+        out.push_setpoints(encode_pair(first.node_id, [a, b]), joints);
+    }
 }
 
 impl Drive {
@@ -400,9 +408,12 @@ impl Drive {
         let setpoint = self.node.setpoint(cycle, target);
         self.control = setpoint.map(|setpoint| setpoint.control);
         let urgent = cycle.drive_target == DriveTarget::TorqueOff || self.control != before;
-        self.carried = setpoint.is_some_and(|DriveSetpoint { control, target_counts }| {
-            (is_due || urgent) && out.push(encode_rpdo(self.node_id, control, target_counts))
-        });
+        if let Some(DriveSetpoint { control, target_counts }) = setpoint
+            && (is_due || urgent)
+        {
+            let frame = encode_rpdo(self.node_id, control, target_counts);
+            out.push_setpoints(frame, JointSet::of(self.joint));
+        }
     }
 
     /// The controlword of a drive whose target comes in a shared frame. True when the drive is told anything new: then

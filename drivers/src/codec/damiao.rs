@@ -7,7 +7,7 @@ use crate::bring_up::damiao_plan::MotorPlan;
 use crate::bring_up::fault;
 use crate::bring_up::timing::{self, StepTimer, Timeouts};
 use crate::codec::damiao_frames::{Reply, Request, Wire};
-use crate::frame::{CanFrame, FrameBatch};
+use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
 use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
 use taustream_arm::{BusKind, Servo, Settings};
 use taustream_motion::MAX_JOINTS;
@@ -171,7 +171,9 @@ impl ServoDriver for DamiaoDriver {
         for joint in &mut self.motors {
             let target = commands.get(joint.joint).and_then(|command| joint.mapping.motor(command));
             if let Some(request) = joint.motor.request(cycle, target) {
-                out.push(request.encode(joint.node_id, self.wire));
+                let frame = request.encode(joint.node_id, self.wire);
+                let joints = if request.is_setpoint() { JointSet::of(joint.joint) } else { JointSet::EMPTY };
+                out.push_setpoints(frame, joints);
             }
         }
     }
@@ -188,7 +190,7 @@ impl ServoDriver for DamiaoDriver {
         }
         // Our own frames do not come back: whoever commands one of our motors is another master.
         if self.motors.iter().any(|joint| Request::is_to(frame, joint.node_id)) {
-            self.clock.note_other_master();
+            self.clock.note_other_master(frame.id());
         }
     }
 
@@ -212,6 +214,7 @@ impl ServoDriver for DamiaoDriver {
             error_code,
             refused_object,
             warning: false,
+            lost_master: joint.motor.lost_master(),
         }
     }
 
@@ -235,6 +238,10 @@ impl ServoDriver for DamiaoDriver {
         let joint = self.motors.iter_mut().find(|motor| motor.joint == joint);
         let joint = joint.ok_or(ZeroRefused::NoSuchJoint)?;
         if joint.motor.set_zero() { Ok(()) } else { Err(ZeroRefused::NotReady) }
+    }
+
+    fn other_master(&self) -> Option<CanId> {
+        self.clock.other_master()
     }
 
     fn explain(&self, error_code: u32) -> String {

@@ -177,6 +177,12 @@ pub enum Request {
 }
 
 impl Request {
+    /// It holds a setpoint.
+    #[must_use]
+    pub const fn is_setpoint(self) -> bool {
+        matches!(self, Self::Mit(_) | Self::PosVel { .. })
+    }
+
     /// The frame to motor `node_id`.
     ///
     /// Real time: arithmetic only.

@@ -3,7 +3,7 @@ use super::{
     Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLED, SWITCHED_ON, frame, hex, settings,
 };
 use taustream_drivers::codec::cia402::{Cia402Driver, Cia402Error, CountScale, counts_from_rad};
-use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
+use taustream_drivers::{CanId, DriveState, DriveTarget, ServoDriver};
 
 #[test]
 fn cycle_starts_with_sync_then_setpoints_in_joint_order() {
@@ -353,5 +353,44 @@ fn settings_that_canopen_cannot_carry_are_refused_with_the_reason() {
         let mut odd = good.clone();
         odd.supervision.drive_timeout_s = value;
         assert!(Cia402Driver::new(&odd, 0).is_err(), "drive_timeout_s = {value}");
+    }
+}
+
+/// Goal: in operation, whoever else sends what only a master sends to these drives is noticed by that frame; the arm's own
+/// traffic, and frames of drives and devices that are not this arm's, are not.
+#[test]
+fn frames_of_another_master_are_noticed_in_operation_and_others_are_not() {
+    let ours: [(u16, &[u8]); 6] = [
+        (0x080, &[]),
+        (0x080, &[7]),
+        (0x201, &[0x0F, 0, 0xE8, 3, 0, 0]),
+        (0x302, &[1, 0, 0, 0, 2, 0, 0, 0]),
+        (0x000, &[0x81, 0]),
+        (0x000, &[0x02, 1]),
+    ];
+    for (id, data) in ours {
+        let mut bench = Bench::enabled(2);
+        bench.steps(600);
+        assert_eq!(bench.driver.other_master(), None, "own traffic");
+        bench.decode(&frame(id, data));
+        assert_eq!(bench.driver.other_master().map(CanId::raw), Some(u32::from(id)), "{id:#05x} {data:?}");
+        bench.steps(400);
+        assert!(bench.driver.other_master().is_some(), "{id:#05x}: forgotten at once");
+        bench.steps(200);
+        assert_eq!(bench.driver.other_master(), None, "{id:#05x}: it has stopped");
+    }
+    let others: [(u16, &[u8]); 7] = [
+        (0x203, &[0x0F, 0, 0xE8, 3, 0, 0]),
+        (0x000, &[0x81, 9]),
+        (0x000, &[0x77, 0]),
+        (0x182, &[0x37, 0x12, 0, 0, 0, 0]),
+        (0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]),
+        (0x77F, &[5]),
+        (0x123, &[1, 2, 3]),
+    ];
+    let mut bench = Bench::enabled(2);
+    for (id, data) in others {
+        bench.decode(&frame(id, data));
+        assert_eq!(bench.driver.other_master(), None, "{id:#05x} {data:?}");
     }
 }

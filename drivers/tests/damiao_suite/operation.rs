@@ -1,6 +1,6 @@
 //! Energising, following, letting go.
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
-use taustream_drivers::codec::damiao_frames::{Request, Special};
+use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::{DriveState, DriveTarget, JointCommand, ServoDriver, ZeroRefused};
 
@@ -273,4 +273,31 @@ fn motor_that_also_speaks_by_itself_changes_nothing() {
     arm.enable();
     arm.steps(500);
     assert_eq!(arm.states(), [DriveState::Enabled; JOINTS]);
+}
+
+/// Goal: in operation a command to one of the motors from elsewhere is noticed by its frame, in whatever mode; answers and
+/// commands to other motors are not.
+#[test]
+fn commands_of_another_master_are_noticed_in_operation() {
+    for settings in [edited(&[]), pos_vel()] {
+        let commands = [
+            Request::Mit([0x80, 0, 0x80, 0, 0, 0, 8, 0]),
+            Request::PosVel { position_rad: 0.5, velocity_rad_s: 1.0 },
+            Request::Special(Special::Disable, 0),
+        ];
+        for command in commands {
+            let mut arm = Arm::enabled(settings.clone());
+            arm.steps(600);
+            assert_eq!(arm.driver.other_master(), None, "own traffic");
+            let frame = command.encode(2, Wire::Classic);
+            arm.arriving.push(frame);
+            arm.step();
+            assert_eq!(arm.driver.other_master(), Some(frame.id()), "{command:?}");
+            arm.steps(600);
+            assert_eq!(arm.driver.other_master(), None, "{command:?}: it has stopped");
+            arm.arriving.push(command.encode(9, Wire::Classic));
+            arm.step();
+            assert_eq!(arm.driver.other_master(), None, "{command:?} to a motor of somebody else");
+        }
+    }
 }

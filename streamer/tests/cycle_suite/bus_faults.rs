@@ -1,9 +1,10 @@
 //! A bus that fails: silent from then on, and brought back by command alone.
 use crate::harness::CycleHarness;
 use crate::{arrived, assert_on_path};
-use taustream_drivers::{DriveState, DriveTarget, LinkFault};
+use taustream_drivers::{CanId, DriveState, DriveTarget, LinkFault};
 use taustream_messages::{BusFault, Command, FaultReason, Phase};
 use taustream_streamer::answer::AnswerReason;
+use taustream_streamer::names::Names;
 
 /// Plants a trouble in a moving arm.
 type Plant = fn(&mut CycleHarness);
@@ -195,6 +196,36 @@ fn frames_confirmed_late_but_within_tolerance_are_no_fault() {
     assert_eq!(harness.cause(), None);
     harness.run(2);
     assert_eq!(harness.cause().map(|c| c.code), Some(BusFault::Unconfirmed.code()));
+}
+
+/// Goal: another master that commands the drives, in motion or while they hold, stops the arm on its path and is named by
+/// its frame; the fault comes back while it goes on.
+#[test]
+fn another_master_in_operation_stops_the_arm_on_the_path_and_is_named() {
+    for moving in [true, false] {
+        let mut harness = CycleHarness::new();
+        let trajectory = moving.then(|| harness.move_it());
+        if !moving {
+            harness.enable();
+        }
+        harness.run(300);
+        harness.script(|w| w.other_master = Some(CanId::standard(0x203)));
+        harness.run(1);
+        let cause = harness.cause().unwrap();
+        assert_eq!(BusFault::from_code(cause.code), Some(BusFault::OtherMaster));
+        let sentence = Names::default().fault(&cause);
+        assert!(sentence.contains("another master") && sentence.contains("0x203"), "{sentence}");
+        harness.run_until(Phase::Fault, 1_500);
+        if let Some(trajectory) = &trajectory {
+            assert_on_path(&harness, trajectory);
+        }
+        harness.accept(Command::ClearFault);
+        harness.run_until(Phase::Fault, 3);
+        harness.script(|w| w.other_master = None);
+        harness.accept(Command::ClearFault);
+        harness.run(50);
+        assert_eq!((harness.phase(), harness.cause()), (Phase::Locked, None));
+    }
 }
 
 /// Goal: after the bus is back the drives are what they say they are: one that was found energised is no licence to move.

@@ -261,3 +261,28 @@ fn guard_trip_can_be_cleared_and_the_arm_moves_again_from_where_it_braked() {
     assert_eq!(arrived(&harness), next.end_rad());
     assert_eq!(harness.cause(), None);
 }
+
+/// Goal: a drive that stops because its master was silent is not blamed for a stall of this loop, whether it says so at
+/// once or a while later; without a stall it is.
+#[test]
+fn drive_that_lost_its_master_in_a_stall_of_the_loop_is_not_blamed() {
+    for (gap, later, reason) in [
+        (60, 0, FaultReason::Stall),
+        (60, 500, FaultReason::Stall),
+        (60, 1_500, FaultReason::DriveFault),
+        (1, 0, FaultReason::DriveFault),
+    ] {
+        let mut harness = CycleHarness::new();
+        harness.enable();
+        harness.run(100);
+        harness.step_after(gap);
+        harness.run(later);
+        harness.script(|w| (w.forced[3], w.lost_master) = (Some(DriveState::Fault), Some(3)));
+        harness.run(3);
+        let cause = harness.cause().unwrap();
+        assert_eq!((cause.reason, cause.joint), (reason, Some(3)), "a gap of {gap}, {later} cycles before");
+        if reason == FaultReason::Stall {
+            assert!((cause.value - 0.06).abs() < 1e-9, "{cause:?}");
+        }
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use taustream_arm::Settings;
 use taustream_drivers::link::{OpenError, Sent};
 use taustream_drivers::{
-    CanFrame, CanId, CanLink, DriveState, DriveTarget, FrameBatch, JointCommand, LinkFault, Nanos,
+    CanFrame, CanId, CanLink, DriveState, DriveTarget, FrameBatch, JointCommand, JointSet, LinkFault, Nanos,
     ServoDriver, ServoStatus,
 };
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces, Report};
@@ -33,6 +33,8 @@ pub struct World {
     pub error_code: u32,
     pub refused_object: u32,
     pub warning: Option<usize>,
+    /// The drive that says it has lost its master.
+    pub lost_master: Option<usize>,
     pub silent: Option<usize>,
     /// What adopted drives hold.
     pub hold_position_rad: JointArray,
@@ -43,6 +45,12 @@ pub struct World {
     pub link_fault: Option<LinkFault>,
     /// Frames that the link takes before it fails.
     pub link_takes: usize,
+    /// Frames that it takes of the batch of a cycle, by tick, without failing.
+    pub takes: Option<fn(u64) -> usize>,
+    /// The setpoints that reached each drive while energised, with their tick.
+    pub drives: [Vec<(u64, f64)>; MAX_JOINTS],
+    /// The frame by which another master commands the drives.
+    pub other_master: Option<CanId>,
     /// Handed to the cycle beside the answers.
     pub error_frame: Option<u32>,
     /// Byte 1 of that frame: state of the controller.
@@ -118,7 +126,8 @@ impl ServoDriver for FakeDriver {
         world.pending = std::array::from_fn(|joint| commands[joint].position_rad + revolution_rad[joint]);
         out.push(CanFrame::classic(CanId::standard(0x080), &[]));
         for joint in 0..JOINTS {
-            out.push(CanFrame::classic(CanId::standard(0x201 + u16::try_from(joint).unwrap()), &[0; 6]));
+            let frame = CanFrame::classic(CanId::standard(0x201 + u16::try_from(joint).unwrap()), &[0; 6]);
+            out.push_setpoints(frame, JointSet::of(joint));
         }
     }
     fn decode(&mut self, now: Nanos, _frame: &CanFrame) {
@@ -150,6 +159,7 @@ impl ServoDriver for FakeDriver {
             error_code: world.error_code,
             refused_object: world.refused_object,
             warning: world.warning == Some(joint),
+            lost_master: world.lost_master == Some(joint),
         }
     }
     fn clear_faults(&mut self) {
@@ -158,6 +168,9 @@ impl ServoDriver for FakeDriver {
     fn start_over(&mut self) {
         self.world.lock().unwrap().start_overs += 1;
         self.received = [None; MAX_JOINTS];
+    }
+    fn other_master(&self) -> Option<CanId> {
+        self.world.lock().unwrap().other_master
     }
     fn explain(&self, error_code: u32) -> String {
         format!("{error_code:#x}")
@@ -172,7 +185,11 @@ impl CanLink for FakeLink {
         if let Some(fault) = world.link_fault {
             return Sent { count: world.link_takes.min(frames.len()), fault: Some(fault) };
         }
-        let pending = world.pending;
+        let taken = world.takes.map_or(frames.len(), |takes| takes(world.tick).min(frames.len()));
+        let mut pending = world.pending;
+        // SYNC comes first; a drive whose frame was refused goes on with the target that it has.
+        let reached = taken.saturating_sub(1);
+        pending[reached..JOINTS].copy_from_slice(&world.pipeline[0][reached..JOINTS]);
         // De-energised drives stay where they are, whatever is commanded.
         let energised = world.drive_target == Some(DriveTarget::Enabled);
         let next = if energised { pending } else { world.pipeline[0] };
@@ -181,9 +198,12 @@ impl CanLink for FakeLink {
         if energised {
             let tick = world.tick;
             world.arrived.push((tick, pending));
+            for (drive, position_rad) in world.drives.iter_mut().zip(&pending).take(reached) {
+                drive.push((tick, *position_rad));
+            }
         }
-        world.frames += frames.len() as u64;
-        Sent { count: frames.len(), fault: None }
+        world.frames += taken as u64;
+        Sent { count: taken, fault: (taken < frames.len()).then_some(LinkFault::QueueFull) }
     }
     fn receive(&mut self, into: &mut FrameBatch) -> Option<LinkFault> {
         into.clear();
@@ -275,12 +295,16 @@ impl CycleHarness {
             error_code: 0,
             refused_object: 0,
             warning: None,
+            lost_master: None,
             silent: None,
             hold_position_rad: [f64::NAN; MAX_JOINTS],
             revolution_rad: [0.0; MAX_JOINTS],
             offset_rad: [0.0; MAX_JOINTS],
             link_fault: None,
             link_takes: 0,
+            takes: None,
+            other_master: None,
+            drives: Default::default(),
             error_frame: None,
             error_state: 0x20,
             confirms: true,
