@@ -1,4 +1,4 @@
-//! The experiments that judge what the seed papers claim, beside what the papers print.
+//! Experiments that check the claims of five papers (docs/papers.md) and show our numbers beside the printed ones.
 //!
 //! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_planner::papers`]) and answers
 //! with tables, pictures and claims. The papers' own values are the only constants in them ([`Cell::Paper`]);

@@ -5,7 +5,7 @@ use crate::run_context::{RunContext, Stop};
 use crate::table::Table;
 use crate::{paper_000, paper_001, paper_002, paper_003, paper_004};
 
-/// A seed paper.
+/// One of the five papers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Paper {
     /// Its number.

@@ -8,7 +8,7 @@
 //!
 //! so the peaks of velocity, acceleration and jerk sit at the roots of a linear, a quadratic and a cubic in x.
 //!
-//! Source: seed paper 000, its profiles Tau-J (m = 3) and Tau-J* (m = 4); the constants are ours,
+//! Source: Wang et al. (2022), its profiles Tau-J (m = 3) and Tau-J* (m = 4); the constants are ours,
 //! checked against 40-digit arithmetic.
 use core::f64::consts::PI;
 

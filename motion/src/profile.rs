@@ -15,7 +15,7 @@
 //!
 //! The snap of both tau profiles diverges at s = 1 for k > 1/4, which is why the wire holds n = 1/k >= 4.
 //!
-//! Source: seed paper 000, section 4 (tau profiles, quintic, cubic spline); the septic is the lowest polynomial with
+//! Source: Wang et al. (2022), section 4 (tau profiles, quintic, cubic spline); the septic is the lowest polynomial with
 //! zero jerk at both ends.
 use crate::peaks::{PeakConstants, family};
 use crate::stroke::Phi;

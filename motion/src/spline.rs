@@ -1,4 +1,4 @@
-//! A cubic spline through knots: the interpolator that seed paper 000 compares with.
+//! A cubic spline through knots: the interpolator that Wang et al. (2022) compares with.
 //!
 //! Velocity and acceleration are continuous, the jerk jumps at knots. Clamped, the velocity is zero at both ends and the
 //! acceleration is not; not-a-knot, the two pieces at each end are one cubic, and neither is zero. The paper does not say
@@ -242,7 +242,7 @@ impl Profile for CubicSpline {
 mod tests {
     use super::*;
 
-    /// The knots of figure 1 of seed paper 000.
+    /// The knots of figure 1 of Wang et al. (2022).
     const FIGURE_1: [(f64, f64); 5] =
         [(0.0, 0.0), (100.0, 300.0), (200.0, 200.0), (300.0, -300.0), (400.0, -700.0)];
 

@@ -3,7 +3,7 @@
 //! phi(s) = 1 - (1 - s^4)^n with integer n = 1/k is a polynomial, so a stroke is exact, fast and
 //! bit-reproducible: powers are products in a fixed order, never a library call.
 //!
-//! Source: seed paper 000 (Tau-J*, its eq. 4.2), written in normalised time.
+//! Source: Wang et al. (2022) (Tau-J*, its eq. 4.2), written in normalised time.
 use crate::{JointArray, MAX_JOINTS};
 
 /// Smallest n on the wire: below 4 the snap at the end of a stroke is not bounded.

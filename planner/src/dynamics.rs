@@ -5,7 +5,7 @@
 //! motors' own inertia are not known here; what the drives draw is more.
 //!
 //! Source: Luh, Walker and Paul, "On-line computational scheme for mechanical manipulators", Journal of Dynamic
-//! Systems, Measurement, and Control 102, 1980. The energy is what seed paper 004 should have minimised: it
+//! Systems, Measurement, and Control 102, 1980. The energy is what Sengupta et al. (2011) should have minimised: it
 //! integrates kinetic plus potential energy over time, whose unit is an action.
 use crate::papers::quadrature::gauss;
 use nalgebra::{Matrix3, Vector3};

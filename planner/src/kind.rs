@@ -13,7 +13,7 @@ pub enum PlannerKind {
     RrtConnect,
     /// The plain RRT with shortcuts: one tree, from the start.
     Rrt,
-    /// Foraging with virtual obstacles as an escape from traps (seed paper 002), with shortcuts.
+    /// Foraging with virtual obstacles as an escape from traps (Abdi et al. 2020), with shortcuts.
     Rbf,
     /// The same without virtual obstacles, with shortcuts.
     Bfo,
@@ -51,7 +51,7 @@ impl PlannerKind {
             Self::Straight => "straight joint-space line, or nothing",
             Self::RrtConnect => "two random trees that grow towards each other, with shortcuts",
             Self::Rrt => "one random tree from the start (LaValle 1998), with shortcuts",
-            Self::Rbf => "greedy foraging, virtual obstacles where it is trapped (seed paper 002)",
+            Self::Rbf => "greedy foraging, virtual obstacles where it is trapped (Abdi et al. 2020)",
             Self::Bfo => "greedy foraging, from the start again where it is trapped",
             Self::Optimiser(method) => method.about,
         }

@@ -11,7 +11,7 @@ pub enum Objective {
     /// It is shorter in time.
     #[default]
     Time,
-    /// It is cheaper by the cost of seed paper 000, whose penalty is nothing for a motion that touches nothing.
+    /// It is cheaper by the cost of Wang et al. (2022), whose penalty is nothing for a motion that touches nothing.
     Cost,
     /// Its joints do less work.
     Energy,
@@ -36,7 +36,7 @@ impl Objective {
     pub fn about(self) -> &'static str {
         match self {
             Self::Time => "shortest in time",
-            Self::Cost => "shortest way of tip and joints, weighed as in seed paper 000",
+            Self::Cost => "shortest way of tip and joints, weighed as in Wang et al. (2022)",
             Self::Energy => "least mechanical work of the joints; needs masses in the robot file",
         }
     }

@@ -17,7 +17,7 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 /// Control points between start and goal (the paper's M).
 pub const CONTROL_POINTS: usize = 3;
 /// Poses a segment, evenly spaced along its line: the paper's even time steps put 40 % of them into the first and
-/// last 1 % of a stroke (papers.md 1.2), and the path is the same for every timing.
+/// last 1 % of a stroke, and the path is the same for every timing.
 const POSES_PER_SEGMENT: u32 = 12;
 /// Poses that one evaluation checks.
 pub const POSES: usize = (CONTROL_POINTS + 1) * POSES_PER_SEGMENT as usize;

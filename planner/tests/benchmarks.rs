@@ -94,7 +94,7 @@ fn optimisers_on_moved_benchmarks_stay_in_the_bands_of_twenty_other_runs() {
     assert_eq!(rows, METHODS.len() * Function::ALL.len());
 }
 
-/// Goal: what papers.md measured of the slime moulds and the wolves with other code is measured with this one.
+/// Goal: SMA and GWO give the values that an independent implementation gave.
 /// Method: 30 dimensions, 1000 iterations of 50, another vector of the move, one run: within a factor of five of the
 /// means of ten.
 #[test]

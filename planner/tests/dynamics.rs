@@ -47,7 +47,7 @@ fn rod(frame: usize, mass_kg: f64, length_m: f64, along: Vector3<f64>) -> LinkMa
     }
 }
 
-/// Seed paper 004's arm as a chain: its second link keeps its level by a joint without mass that turns back.
+/// The arm of Sengupta et al. (2011) as a chain: its second link keeps its level by a joint without mass that turns back.
 fn two_link(arm: &TwoLink) -> Robot {
     let [first_m, second_m] = arm.lengths;
     let joint = |axis, post: Vector3<f64>| ChainJoint {

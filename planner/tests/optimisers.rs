@@ -344,7 +344,7 @@ fn optimiser_numbers_that_make_no_sense_are_refused_with_their_name() {
     }
 }
 
-/// Goal: the refinement that plans are made with stays what it is; papers.md's claim about it stays seen.
+/// Goal: the refinement that plans use does not change unnoticed.
 /// Method: what it found before it shared its colony with the others, on a bowl in eighteen dimensions.
 #[test]
 fn ibfoa_case_1_walks_as_it_did_when_it_was_the_only_one() {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The paper's cost of two motions of a UR5, written independently of the Rust code (plain Python, no packages).
 
-Prints the table that tests/paper_cost.rs holds. Source: seed paper 000, corrected reading: least distance over the
+Prints the table that tests/paper_cost.rs holds. Source: Wang et al. (2022), corrected reading: least distance over the
 links, 120 equal time steps a stroke plus the end.
 """
 from math import cos, sin, pi, sqrt, fsum

@@ -72,8 +72,8 @@ fn cost_of_two_motions_agrees_with_the_python_program() {
     }
 }
 
-/// Goal: papers.md's erratum E3: the sum of the distances to all links is never small, so that a motion straight through
-/// a sphere is free.
+/// Goal: show the erratum of eq. 3.9: the sum of the distances to all links is never small, so a motion straight through
+/// a sphere counts as free.
 #[test]
 fn cost_as_printed_does_not_see_the_collision() {
     let printed = CostModel { reading: Reading::Printed, ..CostModel::default() };
@@ -94,7 +94,7 @@ fn cost_of_a_turn_about_the_base_is_as_by_hand() {
     let tip = common::ur5_origins_m(&pose(up))[6];
     let arc_m = tip[0].hypot(tip[1]);
     assert!((cost.joint_travel_rad - 1.0).abs() < 1e-12 && cost.poses == 121, "{cost:?}");
-    // Chords of at most 0.0237 rad (papers.md 1.2) are shorter than the arc by less than 0.0237^2 / 24.
+    // Chords of at most 0.0237 rad are shorter than the arc by less than 0.0237^2 / 24.
     assert!(cost.path_length_m <= arc_m && cost.path_length_m > arc_m * (1.0 - 2.4e-5), "{cost:?}, {arc_m}");
     assert!((cost.cost - (7.0 * cost.path_length_m + 300.0)).abs() < 1e-9 && !cost.collision);
 }

@@ -1,4 +1,4 @@
-//! Seed paper 000: its random cases and its planning problem.
+//! Wang et al. (2022): its random cases and its planning problem.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{pose, ur5};

@@ -1,4 +1,4 @@
-//! Seed paper 002: foraging robots, their traps and their escape, and the potential field.
+//! Abdi et al. (2020): foraging robots, their traps and their escape, and the potential field.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use taustream_planner::optimize::Reading;
 use taustream_planner::papers::planar::{
@@ -81,7 +81,7 @@ fn planar_nearest_points_are_those_of_geometry() {
     assert!(Obstacle::walls(&[]).nearest([0.0; 2], 0.0).1.is_infinite());
 }
 
-/// Goal: what papers.md measured with other code: single and paired discs are passed without virtual obstacles. Three
+/// Goal: as an independent implementation showed, single and paired discs are passed without virtual obstacles. Three
 /// in a row are a trap for plain bacteria when they stand square to the way, as ours do.
 #[test]
 fn planar_discs_are_passed_by_bacteria_without_an_escape() {
@@ -98,7 +98,7 @@ fn planar_discs_are_passed_by_bacteria_without_an_escape() {
     assert!(steps.iter().all(|s| (95..130).contains(s)), "{steps:?}");
 }
 
-/// Goal: the paper's claim, which papers.md found to hold: L and U trap plain bacteria and the potential field; the
+/// Goal: the claim of the paper holds: L and U trap plain bacteria and the potential field; the
 /// robust ones get out.
 #[test]
 fn planar_traps_hold_plain_bacteria_and_the_field_and_not_the_robust_ones() {

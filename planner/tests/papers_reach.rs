@@ -1,4 +1,4 @@
-//! Seed paper 003: its arm and its reward against an independent program, and which methods reach its target.
+//! Lv et al. (2019): its arm and its reward against an independent program, and which methods reach its target.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use taustream_planner::optimize::{Problem, Progress, Reading, Run, Setup, by_name};
 use taustream_planner::papers::reach::{FiveJointArm, Reach, Reward};
@@ -126,7 +126,7 @@ fn run(method: &str, reading: Reading, iterations: usize, seed: u64) -> (f64, f6
     (found.cost, task.error_m(&found.x) * 1000.0)
 }
 
-/// Goal: what papers.md measured over thirty runs with other code comes out of ten with this one.
+/// Goal: ten runs agree with thirty runs of an independent implementation.
 #[test]
 fn reach_is_solved_by_differences_and_damped_particles_and_not_by_undamped_ones() {
     let reached = |method: &str, iterations: usize| {

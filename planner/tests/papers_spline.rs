@@ -1,4 +1,4 @@
-//! Seed paper 001: its spline against scipy (`oracles/spline.py`), and its objective of time and impact.
+//! Li, Xing and Qin (2025): its spline against scipy (`oracles/spline.py`), and its objective of time and impact.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 use taustream_planner::optimize::{Problem, Progress, Reading, Run, Setup, by_name};
 use taustream_planner::papers::spline::{Spline, SplineError};

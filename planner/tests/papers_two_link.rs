@@ -1,4 +1,4 @@
-//! Seed paper 004: its arm and its price against an independent program, its walk and its cubics.
+//! Sengupta et al. (2011): its arm and its price against an independent program, its walk and its cubics.
 use taustream_planner::optimize::{Iwo, Optimizer, Problem, Progress, Reading, Run, Setup, by_name};
 use taustream_planner::papers::two_link::{Moving, TwoLink};
 use taustream_planner::papers::two_link_energy::{CubicSearch, Cubics, PieceEnergy, moving};
@@ -86,7 +86,7 @@ fn two_link_price_agrees_with_the_python_program_in_radians_and_degrees() {
     }
 }
 
-/// Goal: what papers.md measured with other code: in radians the via points stand clear and the walk backs off; in
+/// Goal: as an independent implementation showed, in radians the via points stand clear and the walk backs off; in
 /// degrees it goes straight through the obstacles, in six points, whatever the penalty.
 #[test]
 fn two_link_walks_round_in_radians_and_straight_through_in_degrees() {

@@ -1,4 +1,4 @@
-//! The plain tree of seed paper 000's third contender, against a program written from its report.
+//! The plain RRT that Wang et al. (2022) compare with, against a program written from LaValle's report.
 use std::cell::Cell;
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::rng::SeededRng;

@@ -1,4 +1,4 @@
-//! Seed paper 000: IBFOA over control points, Tau-J* strokes between them.
+//! Wang et al. (2022): IBFOA over control points, Tau-J* strokes between them.
 pub(crate) mod cases;
 mod contenders;
 pub(crate) mod count;

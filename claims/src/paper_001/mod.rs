@@ -1,4 +1,4 @@
-//! Seed paper 001: ISMA on benchmark functions, and splines of degree seven.
+//! Li, Xing and Qin (2025): ISMA on benchmark functions, and splines of degree seven.
 pub(crate) mod benchmarks;
 pub(crate) mod diagonal;
 pub(crate) mod spline;

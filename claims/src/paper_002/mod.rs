@@ -1,4 +1,4 @@
-//! Seed paper 002: robots in the plane, their traps, and virtual obstacles as an escape.
+//! Abdi et al. (2020): robots in the plane, their traps, and virtual obstacles as an escape.
 pub(crate) mod journeys;
 mod pictures;
 pub(crate) mod robots;

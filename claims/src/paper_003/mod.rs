@@ -1,4 +1,4 @@
-//! Seed paper 003: IEPSO, reward and punishment, on a position without inverse kinematics.
+//! Lv et al. (2019): IEPSO, reward and punishment, on a position without inverse kinematics.
 pub(crate) mod methods;
 pub(crate) mod printed;
 pub(crate) mod reward;

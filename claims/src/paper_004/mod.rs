@@ -1,3 +1,3 @@
-//! Seed paper 004: IWO, greedy via points and cubics of least energy on a two-link arm.
+//! Sengupta et al. (2011): IWO, greedy via points and cubics of least energy on a two-link arm.
 pub(crate) mod energy;
 pub(crate) mod via;

@@ -32,7 +32,7 @@ pub enum Surroundings {
     Given(Box<Scene>),
     /// Balls, boxes and posts at random places, others for every problem.
     Clutter,
-    /// A cup of three walls between start and goal, its mouth to the one or to the other: the trap of seed paper 002.
+    /// A cup of three walls between start and goal, its mouth to the one or to the other: the trap of Abdi et al. (2020).
     Cup,
 }
 

@@ -250,7 +250,7 @@ pub(crate) enum BenchName {
     Compare(CompareArgs),
     /// The paper's cost function in vector lanes beside plain f64, in turns in one run, and whole runs of its IBFOA.
     Cost(CostBenchArgs),
-    /// Judge the claims of the five seed papers: their tables beside ours, claim by claim.
+    /// Check the claims of the five papers: their tables beside ours, claim by claim.
     Papers(super::PapersArgs),
     /// Compare the planners by name: what they find, how fast, and how good the motions are.
     Planners(super::PlannersArgs),

@@ -1,4 +1,4 @@
-//! `taustream bench papers`: judges the claims of the seed papers.
+//! `taustream bench papers`: checks the claims of the five papers (docs/papers.md).
 use crate::args::PapersArgs;
 use crate::failure::Failure;
 use crate::interrupt;

@@ -3,7 +3,7 @@
 //! M control points give M + 1 Tau-J* strokes one after another; the decision vector holds the control points' joint
 //! angles. All joints of a stroke share one profile, so that a table of it serves every evaluation.
 //!
-//! Source: seed paper 000, section 5 and table 1.
+//! Source: Wang et al. (2022), section 5 and table 1.
 use super::fast::Fast;
 use super::level::Level;
 use super::phases::phases;

@@ -1,4 +1,4 @@
-//! Paths as poses: places of the tip become joint angles, and pieces get the times that seed paper 001 would give them.
+//! Paths as poses: places of the tip become joint angles, and pieces get the times that Li, Xing and Qin (2025) would give them.
 use super::ImportError;
 use super::profiles::ViaProfile;
 use super::reference::fitted_durations_s;
@@ -55,7 +55,7 @@ pub struct TimedBy<'a> {
     pub evaluations: usize,
 }
 
-/// Durations by seed paper 001's objective of time and impact, inside the motion limits, each from a quarter of the shortest
+/// Durations by the objective of time and impact of Li, Xing and Qin (2025), inside the motion limits, each from a quarter of the shortest
 /// to four times the longest of the durations that the limits alone would give; those are among the first guesses.
 ///
 /// # Errors

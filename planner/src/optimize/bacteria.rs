@@ -5,8 +5,8 @@
 //! given: how a bacterium turns and whether it drifts ([`Heading`]), whether survivors and dispersal decay, who is exempt
 //! from dispersal, whether a step that worsens is taken back.
 //!
-//! Source: Passino, "Biomimicry of Bacterial Foraging", IEEE Control Systems Magazine 22(3), 2002, and seed paper
-//! 000, algorithm 1, eq. 3.1 to 3.4. Read as: swarming per bacterium over all bacteria (eq. 3.3 sums over the index
+//! Source: Passino, "Biomimicry of Bacterial Foraging", IEEE Control Systems Magazine 22(3), 2002, and
+//! Wang et al. (2022), algorithm 1, eq. 3.1 to 3.4. Read as: swarming per bacterium over all bacteria (eq. 3.3 sums over the index
 //! that it also judges); round(survivors * decay) of at least one, refilled in their order; points are clamped to
 //! the bounds; the cost is calculated again after every step of a swim (the algorithm's line 14 does not say so).
 //! Bacteria move one after another, each in the field of the others where they are by then, so that this is the one

@@ -2,7 +2,7 @@
 //!
 //! Passino's bacteria keep a step that is worse, and anybody may be dispersed, the best one too. Greedy ones move only
 //! to where it is better, and the best is exempt: it is lost only to the others' attraction, or to a death for its poor
-//! health of before. It is ours, made to see what seed paper 000's decay and elite are worth; no paper prints it.
+//! health of before. It is ours, made to see what the decay and elite of Wang et al. (2022) are worth; no paper prints it.
 //!
 //! The colony is in [`super::bacteria`].
 use super::bacteria::{Bacterium, Colony, Exempt, Heading, Parameters, tumble};
@@ -35,7 +35,7 @@ impl Heading for Tumble {
 }
 
 impl Bfoa {
-    /// Case 1 of seed paper 000; a budget does not change the schedule, it cuts it.
+    /// Case 1 of Wang et al. (2022); a budget does not change the schedule, it cuts it.
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         Self { parameters: case_1(setup), exempt: Exempt::Nobody, greedy: false }

@@ -3,7 +3,7 @@
 //! Fragrance f = c `I^a` with the butterfly's cost as stimulus I. With probability p it flies to x + (r² best - x) f,
 //! else to x + (r² `x_j` - `x_k`) f, and stays where it was unless the new place is better.
 //!
-//! Source: Arora and Singh, "Butterfly Optimization Algorithm", Soft Computing 23, 2019; seed paper 001 compares with
+//! Source: Arora and Singh, "Butterfly Optimization Algorithm", Soft Computing 23, 2019; Li, Xing and Qin (2025) compares with
 //! it. Read as: c starts at 0.01 and grows by 0.025/(c T) an iteration; a = 0.1; p = 0.8 (some ports have 0.6); I is
 //! the cost's magnitude, since a negative one has no root; one r a butterfly; j and k differ from each other, not
 //! from the butterfly; everybody moves, and then all are evaluated.
@@ -32,7 +32,7 @@ impl Boa {
     /// What c grows by, times c T.
     const GROWTH: f64 = 0.025;
 
-    /// The authors' numbers, population and iterations of seed paper 001.
+    /// The authors' numbers, population and iterations of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let [to_best, modality, exponent] = Self::AUTHORS;

@@ -3,7 +3,7 @@
 //! Everything is BFOA's but the direction: v = w v + `c_1` `r_1` (own best - x) + `c_2` `r_2` (best - x), of which
 //! only the direction counts; the step stays. A velocity of nothing gives a random direction.
 //!
-//! Source: seed paper 000 compares with it and gives neither w nor c; `c_1` = 1.2 and `c_2` = 0.5 are those of the
+//! Source: Wang et al. (2022) compares with it and gives neither w nor c; `c_1` = 1.2 and `c_2` = 0.5 are those of the
 //! widely copied Matlab program, w = 0.9 is ours. Korani, "Bacterial Foraging Oriented by Particle Swarm
 //! Optimization Strategy for PID Tuning", GECCO 2008. Read as: fresh random numbers for every coordinate; survivors
 //! pass velocity and own best on to their copies; who is dispersed starts anew. This is the reading that "bso" means,
@@ -34,7 +34,7 @@ impl Bso {
     /// The pulls when nothing else is said.
     pub const PULLS: [f64; 2] = [1.2, 0.5];
 
-    /// Case 1 of seed paper 000; a budget does not change the schedule, it cuts it.
+    /// Case 1 of Wang et al. (2022); a budget does not change the schedule, it cuts it.
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         Self { parameters: case_1(setup), inertia: Self::INERTIA, pulls: Self::PULLS }

@@ -27,7 +27,7 @@ pub struct BsoStep {
 }
 
 impl BsoStep {
-    /// Case 1 of seed paper 000; a budget does not change the schedule, it cuts it.
+    /// Case 1 of Wang et al. (2022); a budget does not change the schedule, it cuts it.
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         Self { parameters: case_1(setup), inertia: 0.729, pull: 1.494 }

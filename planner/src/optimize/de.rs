@@ -3,8 +3,8 @@
 //! Trial = a + F (b - c) in coordinates that are drawn with probability CR, and in one at least; it replaces its
 //! parent unless it is worse.
 //!
-//! Source: Storn and Price, "Differential Evolution", Journal of Global Optimization 11, 1997, as rand/1/bin; seed
-//! paper 003 compares with a "DE" and defines nothing. Read as: F = 0.5, CR = 0.9; a, b, c differ from each other and
+//! Source: Storn and Price, "Differential Evolution", Journal of Global Optimization 11, 1997, as rand/1/bin;
+//! Lv et al. (2019) compares with a "DE" and defines nothing. Read as: F = 0.5, CR = 0.9; a, b, c differ from each other and
 //! from the parent; all trials are made, then evaluated.
 //!
 //! Random numbers of a trial: a, b, c, the coordinate that is certain; then one for each coordinate.
@@ -27,7 +27,7 @@ impl De {
     /// F and CR, ours; the paper gives none.
     pub const NUMBERS: [f64; 2] = [0.5, 0.9];
 
-    /// Population and iterations of seed paper 003.
+    /// Population and iterations of Lv et al. (2019).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let [factor, crossover] = Self::NUMBERS;

@@ -4,7 +4,7 @@
 //! between the parents' and half their distance beyond, and mutates with a probability of a tenth by a normal number
 //! with a deviation of a tenth of the box's side.
 //!
-//! Source: seed paper 003 compares with a "GA" and defines nothing; this is the textbook's: blend crossover of Eshelman
+//! Source: Lv et al. (2019) compares with a "GA" and defines nothing; this is the textbook's: blend crossover of Eshelman
 //! and Schaffer, "Real-coded genetic algorithms and interval-schemata", FOGA 2, 1993, with α = 0.5.
 //!
 //! Random numbers of a child: two for each tournament; then for each coordinate the blend, whether it mutates, the
@@ -30,7 +30,7 @@ impl Ga {
     /// Our numbers; the paper gives none.
     pub const MUTATION: [f64; 2] = [0.1, 0.1];
 
-    /// Population and iterations of seed paper 003.
+    /// Population and iterations of Lv et al. (2019).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let schedule = Pso::PAPER_003.fitted(setup.evaluations, Pso::PAPER_003.population - 1);

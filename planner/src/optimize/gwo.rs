@@ -3,8 +3,8 @@
 //! Each coordinate becomes the mean of three moves l - A |C l - x|, one towards each leader l, with A uniform in
 //! -a..a, C uniform in 0..2, and a falling from 2 to 0. There is no greedy step.
 //!
-//! Source: Mirjalili, Mirjalili and Lewis, "Grey Wolf Optimizer", Advances in Engineering Software 69, 2014; seed
-//! paper 001 compares with it. Read as: the leaders are the three best points that any iteration has seen; in
+//! Source: Mirjalili, Mirjalili and Lewis, "Grey Wolf Optimizer", Advances in Engineering Software 69, 2014;
+//! Li, Xing and Qin (2025) compares with it. Read as: the leaders are the three best points that any iteration has seen; in
 //! iteration t = 1..T, a = 2 (1 - (t - 1)/T); everybody moves, and then all are evaluated.
 //!
 //! Random numbers: for each wolf, coordinate and leader in turn: one for A, one for C.
@@ -20,13 +20,13 @@ pub struct Gwo {
 }
 
 impl Gwo {
-    /// What seed paper 001 runs every method with.
+    /// What Li, Xing and Qin (2025) runs every method with.
     pub const PAPER_001: Schedule = Schedule { population: 50, iterations: 5000 };
     /// Where a starts; it ends at 0.
     const A_START: f64 = 2.0;
     const LEADERS: usize = 3;
 
-    /// The numbers of seed paper 001.
+    /// The numbers of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let per_iteration = Self::PAPER_001.population;

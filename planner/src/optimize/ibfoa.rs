@@ -5,7 +5,7 @@
 //! health; it need not be the best, and chemotaxis may worsen it, so what counts is the best ever seen, which every
 //! run returns. [`Exempt::Best`] is what the paper's text describes.
 //!
-//! Source: seed paper 000, section 3.2 and algorithm 1. The colony is in [`super::bacteria`].
+//! Source: Wang et al. (2022), section 3.2 and algorithm 1. The colony is in [`super::bacteria`].
 use super::bacteria::{Colony, Exempt, Parameters};
 use super::bfoa::{Tumble, case_1};
 use super::problem::Refusal;

@@ -2,7 +2,7 @@
 //!
 //! To PSO's velocity comes `c_3` `r_3` (best - own best), and in every iteration the worst particles start anew.
 //!
-//! Source: seed paper 003, eq. 3 to 5 and table 4. Corrected against printed: the exchange has a sign (printed:
+//! Source: Lv et al. (2019), eq. 3 to 5 and table 4. Corrected against printed: the exchange has a sign (printed:
 //! |best - own best|, which pushes every coordinate to its upper bound). In both readings: w falls from 0.9 to 0.4
 //! and `c_3` from 2 to 0, linearly from the first iteration to the last; four of forty are replaced (the paper gives
 //! no number), those with the highest cost now; they start at rest, at a random point that is their own best. The

@@ -4,7 +4,7 @@
 //! probability `P_t` a crossover with the best, whose better child replaces a worse mould; a bee's search of one
 //! coordinate; and the vertex of a parabola through two random moulds and the best, coordinate by coordinate.
 //!
-//! Source: seed paper 001, eq. 27 to 32. Corrected against printed: the parts of [`super::sma`]; vc is the bound of a
+//! Source: Li, Xing and Qin (2025), eq. 27 to 32. Corrected against printed: the parts of [`super::sma`]; vc is the bound of a
 //! random factor (printed: the factor itself, always positive, which draws everybody to the origin); L is a Laplace
 //! variate μ + λ ln 2r, μ - λ ln(2 - 2r) (printed: μ - λ ln r, μ + λ ln r, which leaves a gap between its halves);
 //! the vertex counts only where the parabola opens upwards (printed: it may be a maximum). In both readings: where
@@ -44,7 +44,7 @@ impl Isma {
     /// Our `P_t`, μ and λ; the paper gives none.
     pub const UNPRINTED: [f64; 3] = [0.5, 0.0, 0.5];
 
-    /// The numbers of seed paper 001.
+    /// The numbers of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let [crossover, mu, lambda] = Self::UNPRINTED;

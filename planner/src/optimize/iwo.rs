@@ -5,7 +5,7 @@
 //! `P_max` places.
 //!
 //! Source: Mehrabian and Lucas, "A novel numerical optimization algorithm inspired from weed colonization", Ecological
-//! Informatics 1, 2006; seed paper 004, section III and eq. 14. Read as: t = 1..T; σ in sides of the box; where all
+//! Informatics 1, 2006; Sengupta et al. (2011), section III and eq. 14. Read as: t = 1..T; σ in sides of the box; where all
 //! weeds cost the same, each has `S_max` seeds; equals keep their order, weeds before seeds.
 //!
 //! Random numbers of a seed: a normal one for each coordinate.
@@ -29,7 +29,7 @@ pub struct Iwo {
 }
 
 impl Iwo {
-    /// The numbers of seed paper 004.
+    /// The numbers of Sengupta et al. (2011).
     pub const PAPER_004: Self = Self {
         schedule: Schedule { population: 5, iterations: 100 },
         population_max: 10,
@@ -40,7 +40,7 @@ impl Iwo {
     /// Seeds of all weeds in an iteration, about (ours: 1500 evaluations in 100 iterations).
     const PER_ITERATION: usize = 15;
 
-    /// The numbers of seed paper 004.
+    /// The numbers of Sengupta et al. (2011).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let paper = Self::PAPER_004;

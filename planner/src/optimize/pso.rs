@@ -3,8 +3,8 @@
 //! v = w v + `c_1` `r_1` (own best - x) + `c_2` `r_2` (best - x), then x + v.
 //!
 //! Source: Kennedy and Eberhart, "Particle Swarm Optimization", ICNN 1995 (w = 1, c = 2: nothing damps it); Clerc and
-//! Kennedy, IEEE Transactions on Evolutionary Computation 6(1), 2002 (constriction, w = 0.729, c = 1.494). Seed paper
-//! 003 compares with both and gives no numbers but its population and iterations. Read as: fresh random numbers for
+//! Kennedy, IEEE Transactions on Evolutionary Computation 6(1), 2002 (constriction, w = 0.729, c = 1.494).
+//! Lv et al. (2019) compares with both and gives no numbers but its population and iterations. Read as: fresh random numbers for
 //! every coordinate; the first velocity is half the way to a random point; a particle stops at the box but keeps its
 //! velocity; everybody moves, and then all are evaluated.
 //!
@@ -45,7 +45,7 @@ pub struct Pso {
 }
 
 impl Pso {
-    /// Population and iterations of seed paper 003.
+    /// Population and iterations of Lv et al. (2019).
     pub const PAPER_003: Schedule = Schedule { population: 40, iterations: 1000 };
 
     /// The one of 1995.

@@ -82,7 +82,7 @@ macro_rules! method {
 
 /// Every method.
 pub const METHODS: &[Method] = &[
-    method!("ibfoa", "bacterial foraging with decay and elite (seed paper 000)", Ibfoa::set_up),
+    method!("ibfoa", "bacterial foraging with decay and elite (Wang et al. 2022)", Ibfoa::set_up),
     method!("bfoa", "bacterial foraging (Passino 2002)", Bfoa::set_up),
     method!("bso", "bacterial foraging along particle velocities (Korani 2008)", Bso::set_up),
     method!(
@@ -91,12 +91,12 @@ pub const METHODS: &[Method] = &[
         BsoStep::set_up
     ),
     method!("greedy-bfoa", "bacterial foraging that takes worsening steps back", Bfoa::greedy),
-    method!("isma", "slime mould with crossover, bee search, parabolas (seed paper 001)", Isma::set_up),
+    method!("isma", "slime mould with crossover, bee search, parabolas (Li, Xing and Qin 2025)", Isma::set_up),
     method!("sma", "slime mould (Li et al. 2020)", Sma::set_up),
     method!("boa", "butterflies (Arora and Singh 2019)", Boa::set_up),
     method!("gwo", "grey wolves (Mirjalili et al. 2014)", Gwo::set_up),
     method!("ssa", "sparrow search (Xue and Shen 2020)", Ssa::set_up),
-    method!("iepso", "particles with exchange and elimination (seed paper 003)", Iepso::set_up),
+    method!("iepso", "particles with exchange and elimination (Lv et al. 2019)", Iepso::set_up),
     method!("pso", "particles of 1995, without damping (Kennedy and Eberhart)", Pso::original),
     method!("spso", "particles with constriction (Clerc and Kennedy 2002)", Pso::standard),
     method!("ga", "genetic algorithm: tournament, blend, Gaussian mutation", Ga::set_up),

@@ -5,7 +5,7 @@
 //! probability p = tanh |cost - best| it goes to best + vb (W `X_A` - `X_B`), otherwise to vc x; vb is uniform in
 //! -a..a with a = artanh(1 - t/T), vc in -b..b with b = 1 - t/T. The second move shrinks to the origin.
 //!
-//! Source: Li et al., "Slime mould algorithm", Future Generation Computer Systems 111, 2020; seed paper 001, eq. 17 to
+//! Source: Li et al., "Slime mould algorithm", Future Generation Computer Systems 111, 2020; Li, Xing and Qin (2025), eq. 17 to
 //! 26. Corrected: tanh (printed: tan); a new start draws every coordinate for itself (printed: one number for all,
 //! which puts it on the box's diagonal, where many benchmarks have their optimum). In both readings: logarithm to
 //! base 10 (not said; the authors' program), z = 0.04 (the seed's; the original's is 0.03), the missing minus in
@@ -30,10 +30,10 @@ pub struct Sma {
 }
 
 impl Sma {
-    /// The seed paper's z.
+    /// z of Li, Xing and Qin (2025).
     pub const RESTART: f64 = 0.04;
 
-    /// The numbers of seed paper 001.
+    /// The numbers of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let schedule = Gwo::PAPER_001.fitted(setup.evaluations, Gwo::PAPER_001.population);

@@ -6,7 +6,7 @@
 //! A sparrow stays unless the new place is better.
 //!
 //! Source: Xue and Shen, "A Novel Swarm Intelligence Optimization Approach: Sparrow Search Algorithm", Systems
-//! Science and Control Engineering 8(1), 2020; seed paper 001 compares with it. Read as: i is the rank by cost from
+//! Science and Control Engineering 8(1), 2020; Li, Xing and Qin (2025) compares with it. Read as: i is the rank by cost from
 //! 1; one α, Q, β, K a sparrow; A⁺ L with A of random signs is the mean of the signed distances for every coordinate
 //! (so that scroungers move along the diagonal); the best new place of a producer is the one to settle round; whether
 //! a place is taken is decided when all have moved, and then the watch moves. Shrinking draws to the origin, and both diagonals favour problems whose optimum lies on one.
@@ -37,7 +37,7 @@ impl Ssa {
     /// Share of producers, share on watch, safety threshold.
     pub const AUTHORS: [f64; 3] = [0.2, 0.2, 0.8];
 
-    /// The authors' numbers, population and iterations of seed paper 001.
+    /// The authors' numbers, population and iterations of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
         let [producers, watch, safety] = Self::AUTHORS;

@@ -1,4 +1,4 @@
-//! The benchmark functions F1 to F6 of seed paper 001, also with their optimum moved.
+//! The benchmark functions F1 to F6 of Li, Xing and Qin (2025), also with their optimum moved.
 //!
 //! Source: its table 1, whose text has lost roots, squares and signs; written here as their authors have them. F2 is
 //! the paper's, a sphere round -0.5: the floor of the classic Step function is lost, and with it the steps. F4's

@@ -1,4 +1,4 @@
-//! A criterion for the number of control points, which seed paper 000 chooses by trial and error and wishes for.
+//! A criterion for the number of control points, which Wang et al. (2022) chooses by trial and error.
 //!
 //! Begin with one; optimise; add another in the middle of the longest segment, and optimise again from there. Stop when
 //! the path is free of collision and the last one added has not lowered the cost by a given share: it is left out

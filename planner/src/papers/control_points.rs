@@ -1,4 +1,4 @@
-//! The random cases of seed paper 000 for its planning problem, which is [`ControlPointCost`]. The product's own
+//! The random cases of Wang et al. (2022) for its planning problem, which is [`ControlPointCost`]. The product's own
 //! refinement ([`crate::refine`]) has the same structure over the exact world; this is the paper's, for comparing.
 //!
 //! Source: section 5 and table 1. Its scenes are "random": start and goal uniform in (-π, π), three spheres of radius

@@ -1,4 +1,4 @@
-//! What the seed papers optimise: their benchmark functions, arms, objectives and scenes.
+//! What the five papers (docs/papers.md) optimise: their benchmark functions, arms, objectives and scenes.
 //!
 //! The methods are in [`crate::optimize`]; here are the problems they are tried on, and the papers' own ways of using
 //! them. Nothing here moves an arm: motions for metal come from [`crate::plan()`].

@@ -1,4 +1,4 @@
-//! Reaching a position without inverse kinematics, by reward and punishment (seed paper 003).
+//! Reaching a position without inverse kinematics, by reward and punishment (Lv et al. 2019).
 //!
 //! The cost of joint angles is the time of the joint that has farthest to go, max |θ|/ω, plus a punishment of how far
 //! the tip is off (K exp(-5 (λ + 1)²), at least 67 and at most K), or, within ε, a reward that grows to 24 at the

@@ -1,4 +1,4 @@
-//! Interpolation by a non-uniform B-spline of degree seven (seed paper 001).
+//! Interpolation by a non-uniform B-spline of degree seven (Li, Xing and Qin 2025).
 //!
 //! Joint positions at given times, and velocity, acceleration and jerk at both ends, give one curve per joint whose
 //! derivatives up to the sixth are continuous. The parameter runs from 0 to 1 over the whole time.

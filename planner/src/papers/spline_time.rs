@@ -1,4 +1,4 @@
-//! How long each piece of a spline should last: time against impact (seed paper 001).
+//! How long each piece of a spline should last: time against impact (Li, Xing and Qin 2025).
 //!
 //! F = Kt F1 + Kj F2 + Kp Fp with F1 the whole time, F2 the sum over the joints of their jerk's root mean square, and
 //! Fp the number of limits that are broken, one for each joint and each of speed, acceleration and jerk.

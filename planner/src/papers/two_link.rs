@@ -1,4 +1,4 @@
-//! The two-link arm of seed paper 004: the first link swings in a vertical plane, the second stays horizontal.
+//! The two-link arm of Sengupta et al. (2011): the first link swings in a vertical plane, the second stays horizontal.
 //!
 //! θ is the first link's angle from the upward axis in the plane at azimuth α; φ is the second link's azimuth. Units are
 //! the paper's relative ones for lengths and masses, radians and seconds; g is 9.81 of those lengths a second squared,

@@ -1,4 +1,4 @@
-//! Cubics of least energy through via points of the two-link arm (seed paper 004, stage 2).
+//! Cubics of least energy through via points of the two-link arm (Sengupta et al. 2011, stage 2).
 //!
 //! Between two via points each angle is a cubic in time; position and speed carry over from piece to piece and the last
 //! coefficient, `a_3` of θ and `b_3` of φ, is chosen to make the integral of the mechanical energy least. The arm starts

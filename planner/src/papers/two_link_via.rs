@@ -1,4 +1,4 @@
-//! Via points of the two-link arm, found greedily one step at a time (seed paper 004, stage 1).
+//! Via points of the two-link arm, found greedily one step at a time (Sengupta et al. 2011, stage 1).
 //!
 //! A step of up to 20 degrees an angle is chosen to come near the goal, at a price for every sphere of the arm that
 //! touches an obstacle (highest at its centre) and for every angle out of its range.

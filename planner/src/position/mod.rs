@@ -1,4 +1,4 @@
-//! From a pose to a verified motion whose tip ends at a position, without inverse kinematics (seed paper 003).
+//! From a pose to a verified motion whose tip ends at a position, without inverse kinematics (Lv et al. 2019).
 //!
 //! Swarms look for poses whose tip is there, several times with seeds of their own, and each find is polished. What is
 //! not exact, or nearer to anything than it may be, is dropped; to the nearest of the others motions are planned, and the

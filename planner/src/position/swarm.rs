@@ -1,4 +1,4 @@
-//! Poses of an arm whose tip is at a point, found by a swarm under the cost of seed paper 003.
+//! Poses of an arm whose tip is at a point, found by a swarm under the cost of Lv et al. (2019).
 //!
 //! The paper's cost is of one arm in free space; here it has the arm's own joint ranges, each joint's own speed and, once
 //! the tip is near, a toll for whatever is nearer than it may be. Its constants keep the paper's values and units:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""F1 to F6 of seed paper 001 at a few points, from the usual definitions (plain Python). Prints the table that
+"""F1 to F6 of Li, Xing and Qin (2025) at a few points, from the usual definitions (plain Python). Prints the table that
 tests/benchmarks.rs holds."""
 from math import cos, e, exp, pi, prod, sin, sqrt
 

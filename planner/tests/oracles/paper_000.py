@@ -1,4 +1,4 @@
-"""The bacteria on a Field, written from seed paper 000 and Passino's and Biswas's articles, not from the Rust code."""
+"""The bacteria on a Field, written from Wang et al. (2022) and Passino's and Biswas's articles, not from the Rust code."""
 from math import exp, floor, sqrt
 
 S, NC, NS, NRE, NED, SR, STEP, PED = 4, 3, 2, 1, 3, 3, 0.4, 0.7

@@ -1,4 +1,4 @@
-"""ISMA, SMA, BOA, GWO and SSA on a Field, written from seed paper 001 and the methods' own articles."""
+"""ISMA, SMA, BOA, GWO and SSA on a Field, written from Li, Xing and Qin (2025) and the methods' own articles."""
 from math import atanh, copysign, e, exp, floor, log, log10, tan, tanh
 
 from field import BOX

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One robust bacterial robot in front of a U, written from seed paper 002's algorithm 1 as papers.md reads it (plain
+"""One robust bacterial robot in front of a U, written from algorithm 1 of Abdi et al. (2020) (plain
 Python). Prints how many places and virtual obstacles there are, every twentieth place, and the virtual obstacles, for
 tests/papers_planar.rs: `python3 paper_002.py > planar_walk.txt`."""
 from math import exp, hypot

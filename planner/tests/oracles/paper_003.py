@@ -1,4 +1,4 @@
-"""IEPSO, PSO, SPSO, GA and DE on a Field, written from seed paper 003 and the methods' own articles."""
+"""IEPSO, PSO, SPSO, GA and DE on a Field, written from Lv et al. (2019) and the methods' own articles."""
 from field import BOX
 
 N, T = 6, 4

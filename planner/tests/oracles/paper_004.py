@@ -1,4 +1,4 @@
-"""IWO on a Field, written from seed paper 004 and Mehrabian and Lucas's article."""
+"""IWO on a Field, written from Sengupta et al. (2011) and Mehrabian and Lucas's article."""
 from math import floor
 
 from field import BOX

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The arm of seed paper 003 by its Denavit-Hartenberg matrices, and its reward, in the paper's millimetres (plain
+"""The arm of Lv et al. (2019) by its Denavit-Hartenberg matrices, and its reward, in the paper's millimetres (plain
 Python). Prints what tests/papers_reach.rs holds."""
 from math import cos, exp, pi, sin, sqrt
 

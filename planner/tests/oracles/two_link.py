@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Seed paper 004's arm as point masses along its links, and its price of a via point (plain Python). Prints what
+"""The arm of Sengupta et al. (2011) as point masses along its links, and its price of a via point (plain Python). Prints what
 tests/papers_two_link.rs holds: kinetic and potential energy, and prices."""
 from math import cos, degrees, exp, pi, sin, sqrt
 

@@ -1,10 +1,10 @@
-//! Robots in the plane that feel their way to a goal (seed paper 002): bacterial foraging steps, virtual obstacles as an
+//! Robots in the plane that feel their way to a goal (Abdi et al. 2020): bacterial foraging steps, virtual obstacles as an
 //! escape from traps, and the potential field that it is compared with.
 //!
 //! A robot knows where it is, where its goal is, and what its sensor sees within its range; it remembers its trace.
 //! Lengths are centimetres, as in the paper.
 //!
-//! Source: seed paper 002, eq. 1 to 15 and algorithm 1; most of its numbers are not printed, ours are named
+//! Source: Abdi et al. (2020), eq. 1 to 15 and algorithm 1; most of its numbers are not printed, ours are named
 //! [`Numbers::OURS`].
 mod drive;
 mod field;
