@@ -66,7 +66,7 @@ pub enum Event {
         start_offset_rad: Vec<f64>,
     },
     /// Setpoints were sent.
-    LoggedCycle(LoggedCycle),
+    Cycle(LoggedCycle),
     /// The phase changed.
     Phase {
         /// Cycle number.

@@ -133,7 +133,7 @@ pub fn check_setpoints(
                 path.accept(*trajectory_id, file, start_offset_rad)?;
                 check_result.trajectories += 1;
             }
-            Event::LoggedCycle(cycle) => {
+            Event::Cycle(cycle) => {
                 let before = last.filter(|last| last.tick + 1 == cycle.tick);
                 check_result.setpoints +=
                     compare_cycle(&sent, (before, cycle), bus, (motors, period_s), &mut claimed)?;

@@ -193,7 +193,7 @@ fn check_assuming(
                 path.accept(*trajectory_id, file, start_offset_rad)?;
                 check_result.trajectories += 1;
             }
-            Event::LoggedCycle(cycle) => {
+            Event::Cycle(cycle) => {
                 let whole = is_whole(cycle, bus);
                 if !whole && losses == Losses::None {
                     return Err(Flaw::Log(format!(
@@ -240,7 +240,7 @@ const SILENCES_MAX: usize = 3;
 /// The last cycles that a bus took before it fell silent.
 fn before_silences(log: &[Event], bus: usize) -> Vec<u64> {
     let cycle = |event: &Event| match event {
-        Event::LoggedCycle(cycle) => Some((cycle.tick, is_lost(cycle, bus))),
+        Event::Cycle(cycle) => Some((cycle.tick, is_lost(cycle, bus))),
         Event::Start { .. } | Event::Phase { .. } | Event::Lost { .. } | Event::Trajectory { .. } => None,
     };
     let cycles: Vec<(u64, bool)> = log.iter().filter_map(cycle).collect();

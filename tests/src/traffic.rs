@@ -98,7 +98,7 @@ fn show(nodes: &mut BTreeMap<u32, Node>, node: u32, change: impl FnOnce(&mut Nod
 fn wanted_by_sync(log: &[Event], bus: usize) -> Wanted {
     let mut wanted = BTreeMap::new();
     for event in log {
-        if let Event::LoggedCycle(cycle) = event
+        if let Event::Cycle(cycle) = event
             && let Some(sync) = cycle.sync.get(bus)
         {
             wanted.insert(*sync, (cycle.tick, cycle.position_rad.clone()));

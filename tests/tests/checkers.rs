@@ -78,7 +78,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             data.extend(e.counts(position_rad[e.joint]).to_le_bytes());
             frames.push(BusFrame { id: 0x180 + u32::from(e.node_id), data });
         }
-        log.push(Event::LoggedCycle(LoggedCycle {
+        log.push(Event::Cycle(LoggedCycle {
             tick: u64::from(tick),
             time_ns: u64::from(tick) * 1_000_000,
             sync: vec![u64::from(tick)],
@@ -111,7 +111,7 @@ fn place(frames: &[BusFrame], sync: usize, node: u8) -> usize {
 
 fn nth_cycle(log: &mut [Event], n: usize) -> &mut LoggedCycle {
     let mut cycles =
-        log.iter_mut().filter_map(|e| if let Event::LoggedCycle(c) = e { Some(c) } else { None });
+        log.iter_mut().filter_map(|e| if let Event::Cycle(c) = e { Some(c) } else { None });
     cycles.nth(n).expect("the cycle")
 }
 

@@ -81,7 +81,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             frames.push(BusFrame { id: u32::from(m.node_id), data });
             frames.push(BusFrame { id: u32::from(m.feedback_id), data: answer });
         }
-        log.push(Event::LoggedCycle(LoggedCycle {
+        log.push(Event::Cycle(LoggedCycle {
             tick: u64::from(tick),
             time_ns: u64::from(tick) * 1_000_000,
             sync: vec![0],

@@ -39,7 +39,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
                 frames.push(BusFrame { id, data: [counts(first), counts(first + 1)].concat() });
             }
         }
-        log.push(Event::LoggedCycle(LoggedCycle {
+        log.push(Event::Cycle(LoggedCycle {
             tick: u64::from(cycle),
             time_ns: u64::from(cycle) * 1_000_000,
             frames: vec![2 * u64::from(cycle) + 5],

@@ -230,7 +230,7 @@ pub(crate) enum BenchName {
     ///
     /// No servos are needed: the frames go out, and the arm swings in memory only. Real servos on the bus would get
     /// setpoints, so run it on a virtual bus.
-    CycleSettings {
+    Cycle {
         /// How long to measure, s.
         #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 20.0)]
         seconds: f64,

@@ -16,7 +16,7 @@ struct Answer(CycleBench);
 /// Measures and prints.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Result<(), Failure> {
     let (seconds, slices, link, allow_non_realtime) = match &args.name {
-        BenchName::CycleSettings { seconds, slices, link, allow_non_realtime } => {
+        BenchName::Cycle { seconds, slices, link, allow_non_realtime } => {
             (seconds, slices, link, allow_non_realtime)
         }
         BenchName::Compare(args) => return super::compare::run(form, args),

@@ -97,7 +97,7 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
 /// last one then, and the way back is not in the log.
 fn is_off_by_a_stall(settings: &Settings, log: &Path) -> bool {
     let stands_still =
-        |event: &Event| matches!(event, Event::LoggedCycle(c) if c.phase == "moving" && c.sigma == 0.0);
+        |event: &Event| matches!(event, Event::Cycle(c) if c.phase == "moving" && c.sigma == 0.0);
     let in_turns = settings.buses.iter().any(|bus| bus.traffic.setpoint_every > 1);
     in_turns && cycle_log::read(log).is_ok_and(|log| log.iter().any(stands_still))
 }

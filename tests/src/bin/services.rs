@@ -25,7 +25,7 @@ enum What {
     Boot {
         /// What `cargo xtask install --root STAGE` has installed.
         #[arg(long)]
-        bench: PathBuf,
+        stage: PathBuf,
         /// Where the Debian image is kept.
         #[arg(long)]
         cache: PathBuf,
@@ -69,7 +69,7 @@ fn perform(what: What) -> Result<usize> {
     match what {
         What::Check { only } => checks::run(&only),
         What::Stall { process, thread } => stall::hold(process, &thread).map(|()| 0),
-        What::Boot { bench, cache, output, limit_s, only } => {
+        What::Boot { stage, cache, output, limit_s, only } => {
             let stop = Arc::new(AtomicBool::new(false));
             for number in [SIGINT, SIGTERM, SIGHUP] {
                 signal_hook::flag::register(number, Arc::clone(&stop))?;
@@ -82,8 +82,8 @@ fn perform(what: What) -> Result<usize> {
                 std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
             }
             let controller = cache.join("controller");
-            files::lay_out(&controller, &bench)?;
-            let booted = Booted { image: &image, files: &[&bench, &controller], output: &output, limit_s };
+            files::lay_out(&controller, &stage)?;
+            let booted = Booted { image: &image, files: &[&stage, &controller], output: &output, limit_s };
             let status = booted.run(&["/opt/services", "check", &only], &stop)?;
             println!("booted, tried and ended in {:.0} s", since.elapsed().as_secs_f64());
             if status == machine::TIMED_OUT {
