@@ -1,4 +1,4 @@
-//! The plain RRT that Wang et al. (2022) compare with, against a program written from LaValle's report.
+//! The plain RRT that Wang et al. (2022) compare with, against a program written from its original report (`LaValle` 1998).
 use std::cell::Cell;
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::rng::SeededRng;
