@@ -106,8 +106,7 @@ fn read_traffic(table: &mut Table<'_>) -> Option<Traffic> {
     let feedback_every = table.integer_or("feedback_every", 1, 1, i64::from(FEEDBACK_EVERY_MAX));
     let packed = if table.has("packed") { table.flag("packed") } else { Some(false) };
     if stagger == Some(true) && setpoint_every == Some(1) {
-        let expected =
-            "stagger beside setpoint_every of 2 or more: with one setpoint a cycle there are no turns";
+        let expected = "stagger together with setpoint_every of 2 or more: with setpoint_every = 1 there is nothing to stagger";
         table.fault("stagger", "true", expected);
     }
     Some(Traffic {

@@ -33,8 +33,7 @@ pub(crate) fn check_times(fault_list: &FaultList, cycle: &CycleSettings, supervi
     // Our own stop keeps the arm on its path; the drives' does not, so ours must come first.
     let lost_ms = f64::from(supervision.lost_cycles_max) * period_ms;
     if lost_ms >= f64::from(watchdog_ms) {
-        let expected =
-            format!("fewer cycles than drive_watchdog_ms = {watchdog_ms} holds ({lost_ms} ms as it stands)");
+        let expected = format!("fewer cycles than drive_watchdog_ms = {watchdog_ms} (now {lost_ms} ms)");
         fault_list.add(
             None,
             "supervision.lost_cycles_max",
@@ -120,7 +119,7 @@ pub(crate) fn check_loads(fault_list: &FaultList, settings: &Settings) {
             settings.remedies(i).into_iter().filter(|remedy| remedy.suffices).map(|remedy| remedy.what);
         let remedies: Vec<String> = best.take(2).collect();
         let expected = format!(
-            "at most {REFUSED_PERCENT} % on {}, for instance by {} (`taustream check` lists all ways out)",
+            "at most {REFUSED_PERCENT} % on {}, for instance by {} (`taustream check` lists all remedies)",
             bus.interface,
             if remedies.is_empty() { "more buses".to_owned() } else { remedies.join("; or by ") }
         );
@@ -149,7 +148,7 @@ pub(crate) fn check_traffic(fault_list: &FaultList, settings: &Settings) {
         if setpoint_every > 1 && f64::from(watchdog_ms) <= wait_ms {
             let expected = format!(
                 "setpoints that come, with the tolerated gap, more often than every drive_watchdog_ms = \
-                 {watchdog_ms} ({wait_ms} ms as it stands)"
+                 {watchdog_ms} (now {wait_ms} ms)"
             );
             fault_list.add(None, &format!("bus[{i}].setpoint_every"), &setpoint_every.to_string(), &expected);
         }
@@ -157,9 +156,7 @@ pub(crate) fn check_traffic(fault_list: &FaultList, settings: &Settings) {
         let age_s = settings.supervision.feedback_age_s_max;
         let least_s = f64::from(feedback_every + 1) * period_ms * 1e-3;
         if feedback_every > 1 && age_s < least_s {
-            let expected = format!(
-                "answers for which feedback_age_s_max = {age_s:?} has room: it must be {least_s} s or more"
-            );
+            let expected = format!("feedback_age_s_max = {age_s:?} to be {least_s} s or more");
             fault_list.add(None, &format!("bus[{i}].feedback_every"), &feedback_every.to_string(), &expected);
         }
     }

@@ -109,7 +109,7 @@ impl Manager {
 fn notify(states: &[NotifyState<'_>]) {
     static COMPLAINT: Once = Once::new();
     if let Err(error) = sd_notify::notify(states) {
-        COMPLAINT.call_once(|| tracing::warn!("the service manager cannot be told anything: {error}"));
+        COMPLAINT.call_once(|| tracing::warn!("cannot notify the service manager: {error}"));
     }
 }
 

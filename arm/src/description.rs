@@ -283,7 +283,7 @@ fn read_stop(mut table: Table<'_>, motion: Option<&LimitSet>) -> Option<LimitSet
             && stop <= motion
         {
             let expected =
-                format!("more than the motion limit {motion:?}: the difference is the room for slowing down");
+                format!("more than the motion limit {motion:?}: the difference is needed for slowing down");
             table.fault(key, &format!("{stop:?}"), &expected);
         }
     };

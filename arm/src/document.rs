@@ -200,7 +200,7 @@ pub(crate) fn parse_json(file: &Path, text: &str) -> Result<Node, Faults> {
     match read {
         Ok(node) => match trail.twice.into_inner() {
             None => Ok(node),
-            Some(key) => Err(Faults(vec![Fault::new(file, &key, "stands there twice", "each key once")])),
+            Some(key) => Err(Faults(vec![Fault::new(file, &key, "appears twice", "each key once")])),
         },
         Err(e) => {
             // The trail is left as it was when the reader gave up, and so names the value that is no JSON.

@@ -32,6 +32,7 @@ mod rows;
 pub mod runtime;
 pub mod scene;
 pub mod settings;
+pub mod text;
 pub mod trajectory_file;
 pub mod trust;
 mod urdf;

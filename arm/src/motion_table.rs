@@ -179,7 +179,7 @@ fn read_header(fault_list: &FaultList, text: &str) -> Option<Columns> {
             }
         };
         if slot.replace(at).is_some() {
-            fault_list.add(Some(1), name, "stands there twice", "each column once");
+            fault_list.add(Some(1), name, "appears twice", "each column once");
         }
     }
     let moved = joints.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
@@ -274,7 +274,7 @@ mod tests {
             ("0,1,2\n", "m.csv:1: t_s = missing"),
             ("t_s\n0\n1\n", "q1_rad = missing"),
             ("t_s,q2_rad\n0,0\n1,1\n", "q1_rad = missing"),
-            ("t_s,q1_rad,t_s\n", "t_s = stands there twice"),
+            ("t_s,q1_rad,t_s\n", "t_s = appears twice"),
             ("t_s,q1_rad,q9_rad\n", "\"q9_rad\" = too many joints: expected q1_rad to q8_rad"),
             ("t_s,q1_rad\n0,0\n", "1 row(s): expected at least two rows"),
             ("t_s,q1_rad\n0,0\n1,nan\n", "m.csv:3: q1_rad = \"nan\": expected a finite number"),

@@ -5,6 +5,7 @@
 use crate::document::shown;
 use crate::reader::{Bounds, Table};
 use crate::robot::{Robot, RobotJoint};
+use crate::text::counted;
 use crate::trust::Reaction;
 use std::f64::consts::TAU;
 
@@ -143,8 +144,10 @@ fn later_words(name: &str, robot: Option<&Robot>) -> String {
     let sound = robot.map_or_else(String::new, |robot| {
         let (joints, shapes) = (robot.joints.len(), robot.shapes.len());
         format!(
-            "; the robot itself is sound ({}: {joints} joints, {shapes} collision shapes), so it can be planned for with --robot",
-            robot.name
+            "; the robot itself is valid ({}: {}, {}), so `plan --robot` can use it",
+            robot.name,
+            counted(joints, "joint"),
+            counted(shapes, "collision shape")
         )
     });
     format!("{name} is known and comes in a later version{sound}")

@@ -51,7 +51,7 @@ impl FaultList {
         let further = self.further.into_inner();
         if further > 0 {
             let more = format!("{further} more faults");
-            faults.push(Fault::new(&self.file, "", &more, "these to be mended first"));
+            faults.push(Fault::new(&self.file, "", &more, "these to be fixed first"));
         }
         match value {
             Some(value) if faults.is_empty() => Ok(value),

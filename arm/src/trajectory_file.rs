@@ -6,6 +6,7 @@
 use crate::Faults;
 use crate::document::{self, Node};
 use crate::reader::{Bounds, FaultList, Table, numbers_of};
+use crate::text::counted;
 use std::fmt::Write as _;
 use std::path::Path;
 use taustream_motion::stroke::{DURATION_S_MIN, END_S_MAX, N_MAX, N_MIN};
@@ -145,7 +146,7 @@ fn read_stroke(mut table: Table<'_>, joints: Option<usize>) -> Option<Stroke> {
 fn note(fault_list: &FaultList, error: &TrajectoryError) {
     let (key, value) = match error {
         TrajectoryError::JointCount { joints } => ("joints".to_owned(), joints.to_string()),
-        TrajectoryError::StrokeCount { strokes } => ("strokes".to_owned(), format!("{strokes} strokes")),
+        TrajectoryError::StrokeCount { strokes } => ("strokes".to_owned(), counted(strokes, "stroke")),
         TrajectoryError::Base { joint, value_rad } => {
             (format!("base_rad[{joint}]"), format!("{value_rad:?}"))
         }

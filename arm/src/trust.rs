@@ -135,8 +135,8 @@ pub(crate) fn check_feedback(table: &Table<'_>, servo: &Servo, joint: &RobotJoin
         return;
     }
     let expected = format!(
-        "a range that holds [{joint_low:?}, {joint_high:?}] of joint {}, or feedback = \"wraps\" with the angles that \
-         the feedback tells apart (a single turn of the motor is {:.6} rad of the link)",
+        "a range that contains [{joint_low:?}, {joint_high:?}] of joint {}, or feedback = \"wraps\" with the angles that \
+         the feedback distinguishes (one revolution of the motor is {:.6} rad of the link)",
         joint.name,
         TAU / servo.protocol.gear_ratio()
     );

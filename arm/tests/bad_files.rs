@@ -133,7 +133,7 @@ const ROBOT_CASES: &[Case] = &[
         "acceleration_rad_s2 = 30.0",
         "acceleration_rad_s2 = 15.0",
         "joint[0].stop.acceleration_rad_s2",
-        "room for slowing down",
+        "needed for slowing down",
     ),
     (
         Robot,

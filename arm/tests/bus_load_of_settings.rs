@@ -88,7 +88,7 @@ fn rare_setpoints_and_answers_must_fit_the_watchdogs_and_the_supervision() {
         edited("virtual = true\nsetpoint_every = 10", "drive_watchdog_ms = 100", "drive_watchdog_ms = 11");
     let slow = slow.replace("stall_resume_ms = 20", "stall_resume_ms = 5");
     let said = faults_of(&file(), &slow);
-    assert!(said.contains("bus[0].setpoint_every = 10") && said.contains("11 ms as it stands"), "{said}");
+    assert!(said.contains("bus[0].setpoint_every = 10") && said.contains("now 11 ms"), "{said}");
     let late = edited(
         "virtual = true\nfeedback_every = 10",
         "feedback_age_s_max = 0.05",

@@ -144,7 +144,7 @@ fn paper(order: &Order) -> Result<Stdio, Failure> {
 pub(crate) fn taken() -> Result<Result<Cli, clap::Error>, Failure> {
     let own = rustix::process::geteuid().as_raw();
     if user_of_services() != Some(own) {
-        let what = "is what sudo starts as the services' user; type the command itself, and it finds its way";
+        let what = "is started by sudo as the services' user; run the command itself instead";
         return Err(Failure::Usage(format!("`{COMMAND}` {what}")));
     }
     // Names of settings are looked for below the working directory too, and that one is the caller's.

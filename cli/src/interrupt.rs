@@ -32,7 +32,7 @@ pub(crate) fn forget() {
 /// Ends a wait after a signal.
 pub(crate) fn check() -> Result<(), Failure> {
     if has_come() {
-        let what = "interrupted: the arm goes on with what it does; `taustream stop` stops it";
+        let what = "interrupted: the arm continues; `taustream stop` stops it";
         return Err(Failure::Interrupted(what.to_owned()));
     }
     Ok(())

@@ -119,7 +119,7 @@ mod tests {
         write_whole(&pipe, "text").unwrap();
         let is_pipe = fs::metadata(&pipe).unwrap().file_type().is_fifo();
         fs::remove_file(&pipe).unwrap();
-        assert!(is_pipe, "a file stands where the pipe was");
+        assert!(is_pipe, "a file has replaced the pipe");
         assert_eq!(reader.join().unwrap().unwrap(), "text");
     }
 

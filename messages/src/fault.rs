@@ -171,9 +171,9 @@ impl BusFault {
             Self::Down => format!("bring it up: ip link set {interface} up"),
             Self::Gone => "bring the interface (or the simulated servos of a local link) back".to_owned(),
             Self::BusOff => format!(
-                "mend cable, termination or bit rate, then: ip link set {interface} type can restart"
+                "fix cable, termination or bit rate, then: ip link set {interface} type can restart"
             ),
-            Self::Restarted => "mend cable, termination or bit rate: it will leave the bus again".to_owned(),
+            Self::Restarted => "fix cable, termination or bit rate: otherwise it goes bus-off again".to_owned(),
             Self::ErrorPassive => {
                 "see cable, termination, bit rate and the power of the drives: bus-off is next".to_owned()
             }

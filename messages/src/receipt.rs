@@ -95,7 +95,7 @@ pub enum Rejection {
         at_s: f64,
     },
     /// The streamer had no free slot.
-    #[error("busy: another trajectory is being taken over; send it again")]
+    #[error("busy: another trajectory is being checked; send it again")]
     Busy,
 }
 

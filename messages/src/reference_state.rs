@@ -52,7 +52,7 @@ impl ReferenceState {
     pub fn from_code(code: u32) -> Self {
         Self::ALL.into_iter().find(|reference_state| reference_state.code() == code).unwrap_or_default()
     }
-    /// True when the joint's turn is known.
+    /// True when the joint's multi-turn offset is known.
     #[must_use]
     pub fn is_referenced(self) -> bool {
         matches!(self, Self::Encoder | Self::Record | Self::Adoption | Self::Operator)
@@ -61,18 +61,20 @@ impl ReferenceState {
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
-            Self::NoFeedback => "its drive was not heard yet",
-            Self::Encoder => "its feedback tells every angle",
+            Self::NoFeedback => "no feedback from its drive yet",
+            Self::Encoder => "its feedback is absolute",
             Self::Record => "by the last pose on disk",
-            Self::Adoption => "its drive was never off since it was known",
-            Self::Operator => "the operator said where it stands",
-            Self::NoRecord => "its feedback repeats itself, and there is no last pose to tell the turn",
-            Self::RecordMoving => "its feedback repeats itself, and the last pose was written in motion",
-            Self::RecordFar => {
-                "its feedback repeats itself, and the last pose is too far away to tell the turn"
+            Self::Adoption => "its drive was never off since it was referenced",
+            Self::Operator => "set by the operator",
+            Self::NoRecord => {
+                "its feedback wraps, and there is no last pose to resolve the multi-turn offset"
             }
-            Self::OutOfRange => "no turn of its feedback lies inside its range",
-            Self::Incremental => "its feedback knows nothing after power-up",
+            Self::RecordMoving => "its feedback wraps, and the last pose was written in motion",
+            Self::RecordFar => {
+                "its feedback wraps, and the last pose is too far away to resolve the multi-turn offset"
+            }
+            Self::OutOfRange => "no multi-turn offset of its feedback lies inside its range",
+            Self::Incremental => "its feedback is incremental and has no reference after power-up",
         }
     }
 }

@@ -73,8 +73,8 @@ impl Note {
     #[must_use]
     pub fn words(&self, until_s: Option<f64>) -> String {
         let Self { margin_m, near_to, required_m } = self;
-        let span =
-            until_s.map_or_else(|| "all the way".to_owned(), |t_s| format!("for the first {t_s:.2} s"));
+        let span = until_s
+            .map_or_else(|| "along the whole motion".to_owned(), |t_s| format!("for the first {t_s:.2} s"));
         format!("margin {margin_m:.4} m {span}: the start is nearer to {near_to} than {required_m:.4} m")
     }
 }

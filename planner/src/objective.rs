@@ -36,7 +36,7 @@ impl Objective {
     pub fn about(self) -> &'static str {
         match self {
             Self::Time => "shortest in time",
-            Self::Cost => "shortest way of tip and joints, weighed as in Wang et al. (2022)",
+            Self::Cost => "least path length of tip and joints, weighted as in Wang et al. (2022)",
             Self::Energy => "least mechanical work of the joints; needs masses in the robot file",
         }
     }

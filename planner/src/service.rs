@@ -111,7 +111,7 @@ impl<'a> Service<'a> {
             thread::sleep(POLL);
         }
         if let Some(waiting) = self.waiting.take() {
-            reply(&waiting.request, &failed("the planner was told to end before the running motion did"));
+            reply(&waiting.request, &failed("the planner was terminated before the running motion ended"));
         }
     }
 
@@ -159,7 +159,7 @@ impl<'a> Service<'a> {
         }
         let options = options(requested)?;
         if self.waiting.is_some() {
-            return Err("another motion waits for the end of the running one; ask again after it".to_owned());
+            return Err("another motion waits for the end of the running one; try again after it".to_owned());
         }
         let (report, phase) = self.outbox.fresh_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
@@ -203,7 +203,7 @@ impl<'a> Service<'a> {
 
     fn send(&self, request: &Request, plan: &Plan) -> PlanOutcome {
         if !request.is_connected() {
-            return failed("whoever asked for the motion is gone; not sent");
+            return failed("the client has disconnected; motion not sent");
         }
         match self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN) {
             Ok(sent) => PlanOutcome::Planned {
@@ -223,7 +223,7 @@ impl<'a> Service<'a> {
     /// streamer knows, and moves nothing; so no streamer can take it for a motion, and this one's answer is final.
     fn ask_for_cut(&self, report: &Report) -> Result<PlanOutcome, String> {
         let still: Trajectory = stand_still(self.robot.joints.len(), &report.end_rad)
-            .ok_or("the streamer reports an end pose that is no pose")?;
+            .ok_or("the streamer reports an invalid end pose")?;
         let replaces = Replaces::Cut { trajectory_id: report.trajectory_id, at_s: report.trajectory_s };
         let sent =
             self.outbox.send(self.robot, &still, replaces, RECEIPT_WITHIN).map_err(|e| e.to_string())?;
@@ -233,7 +233,7 @@ impl<'a> Service<'a> {
             duration_s: 0.0,
             clearance_m: 0.0,
             strokes: 0,
-            how: "not planned: asked the streamer to cut the running motion".to_owned(),
+            how: "not planned: the streamer was asked to cut the running motion".to_owned(),
             receipt: sent.receipt.map(Box::new),
         })
     }
@@ -243,7 +243,7 @@ impl<'a> Service<'a> {
         let Some(waiting) = self.waiting.take() else { return };
         let outcome = match newest {
             _ if !waiting.request.is_connected() => {
-                info!("whoever asked for the waiting motion is gone; dropped");
+                info!("the client of the waiting motion has disconnected; motion dropped");
                 return;
             }
             Some((_, Phase::Holding)) => self.send(&waiting.request, &waiting.plan),
@@ -308,7 +308,7 @@ fn not_ready(phase: Phase) -> String {
         | Phase::Stopping
         | Phase::FastStopping
         | Phase::Braking
-        | Phase::Disabling => "wait until that has ended and ask again",
+        | Phase::Disabling => "wait until that has ended and try again",
     };
     format!("the arm is {}; {hint}", phase.word())
 }

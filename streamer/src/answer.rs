@@ -18,7 +18,7 @@ pub struct CommandAnswer {
 
 /// What happens now, or why not. Joints are zero-based.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "each variant's sentence stands in `Why::sentence`")]
+#[expect(missing_docs, reason = "each variant has its text in `AnswerReason::sentence`")]
 pub enum AnswerReason {
     Enabling,
     Unlocked,
@@ -77,37 +77,37 @@ impl AnswerReason {
     fn taken(self) -> Option<String> {
         let text = match self {
             Self::Enabling => "drives are being energised at the measured pose",
-            Self::Unlocked => "the arm holds and takes trajectories",
-            Self::TakingOver => "the drives that hold from before are taken over where they hold",
+            Self::Unlocked => "the arm holds and accepts trajectories",
+            Self::TakingOver => "the drives that hold are adopted at their held pose",
             Self::Disabling => "drives are being de-energised",
-            Self::Pausing => "slowing down on the path; `resume` goes on",
-            Self::Resuming => "going on along the path",
+            Self::Pausing => "slowing down on the path; `resume` continues",
+            Self::Resuming => "continuing on the path",
             Self::Stopping => "slowing down on the path; then the trajectory is dropped",
             Self::FastStopping => "fast stop on the path; then `clear-fault` and `enable`",
             Self::TorqueOff => "drives are de-energised at once; the arm may fall",
-            Self::SpeedSet { percent, moving: true } => return Some(format!("speed goes to {percent} %")),
+            Self::SpeedSet { percent, moving: true } => return Some(format!("speed changes to {percent} %")),
             Self::SpeedSet { percent, moving: false } => {
                 return Some(format!("the next motion runs at {percent} %"));
             }
-            Self::Resetting => "the drives are asked to forget their faults; `status` shows the outcome",
+            Self::Resetting => "fault reset sent to the drives; `status` shows the result",
             Self::ClearedHolding => "fault cleared, the drives hold; `enable` makes the arm ready",
             Self::ClearedOff => "fault cleared, the drives are de-energised; `enable` energises them",
             Self::BusRestored => {
-                "the bus carries frames again and its drives are looked at anew; when `status` says disabled, `enable`"
+                "the bus is open again and the state of its drives is being read; when `status` shows disabled, `enable`"
             }
-            Self::Already => "it is so already",
+            Self::Already => "the arm is in this state already",
             Self::NothingMoves => "nothing moves",
             _ => return None,
         };
         Some(text.to_owned())
     }
 
-    /// Answers that have to do with turns.
+    /// Answers about references.
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
     fn of_referencing(&self, names: &Names) -> Option<String> {
         Some(match *self {
             Self::Referenced { joint, at_rad } => {
-                format!("{} stands at {at_rad:.6} rad; it is kept on disk", names.joint(joint))
+                format!("{} is referenced at {at_rad:.6} rad; stored on disk", names.joint(joint))
             }
             Self::NotReferenced { joint, reference_state, by_rad } => {
                 let by = match reference_state {
@@ -115,28 +115,28 @@ impl AnswerReason {
                     _ => String::new(),
                 };
                 format!(
-                    "{} is not referenced: {}{by}; look where it stands, then `taustream reference --joint ..`",
+                    "{} is not referenced: {}{by}; measure its angle, then `taustream reference --joint ..`",
                     names.joint(joint),
                     reference_state.word()
                 )
             }
             Self::ReferenceOutside { joint, at_rad, range_rad: [low, high] } => format!(
-                "{} cannot stand at {at_rad:.4} rad: its range is [{low:.4}, {high:.4}]; measure again",
+                "{} cannot be at {at_rad:.4} rad: its range is [{low:.4}, {high:.4}] rad; measure again",
                 names.joint(joint)
             ),
             Self::ReferenceFar { joint, at_rad, nearest_rad, limit_rad } => format!(
-                "{} cannot stand at {at_rad:.4} rad: the nearest turn of its feedback is {nearest_rad:.4} rad, {:.4} rad away (at most {limit_rad:.4}); measure again, or mend zero_offset_rad and sign",
+                "{} cannot be at {at_rad:.4} rad: the nearest angle that its feedback allows is {nearest_rad:.4} rad, {:.4} rad away (at most {limit_rad:.4}); measure again, or correct zero_offset_rad and sign",
                 names.joint(joint),
                 (nearest_rad - at_rad).abs()
             ),
             Self::ReferenceNotNeeded { joint, reading_rad, at_rad } => format!(
-                "{} needs no reference: its feedback tells every angle and says {reading_rad:.6} rad, {:.6} rad from {at_rad:.6}; if that is wrong, mend zero_offset_rad or sign in the settings",
+                "{} needs no reference: its feedback is absolute and reads {reading_rad:.6} rad, {:.6} rad from {at_rad:.6}; if that is wrong, correct zero_offset_rad or sign in the settings",
                 names.joint(joint),
                 (reading_rad - at_rad).abs()
             ),
             Self::NoSuchJoint { joint } => format!("there is no joint {}", joint + 1),
             Self::Energised { joint, state } => format!(
-                "{} may only be referenced while nothing is energised (its drive is {}); support the arm and `disable` first",
+                "{} can be referenced only while nothing is energised (its drive is {}); support the arm and `disable` first",
                 names.joint(joint),
                 state_word(state)
             ),
@@ -149,12 +149,12 @@ impl AnswerReason {
         let name = |joint| names.joint(joint);
         match self {
             Self::NotConfigured { joint, state } => format!(
-                "{} is not ready ({}); see that its drive is powered and connected, then `status`",
+                "{} is not ready ({}); check power and connection of its drive, then `status`",
                 name(joint),
                 state_word(state)
             ),
             Self::NotAtRest { joint, speed_rad_s, limit_rad_s } => format!(
-                "{} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm rests",
+                "{} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm is at rest",
                 name(joint)
             ),
             Self::OutOfRange { joint, position_rad, range_rad: [low, high] } => format!(
@@ -162,7 +162,7 @@ impl AnswerReason {
                 name(joint)
             ),
             Self::NoFeedback { joint, age_s } => format!(
-                "{} has not answered for {age_s:.3} s; see that its drive is powered and connected",
+                "no feedback from {} for {age_s:.3} s; check power and connection of its drive",
                 name(joint)
             ),
             Self::Warns { joint, status_word } => format!(
@@ -174,23 +174,23 @@ impl AnswerReason {
                 name(joint)
             ),
             Self::BusPassive { bus } => format!(
-                "the controller of {} is still error-passive; see cable, termination and the power of the drives, or start \
-                 it anew: ip link set {1} down && ip link set {1} up",
+                "the controller of {} is still error-passive; check cable, termination and the power of the drives, or restart \
+                 it: ip link set {1} down && ip link set {1} up",
                 names.bus(bus),
                 names.interface(bus)
             ),
             Self::Unreachable { bus } => format!(
-                "no drive can be told: {} has failed, and its drives are where their own watchdogs have left them; \
-                 `clear-fault` reaches them again once the bus is mended",
+                "no drive can be reached: {} has failed, and its drives have stopped by their own watchdogs; \
+                 fix the bus, then `clear-fault`",
                 names.bus(bus)
             ),
             Self::HoldsBesideFailed { joint, bus } => format!(
-                "{} holds while the drives on {} are out of reach; support the arm, `disable`, then `clear-fault`",
+                "{} holds while the drives on {} are unreachable; support the arm, `disable`, then `clear-fault`",
                 name(joint),
                 names.bus(bus)
             ),
             Self::Unowned { joint } => format!(
-                "the drive of {} is energised, unowned, and left alone; end the program that uses it, or support the arm and `torque-off`",
+                "the drive of {} is energised, unowned; end the program that uses it, or support the arm and `torque-off`",
                 name(joint)
             ),
             Self::PartlyEnergised { joint, state } => format!(
@@ -199,7 +199,7 @@ impl AnswerReason {
                 state_word(state)
             ),
             Self::StillEnergised { joint } => {
-                format!("the drive of {} is still energised; wait, then ask again", name(joint))
+                format!("the drive of {} is still energised; wait and try again", name(joint))
             }
             other => other.plain_refusal().to_owned(),
         }
@@ -210,15 +210,15 @@ impl AnswerReason {
         match self {
             Self::ClearFirst => "the arm is in fault; `status` shows why, then `clear-fault`",
             Self::SpeedUnknown => {
-                "the drives were heard for too short a time to know that the arm rests; ask again in a moment"
+                "too little feedback to know that the arm is at rest; try again in a second"
             }
             Self::StopFirst => "the arm moves; `stop` first",
             Self::EnableFirst => "the drives are not energised; `enable` first",
             Self::NothingToResume => "nothing is paused; send a trajectory",
             Self::NoFault => "there is no fault",
-            Self::TooManyRamps => "too many speed changes at once; wait a second and ask again",
-            Self::Wait => "another change is under way; wait until it has ended",
-            Self::ShuttingDown => "the streamer is ending",
+            Self::TooManyRamps => "too many speed changes at once; wait a second and try again",
+            Self::Wait => "another change is in progress; wait until it has ended",
+            Self::ShuttingDown => "the streamer is shutting down",
             _ => "it is not possible now",
         }
     }
@@ -228,7 +228,7 @@ impl AnswerReason {
 #[must_use]
 pub fn state_word(state: DriveState) -> &'static str {
     match state {
-        DriveState::Absent => "not heard",
+        DriveState::Absent => "no feedback",
         DriveState::Configuring => "being configured",
         DriveState::EnergisedUnowned => "energised, unowned",
         DriveState::Adopted => "holding from before this start",

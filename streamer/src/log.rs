@@ -2,6 +2,7 @@
 use crate::cycle_state::{Transition, TripKind};
 use crate::names::Names;
 use crate::report::Note;
+use taustream_arm::text::counted;
 use taustream_messages::Phase;
 use tracing::{error, info, warn};
 
@@ -25,18 +26,21 @@ pub fn note(note: &Note, names: &Names) {
             );
         }
         Note::BusError { bus, error, count } => warn!(
-            "{}: {} ({count} error frames since the last such line); {}",
+            "{}: {} ({} since the last such line); {}",
             names.bus(*bus),
             error.sentence(),
+            counted(*count, "error frame"),
             error.remedy()
         ),
         Note::BusFailed { bus, bus_fault } => error!(
-            "{}: {}; it is silent until `clear-fault`; {}",
+            "{}: {}; nothing is sent on it until `clear-fault`; {}",
             names.bus(*bus),
             bus_fault.word(),
             bus_fault.remedy(names.interface(*bus))
         ),
-        Note::Stall { gap_s } => warn!("no setpoint left for {gap_s:.4} s: trajectory time stands still"),
+        Note::Stall { gap_s } => {
+            warn!("no setpoint was sent for {gap_s:.4} s: trajectory time does not advance")
+        }
     }
 }
 

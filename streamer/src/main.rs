@@ -57,7 +57,7 @@ fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
     let state = last_pose::directory(arguments.state_dir.as_deref());
     core.restore_poses(&pose_store::restore_poses(&settings, &state));
     let pose_store =
-        PoseStore::start(&settings, state).context("cannot start the thread that keeps the last pose")?;
+        PoseStore::start(&settings, state).context("cannot start the thread that stores the last pose")?;
     let readers = core.readers();
 
     lock_memory(arguments.allow_non_realtime)?;
@@ -167,7 +167,7 @@ fn run_real_time(
             let list: Vec<String> = missing.iter().map(ToString::to_string).collect();
             bail!("not started: {}", list.join("; "));
         }
-        warn!("running without real-time rights, as told: setpoints will be late");
+        warn!("running without real-time rights (--allow-non-realtime): setpoints will be late");
     } else if let Some(warning) = rt::throttling_warning() {
         warn!("{warning}");
     }

@@ -1,6 +1,7 @@
 //! The names that an arm's settings give to joints and buses, and the sentences about them that every reader gets alike:
 //! the log, the answers to commands, `status`.
 use taustream_arm::Settings;
+use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
 use taustream_drivers::bring_up::{explain, explain_refusal};
 use taustream_messages::{BusFault, BusReport, Cause, Evidence};
@@ -80,10 +81,10 @@ impl Names {
 
     fn bus_fault(&self, cause: &Cause, bus_fault: Option<BusFault>) -> String {
         let Some(bus_fault) = bus_fault else {
-            return format!("trouble {} of another release", cause.code);
+            return format!("fault {} of another release", cause.code);
         };
         let count = match bus_fault {
-            BusFault::QueueFull | BusFault::System => format!(" for {} cycles in a row", cause.value),
+            BusFault::QueueFull | BusFault::System => format!(" for {} consecutive cycles", cause.value),
             BusFault::Unconfirmed => format!(", {} in flight", cause.value),
             BusFault::ReceiveBehind if cause.limit > 0.0 => {
                 format!(": no feedback was read for {:.6} s, {:.6} s are tolerated", cause.value, cause.limit)
@@ -114,7 +115,7 @@ impl Names {
         let state = match report.bus_fault() {
             None => "well".to_owned(),
             Some(bus_fault) => {
-                let silent = if report.silent == 0 { "" } else { ", silent until `clear-fault`" };
+                let silent = if report.silent == 0 { "" } else { ", nothing is sent until `clear-fault`" };
                 format!("{}{silent}; {}", bus_fault.word(), bus_fault.remedy(self.interface(bus)))
             }
         };
@@ -122,7 +123,7 @@ impl Names {
         if report.error_frames == 0 {
             return state;
         }
-        format!("{state}; {} error frames, the newest: {}", report.error_frames, error.sentence())
+        format!("{state}; {}, the newest: {}", counted(report.error_frames, "error frame"), error.sentence())
     }
 }
 
@@ -183,7 +184,7 @@ mod tests {
             ),
             (
                 Cause { code: 99, ..Cause::bus(4, BusFault::Gone, 0.0, 0.0) },
-                "bus fault on bus 5: trouble 99 of another release",
+                "bus fault on bus 5: fault 99 of another release",
             ),
         ];
         for (cause, expected) in cases {
@@ -204,7 +205,9 @@ mod tests {
             ..recovered
         };
         let text = names().bus_state(0, &off);
-        for part in ["bus-off", "silent until `clear-fault`", "ip link set can3 type can restart", "tx=248"] {
+        for part in
+            ["bus-off", "nothing is sent until `clear-fault`", "ip link set can3 type can restart", "tx=248"]
+        {
             assert!(text.contains(part), "no `{part}` in: {text}");
         }
         let foreign = BusReport { bus_fault: 77, ..recovered };

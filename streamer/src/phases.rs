@@ -79,16 +79,16 @@ impl Event {
     pub fn word(self) -> &'static str {
         match self {
             Self::DrivesReady => "drives ready",
-            Self::DrivesLost => "a drive is not ready any more",
-            Self::HoldAdopted => "drives found holding are adopted",
-            Self::EnableRequested => "enable asked",
-            Self::AdoptRequested => "take-over asked",
+            Self::DrivesLost => "a drive is no longer ready",
+            Self::HoldAdopted => "holding drives adopted",
+            Self::EnableRequested => "enable requested",
+            Self::AdoptRequested => "adoption requested",
             Self::DrivesEnabled => "drives energised",
             Self::Accepted => "trajectory accepted",
             Self::EndReached => "end of trajectory",
-            Self::PauseRequested => "pause asked",
-            Self::ResumeRequested => "resume asked",
-            Self::StopRequested => "stop asked",
+            Self::PauseRequested => "pause requested",
+            Self::ResumeRequested => "resume requested",
+            Self::StopRequested => "stop requested",
             Self::AtRest => "at rest",
             Self::StalledLong => "loop stalled",
             Self::StopFault => "fast stop",
@@ -96,7 +96,7 @@ impl Event {
             Self::HardFault => "fault",
             Self::ClearedHolding => "fault cleared, drives hold",
             Self::ClearedOff => "fault cleared, drives off",
-            Self::DisableRequested => "disable asked",
+            Self::DisableRequested => "disable requested",
             Self::DrivesDisabled => "drives de-energised",
         }
     }
@@ -106,7 +106,7 @@ impl Event {
 ///
 /// Real time: a table.
 #[must_use]
-#[expect(clippy::match_same_arms, reason = "rows stand together by what they mean, not by where they lead")]
+#[expect(clippy::match_same_arms, reason = "rows are grouped by meaning, not by result")]
 pub fn next(phase: Phase, event: Event) -> Option<Phase> {
     use Event as E;
     use Phase as P;

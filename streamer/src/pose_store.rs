@@ -171,7 +171,7 @@ impl Drop for PoseStore {
     fn drop(&mut self) {
         self.sender = None;
         if self.writer.take().is_some_and(|writer| writer.join().is_err()) {
-            error!("the thread that keeps the last pose has panicked");
+            error!("the thread that stores the last pose has panicked");
         }
     }
 }

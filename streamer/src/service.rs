@@ -175,13 +175,13 @@ impl Service {
                     continue;
                 }
             };
-            info!(?command, "asked");
+            info!(?command, "command received");
             let sequence = self.next_sequence;
             self.next_sequence += 1;
             if self.command_queue.push_command(PendingCommand { sequence, command }) {
                 self.pending.push(Pending { sequence, since: rt::now(), question });
             } else {
-                let text = "too many commands at once; ask again";
+                let text = "too many commands at once; try again";
                 reply(&question, CommandReply::refused(self.phase, text));
             }
         }
@@ -387,6 +387,6 @@ impl Service {
 fn reply(question: &Question, message: CommandReply) {
     if let Err(e) = question.send_copy(message) {
         // The asker has gone; that is its own affair.
-        info!("an answer found nobody: {e:?}");
+        info!("no receiver for an answer: {e:?}");
     }
 }

@@ -98,7 +98,7 @@ fn move_on(bench: &mut TestBench, goals: &Goals) -> Result<()> {
 fn queue_full(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     in_progress(bench, goals)?;
     bench.run("tc", "qdisc add dev vcan0 root tbf rate 500kbit burst 160 limit 320")?;
-    let words = ["transmit queue full (ENOBUFS)", "bus `arm` (vcan0)", "silent until `clear-fault`"];
+    let words = ["transmit queue full (ENOBUFS)", "bus `arm` (vcan0)", "nothing is sent until `clear-fault`"];
     let report = bus_fault(bench, BusFault::QueueFull, &words)?;
     ensure!(report.buses[0].cycles_lost >= 3 && report.frames_lost > 0, "lost cycles are not counted");
     bench.run("tc", "qdisc del dev vcan0 root")?;
@@ -110,7 +110,7 @@ fn interface_down(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.run("ip", "link set vcan0 down")?;
     bus_fault(bench, BusFault::Down, &["interface is down (ENETDOWN)", "ip link set vcan0 up"])?;
     bench.cli_refused(&["clear-fault"], "ip link set vcan0 up")?;
-    bench.cli_refused(&["disable"], "no drive can be told")?;
+    bench.cli_refused(&["disable"], "no drive can be reached")?;
     bench.run("ip", "link set vcan0 up")?;
     return_path(bench, goals)
 }
@@ -172,7 +172,7 @@ fn second_down(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     );
     ensure!(report.buses[0].bus_fault == 0 && report.buses[1].silent == 1, "{:?}", report.buses());
     let status = bench.cli_done(&["status"])?.stdout;
-    ensure!(status.contains("(vcan1)") && status.contains("ip link set vcan1 up"), "no cure in: {status}");
+    ensure!(status.contains("(vcan1)") && status.contains("ip link set vcan1 up"), "no remedy in: {status}");
     let before = report.buses;
     let report = bench.await_report("setpoints to hold by on the first bus", |r, _| {
         r.buses[0].frames_sent > before[0].frames_sent + 100

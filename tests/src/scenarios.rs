@@ -378,18 +378,18 @@ fn started_twice(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     Ok(())
 }
 
-/// A streamer whose bus is not there ends with the cure in its message, and disturbs nobody.
+/// A streamer whose bus is not there ends with the remedy in its message, and disturbs no other process.
 fn interface_missing_or_down(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     enable(bench)?;
     let motion = bench.replan(&goals.text(0)?)?;
     let (status, said) = bench.streamer_on("vcan9")?;
     ensure!(status.code() == Some(1), "a missing interface ended the streamer with {status}: {said}");
-    ensure!(said.contains("vcan9") && said.contains("ip link"), "no cure in: {said}");
+    ensure!(said.contains("vcan9") && said.contains("ip link"), "no remedy in: {said}");
     bench.run("ip", "link set vcan1 down")?;
     let (status, said) = bench.streamer_on("vcan1")?;
     bench.run("ip", "link set vcan1 up")?;
     ensure!(status.code() == Some(1), "an interface that is down ended the streamer with {status}: {said}");
-    ensure!(said.contains("vcan1") && said.contains("up"), "no cure in: {said}");
+    ensure!(said.contains("vcan1") && said.contains("up"), "no remedy in: {said}");
     arrive(bench, motion, goals.rad(0)?)?;
     Ok(())
 }

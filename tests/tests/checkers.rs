@@ -110,8 +110,7 @@ fn place(frames: &[BusFrame], sync: usize, node: u8) -> usize {
 }
 
 fn nth_cycle(log: &mut [Event], n: usize) -> &mut LoggedCycle {
-    let mut cycles =
-        log.iter_mut().filter_map(|e| if let Event::Cycle(c) = e { Some(c) } else { None });
+    let mut cycles = log.iter_mut().filter_map(|e| if let Event::Cycle(c) = e { Some(c) } else { None });
     cycles.nth(n).expect("the cycle")
 }
 

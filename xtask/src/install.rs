@@ -13,7 +13,7 @@ Examples:
   sudo cargo xtask install --root /                       build in release and install on this machine
   cargo xtask install --root stage --programs target/debug  into a directory, from programs that are there
 
-docs/services.md says how to go on: settings, bus, users, start.";
+docs/services.md has the next steps: settings, bus, users, start.";
 
 /// Where to install.
 #[derive(Args, Debug)]
@@ -191,7 +191,7 @@ fn is_this_machine(root: &Path) -> bool {
 /// Lets systemd take notice. A machine that systemd does not run has nobody to tell.
 fn manager(commands: &[&[&str]]) -> Result<()> {
     if !Path::new("/run/systemd/system").is_dir() {
-        println!("systemd does not run here: not told");
+        println!("systemd does not run here: not notified");
         return Ok(());
     }
     for words in commands {

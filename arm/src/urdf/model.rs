@@ -4,6 +4,7 @@ use crate::document::shown;
 use crate::mass::{MASS_KG, MOMENT_KG_M2};
 use crate::reader::Bounds;
 use crate::scene::Shape;
+use crate::text::counted;
 use std::collections::BTreeSet;
 
 /// Where something stands in the frame before it.
@@ -134,7 +135,11 @@ impl Model {
         let name = robot.name("name");
         let (link_elements, joint_elements) = (robot.children("link"), robot.children("joint"));
         if link_elements.is_empty() || link_elements.len() > LINKS_MAX || joint_elements.len() > LINKS_MAX {
-            let value = format!("{} links and {} joints", link_elements.len(), joint_elements.len());
+            let value = format!(
+                "{} and {}",
+                counted(link_elements.len(), "link"),
+                counted(joint_elements.len(), "joint")
+            );
             robot.fault("", &value, &format!("1 to {LINKS_MAX} links, and at most as many joints"));
             return None;
         }

@@ -180,7 +180,7 @@ pub(crate) const CASES: &[Case] = &[
         "bus[0].feedback_every",
         "from 1 to 10",
     ),
-    (Settings, "virtual = true", "virtual = true\nstagger = true", "bus[0].stagger", "no turns"),
+    (Settings, "virtual = true", "virtual = true\nstagger = true", "bus[0].stagger", "nothing to stagger"),
     (Settings, "virtual = true", "virtual = true\nstagger = 1", "bus[0].stagger", "true or false"),
     (Settings, "virtual = true", "virtual = true\npacked = \"yes\"", "bus[0].packed", "true or false"),
     (

@@ -1,4 +1,4 @@
-//! Words of `taustream import`.
+//! Arguments of `taustream import`.
 use crate::angles::{Angles, Times};
 use clap::{ArgGroup, Args};
 use std::path::PathBuf;
@@ -10,16 +10,16 @@ Examples:
   taustream sample other.json | taustream import - --robot ur5 --scene open --tolerance-rad 0.002
   taustream import --via \"0,-1.57,1.57,-1.57,-1.57,0\" --via \"0.5,-1.4,1.5,-1.6,-1.5,0.2\" \\
       --profile quintic --durations 1.5 --robot ur5 --scene open -o move.json
-  taustream import --via .. --via .. --profile tau-j-star --k 1/8 ...     a stroke as it stands: nothing is approximated
+  taustream import --via .. --via .. --profile tau-j-star --k 1/8 ...     written as strokes without approximation
   taustream import --path eight_points --timed-by isma --seed 1 --robot ur5 --scene open -o move.json
 
-A table begins with a line that names its columns: t_s, then q1_rad, q2_rad, .. as `sample` writes them; other columns are
-let go, and said. Between rows it goes straight. Profiles tau-j, tau-j-star, quintic and septic stop at every point;
+The first line of a table names its columns: t_s, then q1_rad, q2_rad, .. as `sample` writes them; other columns are
+ignored and named. Between rows the motion is linear. Profiles tau-j, tau-j-star, quintic and septic stop at every point;
 cubic-spline, not-a-knot and b-spline7 pass them.
 
-A motion is smoothed into strokes and comes out from rest to rest with continuous jerk, a little later; the summary says how
-far it is from the original at most. What is too fast for the limits is slowed down by one factor, and said. The result is
-verified like every motion (limits, clearance along its whole length) before it is written.";
+The motion is smoothed into strokes. The result goes from rest to rest with continuous jerk and a small delay; the summary
+states the largest deviation from the original. A motion that is too fast for the limits is slowed down by one factor,
+which the summary states. The result is verified (limits, clearance along its whole length) before it is written.";
 
 /// `taustream import`
 #[derive(Args, Debug)]
@@ -29,10 +29,10 @@ pub(crate) struct ImportArgs {
     /// Table of a sampled motion (CSV); `-` is standard input.
     #[arg(value_name = "CSV")]
     pub(crate) table: Option<PathBuf>,
-    /// Way point, rad, one value a joint; once for each point, in their order.
+    /// Way point, rad, one value per joint; repeat the option for each point, in order.
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
     pub(crate) via: Vec<Angles>,
-    /// Path file of poses or of places of the tip (TOML): a path, or the name of a shipped path.
+    /// Path file of poses or tip positions (TOML): a path, or the name of a shipped path.
     #[arg(long, value_name = "FILE")]
     pub(crate) path: Option<PathBuf>,
     /// Robot: a path, or the name of a shipped robot.
@@ -47,7 +47,7 @@ pub(crate) struct ImportArgs {
     /// k of tau-j and tau-j-star, below 1/3: a number, or a fraction such as 1/8. Without it 1/10.
     #[arg(long, value_name = "K", conflicts_with = "table", allow_hyphen_values = true, value_parser = fraction)]
     pub(crate) k: Option<f64>,
-    /// How long each piece between way points takes, s. Without it: as short as the limits allow.
+    /// Duration of each segment between way points, s. Without it: as short as the limits allow.
     #[arg(long, value_name = "S,..", conflicts_with = "table", allow_hyphen_values = true)]
     pub(crate) durations: Option<Times>,
     /// Optimiser that chooses the durations of b-spline7 by time and impact (`isma`, `sma`, `gwo`, ..).
@@ -59,7 +59,7 @@ pub(crate) struct ImportArgs {
     /// Evaluations of the optimiser.
     #[arg(long, value_name = "N", requires = "timed_by", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) evaluations: u32,
-    /// How far from the original each joint may be, rad.
+    /// Largest deviation of each joint from the original, rad.
     #[arg(long, value_name = "RAD", allow_negative_numbers = true, default_value_t = TOLERANCE_RAD_DEFAULT, value_parser = tolerance)]
     pub(crate) tolerance_rad: f64,
     /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.

@@ -1,4 +1,4 @@
-//! Words of the commands that talk to the running streamer and planner.
+//! Arguments of the commands that talk to the running streamer and planner.
 use super::offline::planner_kind;
 use crate::angles::Angles;
 use clap::Args;
@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;
 use taustream_planner::PlannerKind;
 
-/// A command to the streamer that has no words of its own.
+/// A command to the streamer without arguments of its own.
 #[derive(Args, Debug)]
 pub(crate) struct CommandArgs {
-    /// How long to wait until the arm has done it, s; 0 returns as soon as the streamer has agreed.
+    /// Wait up to this long until the arm has done it, s; 0 returns when the streamer has accepted.
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0, value_parser = waiting_s)]
     pub(crate) wait_s: f64,
 }
@@ -28,7 +28,7 @@ pub(crate) struct SpeedArgs {
 /// `taustream stop`
 #[derive(Args, Debug)]
 pub(crate) struct StopArgs {
-    /// As fast as the stop limits allow; ends in a fault that `clear-fault` forgets.
+    /// Stop as fast as the stop limits allow; ends in a fault, which `clear-fault` clears.
     #[arg(long)]
     pub(crate) fast: bool,
     /// Waiting.
@@ -38,15 +38,15 @@ pub(crate) struct StopArgs {
 
 const REFERENCE_HELP: &str = "\
 Examples:
-  taustream reference                                       what is known, and what each joint's feedback can mean
-  taustream reference --joint elbow --at-rad 1.57           the elbow stands at 1.57 rad: you have looked
-  taustream reference --confirm                             what is shown is where the arm stands: you have looked
+  taustream reference                                       show which joints are referenced, and the possible angles
+  taustream reference --joint elbow --at-rad 1.57           set the elbow to 1.57 rad, as measured at the arm
+  taustream reference --confirm                             confirm the shown angles after a look at the arm
 
-A feedback that repeats itself (`feedback = \"wraps\"`) tells an angle but for whole turns, and one that counts from where it
-was switched on (\"incremental\") tells none. A wrong turn looks right and sends the joint the wrong way, so such a joint is
-energised only when its turn is known: from the last pose on disk, or from you. Look at the arm, not at the screen. It is
-taken only while nothing is energised and the arm rests; --at-rad may miss a turn of the feedback by 0.4 of it. Changing
-sign, gear, zero or drive in the settings makes it necessary anew.";
+Feedback that wraps (`feedback = \"wraps\"`) leaves the multi-turn offset of a joint open; incremental feedback
+(\"incremental\") leaves the whole angle open. A wrong offset looks valid and moves the joint the wrong way. Such a joint is
+energised only when it is referenced: from the last pose on disk, or by this command. Look at the arm, not at the screen.
+References are accepted only while nothing is energised and the arm is at rest. --at-rad must be within 0.4 periods of an
+angle that the feedback allows. After a change of sign, gear, zero or drive in the settings, reference the joint again.";
 
 /// `taustream reference`
 #[derive(Args, Debug)]
@@ -55,10 +55,10 @@ pub(crate) struct ReferenceArgs {
     /// Joint, by its name or its number from 1; without it, all.
     #[arg(long, value_name = "JOINT")]
     pub(crate) joint: Option<String>,
-    /// Where the joint stands, rad, by your own eyes or a mark on the arm.
+    /// Angle of the joint, rad, as measured at the arm.
     #[arg(long, value_name = "RAD", allow_hyphen_values = true, conflicts_with = "confirm", value_parser = angle_rad)]
     pub(crate) at_rad: Option<f64>,
-    /// What is shown is where the joint stands; for joints whose feedback can mean one angle only.
+    /// Confirm the shown angle; for joints whose feedback allows one angle only.
     #[arg(long)]
     pub(crate) confirm: bool,
 }
@@ -76,29 +76,29 @@ Examples:
   taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
 
-The planner starts from the pose that the streamer commands, verifies the whole motion and sends it; the streamer's
-receipt says whether, and from which cycle, it runs. Exit code 0 means: accepted (with --wait: executed).";
+The planner starts from the commanded pose, verifies the whole motion and sends it. The receipt of the streamer states
+whether, and from which cycle, it runs. Exit code 0 means: accepted (with --wait: executed).";
 
 /// `taustream replan`
 #[derive(Args, Debug)]
 #[command(after_help = REPLAN_HELP)]
 pub(crate) struct ReplanArgs {
-    /// Pose to go to, rad, one value a joint.
+    /// Goal pose, rad, one value per joint.
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
     pub(crate) goal: Angles,
-    /// Take over as soon as the plan is there (the default).
+    /// Start as soon as the motion is planned (the default).
     #[arg(long, conflicts_with = "after_current")]
     pub(crate) at_once: bool,
     /// Plan from the end of the running motion, and start when it has ended.
     #[arg(long)]
     pub(crate) after_current: bool,
-    /// How long planning may take, ms.
+    /// Deadline of planning, ms.
     #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: u32,
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Which planner.
+    /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
     /// Return only when the motion has ended.
@@ -110,8 +110,8 @@ const RUN_HELP: &str = "\
 Examples:
   taustream run move.json --wait
 
-The file must hold the digest of the robot that the streamer drives. The motion is verified against the robot and the
-scene of the settings first, and the arm must stand at its base pose: `taustream replan --goal BASE` takes it there.";
+The file must have the digest of the streamer's robot. The motion is first verified against the robot and the scene of
+the settings. The arm must be at the base pose of the motion: `taustream replan --goal BASE` moves it there.";
 
 /// `taustream run`
 #[derive(Args, Debug)]
@@ -123,33 +123,33 @@ pub(crate) struct RunArgs {
     /// Return only when the motion has ended.
     #[arg(long)]
     pub(crate) wait: bool,
-    /// The file's text, when whoever handed the command over has read it.
+    /// The file's text, when the calling process has read it.
     #[arg(skip)]
     pub(crate) text: Option<String>,
 }
 
 const WATCH_HELP: &str = "\
 Examples:
-  taustream watch                                     q or Ctrl-C leaves; the arm goes on with what it does
+  taustream watch                                     q or Ctrl-C ends the view; the arm continues
   taustream watch --rate-hz 2 > arm.log               one line every half second
   taustream watch --json | jq '.joints[2].tracking_error_rad'
   taustream watch --json --count 1                    the next report
 
-On a terminal it is a picture with bars against the limits of the settings (NO_COLOR turns colours off), elsewhere one
-line a report, with --json one object a report, as `status` prints it. Reports that end are said, and waited for; while
-they are missing, --json prints one object with \"phase\":null and the reason.";
+On a terminal it shows bars against the limits of the settings (NO_COLOR disables colours), elsewhere one line per
+report, with --json one object per report, as `status` prints it. When reports stop it says so and waits for new ones;
+--json then prints one object with \"phase\":null and the reason.";
 
 /// `taustream watch`
 #[derive(Args, Debug)]
 #[command(after_help = WATCH_HELP)]
 pub(crate) struct WatchArgs {
-    /// Most pictures or lines a second, Hz; without it 10 on a terminal, 1 elsewhere, and every report with --json.
+    /// Maximum rate of pictures or lines, Hz; without it 10 on a terminal, 1 elsewhere, and every report with --json.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = rate_hz)]
     pub(crate) rate_hz: Option<f64>,
-    /// Leave after this long, s; without it when told to.
+    /// End after this time, s; without it, on q or Ctrl-C.
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = waiting_s)]
     pub(crate) seconds: Option<f64>,
-    /// Leave after this many pictures or lines.
+    /// End after this many pictures or lines.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
 }
@@ -159,9 +159,9 @@ Examples:
   taustream demo --output /tmp/demo
   taustream demo --config config/demo.toml --link local --output out
 
-Starts taustream-servosim, taustream-streamer and taustream-planner (from beside this program), enables the simulated
-arm, goes to every goal of the demo file, disables, and writes SVG plots. Nothing outside the output directory is
-touched. Ctrl-C stops the arm first.";
+Starts taustream-servosim, taustream-streamer and taustream-planner (from the directory of this program), enables the
+simulated arm, moves to every goal of the demo file, disables, and writes SVG plots. It writes only to the output
+directory. Ctrl-C stops the arm first.";
 
 /// `taustream demo`
 #[derive(Args, Debug)]
@@ -170,13 +170,13 @@ pub(crate) struct DemoArgs {
     /// Demo file: `settings`, `start_rad`, `goals_rad`.
     #[arg(long, value_name = "FILE", default_value = "config/demo.toml")]
     pub(crate) config: PathBuf,
-    /// Directory for plots, logs and the cycle log; made when it is missing.
+    /// Directory for plots, logs and the cycle log; created if missing.
     #[arg(long, value_name = "DIR", default_value = "demo-output")]
     pub(crate) output: PathBuf,
-    /// What carries the frames.
+    /// CAN link.
     #[arg(long, value_name = "LINK", default_value = "auto")]
     pub(crate) link: LinkChoice,
-    /// Give up after this long, s.
+    /// Abort after this time, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 110.0, value_parser = waiting_s)]
     pub(crate) limit_s: f64,
 }

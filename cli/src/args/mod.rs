@@ -1,4 +1,4 @@
-//! The words of the command line. Units stand in every name; every default stands in the help.
+//! The command line. Every name has its unit; the help states every default.
 mod import;
 mod live;
 mod offline;
@@ -22,27 +22,27 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  taustream check vcan6                                   is the configuration sound?
+  taustream check vcan6                                   check the configuration
   taustream plan --robot ur5 --scene pillars \\
       --start \"0,-1.57,1.57,-1.57,-1.57,0\" --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" -o move.json
   taustream verify --robot ur5 --scene pillars --trajectory move.json
   taustream sample move.json --rate-hz 1000 > move.csv
   taustream plot move.json --robot ur5 --scene pillars    joint curves and three views, to move.svg
-  taustream doctor                                        is this computer fit to drive an arm?
+  taustream doctor                                        check whether this computer can drive an arm
   taustream enable && taustream run move.json --wait      with streamer and planner running
   taustream replan --goal \"0,-1.57,1.57,-1.57,-1.57,0\" --wait
-  taustream watch                                         live, until you leave it
+  taustream watch                                         live view, until you end it
   taustream status --json | jq .phase
 
 Units: angles are rad, times s, lengths m. Robots, scenes and settings are given by path, or by the name of a
 shipped file (`ur5`, `pillars`, `vcan6`).";
 
-/// What a program's end tells scripts; help, manual pages and `failure.rs` agree.
+/// Exit codes for scripts; help, manual pages and `failure.rs` agree.
 pub(crate) const EXIT_CODES: &str = "\
 Exit codes: 0 done; 1 refused or failed, with the reason on stderr; 2 bad usage or bad file; 130 interrupted.
 With --json, errors are JSON on stderr too: {\"error\":{\"kind\":\"..\",\"message\":\"..\"}}.";
 
-/// Stands in the help, in every manual page and in what `doctor` says.
+/// Printed in the help, in every manual page and by `doctor`.
 pub(crate) const SAFETY: &str = "\
 taustream is not a safety function: its stops are best effort by software over a bus. A machine needs its own
 hard-wired emergency stop and safe torque off.";
@@ -51,12 +51,12 @@ fn after_help() -> String {
     format!("{EXAMPLES}\n\n{EXIT_CODES}\n\n{SAFETY}")
 }
 
-/// Plans, runs and watches the motion of CAN-connected robot arms.
+/// Plan, run and watch the motion of CAN-connected robot arms.
 #[derive(Debug, Parser)]
 #[command(name = "taustream", version, after_help = after_help(), arg_required_else_help = true)]
 #[command(max_term_width = 110)]
 pub(crate) struct Cli {
-    /// Answer with one JSON object on stdout, and with errors as JSON on stderr.
+    /// Print one JSON object on stdout, and errors as JSON on stderr.
     #[arg(long, global = true)]
     pub(crate) json: bool,
 
@@ -68,29 +68,29 @@ pub(crate) struct Cli {
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) settings: Option<PathBuf>,
 
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub(crate) action: Action,
 }
 
-/// What the user wants.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Action {
-    /// Plan a collision-free motion offline and write it down.
+    /// Plan a collision-free motion offline and write it to a file.
     Plan(PlanArgs),
-    /// Make a verified trajectory file of a motion from elsewhere: a table of positions, or way points and a profile.
+    /// Convert a table of positions, or way points and a profile, into a verified trajectory file.
     Import(ImportArgs),
     /// Print a trajectory file as a table of positions, velocities, accelerations and jerks.
     Sample(SampleArgs),
     /// Draw a trajectory as SVG: joint curves with limits, arm, obstacles and path in three views.
     Plot(PlotArgs),
-    /// Rate a trajectory by the cost of the IBFOA paper, in its own model.
+    /// Evaluate a trajectory by the cost function of Wang et al. (2022), in its own model.
     Cost(CostArgs),
     /// Prove that a trajectory keeps limits and clearance, or name the first violation.
     Verify(MotionArgs),
     /// Check a configuration: robot, scene, settings or trajectory file; every fault at once.
     Check(CheckArgs),
-    /// Ask the running planner for a motion to a new goal; prints the streamer's receipt.
+    /// Request a motion to a new goal from the running planner, and print the receipt.
     Replan(ReplanArgs),
     /// Execute a saved trajectory from its base pose, after verification.
     Run(RunArgs),
@@ -100,7 +100,7 @@ pub(crate) enum Action {
     Disable(CommandArgs),
     /// Slow down to rest on the path and keep the motion.
     Pause(CommandArgs),
-    /// Go on with a paused motion.
+    /// Resume a paused motion.
     Resume(CommandArgs),
     /// Set the speed override, 0 to 100 percent.
     Speed(SpeedArgs),
@@ -108,19 +108,19 @@ pub(crate) enum Action {
     Stop(StopArgs),
     /// De-energise the drives at once. THE ARM MAY FALL.
     TorqueOff(CommandArgs),
-    /// Forget a fault whose cause is gone; `enable` makes the arm ready again.
+    /// Clear a fault after its cause is fixed; then `enable`.
     ClearFault(CommandArgs),
-    /// Show which joints' turns are known, or say where a joint stands.
+    /// Show or set joint references.
     Reference(ReferenceArgs),
-    /// Show what the streamer does: phase, joints, timing, bus.
+    /// Show the state of the arm: phase, joints, timing, buses.
     Status,
-    /// Show what the streamer does, live, until you leave it; the arm does not notice.
+    /// Show the state of the arm, live; this does not affect the arm.
     Watch(WatchArgs),
-    /// Examine this computer: kernel, rights, CPUs, CAN interfaces, memory; measures how late it wakes the cycle up.
+    /// Check this computer: kernel, rights, CPUs, CAN interfaces, memory; measure its wake-up latency.
     Doctor(DoctorArgs),
     /// Run a measurement that the documentation quotes.
     Bench(BenchArgs),
-    /// Start simulated servos, streamer and planner, and go through a few moves.
+    /// Start simulated servos, streamer and planner, and run a few moves.
     Demo(DemoArgs),
     /// Print a completion script for a shell: `taustream completions bash > /etc/bash_completion.d/taustream`.
     Completions {
@@ -129,7 +129,7 @@ pub(crate) enum Action {
     },
     /// Write the manual pages of all programs into a directory, or print that of taustream.
     Man(ManArgs),
-    /// What sudo starts as the services' user: carries out the command that stands on its standard input.
+    /// Started by sudo as the services' user: execute the command from standard input.
     #[command(hide = true)]
     HandedOver,
 }

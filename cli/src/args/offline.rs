@@ -1,4 +1,4 @@
-//! Words of the commands that need no running process.
+//! Arguments of the commands that need no running process.
 use crate::angles::{Angles, Position, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
@@ -19,7 +19,7 @@ Examples:
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
 The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
-cut the search short; the summary says so then.";
+aborted the search; the summary then says so.";
 
 /// `taustream plan`
 #[derive(Args, Debug)]
@@ -31,10 +31,10 @@ pub(crate) struct PlanArgs {
     /// Scene: a path, or the name of a shipped scene.
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: PathBuf,
-    /// Pose to start from, rad, one value a joint: "0,-1.57,1.57,-1.57,-1.57,0".
+    /// Start pose, rad, one value per joint: "0,-1.57,1.57,-1.57,-1.57,0".
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
     pub(crate) start: Angles,
-    /// Pose to go to, rad, one value a joint.
+    /// Goal pose, rad, one value per joint.
     #[arg(
         long,
         value_name = "RAD,..",
@@ -43,28 +43,28 @@ pub(crate) struct PlanArgs {
         conflicts_with = "to_position"
     )]
     pub(crate) goal: Option<Angles>,
-    /// Position to bring the tip to, m, in the base's frame, instead of a pose: "0.4,-0.2,0.3".
+    /// Goal position of the tip, m, in the base frame, instead of a pose: "0.4,-0.2,0.3".
     ///
-    /// Swarms look for poses whose tip is there, clear of everything; the best verified motion to one of them wins. How
-    /// the tip is turned there is left free.
+    /// Swarms search clear poses with the tip at this position. The result is the best verified motion to one of them. The
+    /// orientation of the tip is free.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) to_position: Option<Position>,
-    /// Which optimiser looks for poses at the position; without it those that measured best take turns.
+    /// Optimiser that searches poses for --to-position; without it the best two alternate.
     #[arg(long, value_name = "NAME", conflicts_with = "goal", value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
-    /// Which planner.
+    /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
-    /// What makes one verified motion better than another.
+    /// Objective by which verified motions are compared.
     #[arg(long, value_name = "WHAT", default_value = "time", value_parser = objective())]
     pub(crate) objective: Objective,
-    /// Where a paper cannot be meant as printed: which reading the optimisers follow.
+    /// Follow the papers as printed, or with their errors corrected.
     #[arg(long, value_name = "READING", default_value = "corrected", value_parser = reading())]
     pub(crate) reading: Reading,
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// How long planning may take, ms.
+    /// Deadline of planning, ms.
     #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: u32,
     /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.
@@ -78,9 +78,9 @@ Examples:
   taustream sample move.json --rate-hz 50 | head
   taustream sample move.json --at 0,0.5,1.25 --json
 
-The table begins with t_s, then q1_rad.. (position), v1_rad_s.. (velocity), a1_rad_s2.. (acceleration) and
-j1_rad_s3.. (jerk). Samples lie on the grid k / rate from 0 on; the end of the motion is always the last one.
-Numbers are written so that reading them gives the same bits.";
+The columns are t_s, then q1_rad.. (position), v1_rad_s.. (velocity), a1_rad_s2.. (acceleration) and
+j1_rad_s3.. (jerk). Samples are at k / rate, k = 0, 1, ..; the last sample is the end of the motion.
+Numbers have enough digits to read back the same bits.";
 
 /// `taustream sample`
 #[derive(Args, Debug)]
@@ -89,7 +89,7 @@ pub(crate) struct SampleArgs {
     /// Trajectory file.
     #[arg(value_name = "FILE")]
     pub(crate) trajectory: PathBuf,
-    /// Samples a second, Hz.
+    /// Sample rate, Hz.
     #[arg(
         long,
         value_name = "HZ",
@@ -98,7 +98,7 @@ pub(crate) struct SampleArgs {
         conflicts_with = "at"
     )]
     pub(crate) rate_hz: f64,
-    /// Sample at these times instead, s. Before the start and after the end the arm rests.
+    /// Sample at these times instead, s. Before the start and after the end the arm is at rest.
     #[arg(long, value_name = "S,..", allow_hyphen_values = true)]
     pub(crate) at: Option<Times>,
 }
@@ -106,11 +106,11 @@ pub(crate) struct SampleArgs {
 const PLOT_HELP: &str = "\
 Examples:
   taustream plot move.json                                          joint curves, written to move.svg
-  taustream plot move.json --robot ur5 --scene pillars -o move.svg  limits, and the arm among its obstacles, too
+  taustream plot move.json --robot ur5 --scene pillars -o move.svg  with limits, arm and obstacles
   taustream plot move.json --robot ur5 -o - | display svg:-
 
-The arm is drawn at nine times from light (start) to dark (end), with its collision shapes; metres are the same in all
-views and directions. Meshes of scenes are drawn as their hulls.";
+The arm is drawn at nine times from light (start) to dark (end), with its collision shapes. All views have one scale.
+Meshes of scenes are drawn as their hulls.";
 
 /// `taustream plot`
 #[derive(Args, Debug)]
@@ -125,7 +125,7 @@ pub(crate) struct PlotArgs {
     /// Scene, for the obstacles in the views: a path, or the name of a shipped scene.
     #[arg(long, value_name = "FILE", requires = "robot")]
     pub(crate) scene: Option<PathBuf>,
-    /// Picture to write; `-` is stdout. Without it: beside the trajectory file, with the ending svg.
+    /// Picture to write; `-` is stdout. Without it: beside the trajectory file, with the extension svg.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -138,19 +138,19 @@ Examples:
 The paper's model: links are bare segments between frame origins, obstacles are spheres only, each stroke is
 sampled at equal time steps plus the end, strokes must not overlap.
 cost = w1 path_length_m + w2 joint_travel_rad + w3 penalty (the penalty counts only in collision).
-energy_J, the mechanical work of the joints, is added for robots whose file states masses; it is no part of the cost.";
+energy_J, the mechanical work of the joints, is added for robots whose file has masses; it is not part of the cost.";
 
 /// `taustream cost`
 #[derive(Args, Debug)]
 #[command(after_help = COST_HELP)]
 pub(crate) struct CostArgs {
-    /// What to rate.
+    /// The motion to evaluate.
     #[command(flatten)]
     pub(crate) motion: MotionArgs,
-    /// Equal time steps a stroke.
+    /// Equal time steps per stroke.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 120, value_parser = waypoints)]
     pub(crate) waypoints_per_segment: usize,
-    /// How much the paper's obstacles grow, m.
+    /// Expansion of the obstacles in the paper's model, m.
     #[arg(long, value_name = "M", default_value_t = 0.1, allow_hyphen_values = true)]
     pub(crate) expansion_m: f64,
     /// Weights of path length, joint travel and penalty.
@@ -187,19 +187,19 @@ Examples:
   taustream doctor --settings my-arm.toml --seconds 600
   taustream doctor --json | jq '.findings[] | select(.grade == \"problem\")'
 
-Every finding is ok, unknown (this computer does not say), a WARNING or a PROBLEM, with its cure. Nothing is changed.
+Every finding is ok, unknown (not readable on this computer), a WARNING or a PROBLEM, with its remedy. Nothing is changed.
 Exit code 1 means: at least one problem.
 
-It looks at a computer, not at an arm: a clean bill is no promise that the arm is safe.";
+It checks a computer, not an arm. A result without problems does not mean that the arm is safe.";
 
 /// `taustream doctor`
 #[derive(Args, Debug)]
 #[command(after_help = DOCTOR_HELP)]
 pub(crate) struct DoctorArgs {
-    /// How long to measure wake-ups, s; 0 leaves the measurement out.
+    /// Duration of the wake-up measurement, s; 0 skips it.
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 5.0, value_parser = measuring_s)]
     pub(crate) seconds: f64,
-    /// Priority to measure at; without it that of the settings.
+    /// Priority of the measurement; without it that of the settings.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub(crate) priority: Option<u8>,
 }
@@ -210,7 +210,7 @@ pub(crate) struct DoctorArgs {
     after_help = "Examples:\n  taustream man | man -l -\n  taustream man /usr/local/share/man/man1 && man taustream-plan"
 )]
 pub(crate) struct ManArgs {
-    /// Directory to write one page a program and command into; made when it is missing.
+    /// Directory to write one page per program and command into; created if missing.
     #[arg(value_name = "DIR")]
     pub(crate) directory: Option<PathBuf>,
 }
@@ -218,7 +218,7 @@ pub(crate) struct ManArgs {
 /// `taustream bench`
 #[derive(Args, Debug)]
 pub(crate) struct BenchArgs {
-    /// Which measurement.
+    /// Measurement.
     #[command(subcommand)]
     pub(crate) name: BenchName,
 }
@@ -226,33 +226,32 @@ pub(crate) struct BenchArgs {
 /// The measurements.
 #[derive(Debug, Subcommand)]
 pub(crate) enum BenchName {
-    /// Wake-up lateness and time of the streamer's cycle, beside bare loops in alternating slices of one run.
+    /// Measure wake-up latency and duration of the cycle against bare loops, in alternating slices of one run.
     ///
-    /// No servos are needed: the frames go out, and the arm swings in memory only. Real servos on the bus would get
-    /// setpoints, so run it on a virtual bus.
+    /// No servos are needed. Real servos on the bus would get setpoints, so use a virtual bus.
     Cycle {
-        /// How long to measure, s.
+        /// Duration, s.
         #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 20.0)]
         seconds: f64,
-        /// Slices, bare and streamer in turns.
+        /// Slices, bare and streamer alternately.
         #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 20)]
         slices: u32,
-        /// What carries the frames; without it they are dropped, without system calls.
+        /// CAN link; without it frames are dropped, without system calls.
         #[arg(long, value_name = "LINK")]
         link: Option<LinkChoice>,
-        /// Measure without real-time rights too; such figures say little.
+        /// Measure without real-time rights too; such values say little.
         #[arg(long)]
         allow_non_realtime: bool,
     },
-    /// Time of the streamer's cycle with several settings files, in turns in one run: two buses against one, say.
+    /// Compare the duration of the cycle with several settings files, alternately in one run.
     ///
-    /// As with `cycle`, no servos are needed, and real ones on the bus would get setpoints.
+    /// No servos are needed. Real servos on the bus would get setpoints, so use a virtual bus.
     Compare(CompareArgs),
-    /// The paper's cost function in vector lanes beside plain f64, in turns in one run, and whole runs of its IBFOA.
+    /// Measure the vectorised cost function of Wang et al. (2022) against plain f64, and whole runs of IBFOA.
     Cost(CostBenchArgs),
-    /// Check the claims of the five papers: their tables beside ours, claim by claim.
+    /// Check the claims of the five papers, and print their tables beside ours.
     Papers(super::PapersArgs),
-    /// Compare the planners by name: what they find, how fast, and how good the motions are.
+    /// Compare the planners by name: problems solved, planning time, quality of the motions.
     Planners(super::PlannersArgs),
 }
 
@@ -262,10 +261,10 @@ pub(crate) struct CostBenchArgs {
     /// Robot: a path, or the name of a shipped robot.
     #[arg(long, value_name = "FILE", default_value = "ur5")]
     pub(crate) robot: PathBuf,
-    /// How long to measure single evaluations, s.
+    /// Duration of the measurement of single evaluations, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0, value_parser = measuring_s)]
     pub(crate) seconds: f64,
-    /// Whole runs of the paper's case 1, each of a random case of its own.
+    /// Whole runs of case 1 of the paper, each of a different random case.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 9, value_parser = runs())]
     pub(crate) case_1_runs: usize,
     /// Whole runs of case 2, some seconds each.
@@ -276,19 +275,19 @@ pub(crate) struct CostBenchArgs {
 /// What `taustream bench compare` takes.
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
-    /// Settings files, or names of some; the first one is what the others are measured by.
+    /// Settings files or names; the first one is the reference.
     #[arg(required = true, num_args = 2.., value_name = "SETTINGS")]
     pub(crate) arms: Vec<PathBuf>,
-    /// How long to measure each arm, s.
+    /// Duration per arm, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 10.0)]
     pub(crate) seconds: f64,
-    /// Rounds in which each arm has its turn.
+    /// Rounds; each round measures every arm once.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 10)]
     pub(crate) slices: u32,
-    /// What carries the frames; without it they are dropped, without system calls.
+    /// CAN link; without it frames are dropped, without system calls.
     #[arg(long, value_name = "LINK")]
     pub(crate) link: Option<LinkChoice>,
-    /// Measure without real-time rights too; such figures say little.
+    /// Measure without real-time rights too; such values say little.
     #[arg(long)]
     pub(crate) allow_non_realtime: bool,
 }
@@ -349,7 +348,7 @@ impl FromStr for Weights {
     fn from_str(text: &str) -> Result<Self, String> {
         let parse = |word: &str| match word.trim().parse::<f64>() {
             Ok(weight) if weight.is_finite() && weight >= 0.0 => Ok(weight),
-            _ => Err(format!("`{}` is no weight; expected a finite number of 0 or more", word.trim())),
+            _ => Err(format!("`{}` is not a weight; expected a finite number of 0 or more", word.trim())),
         };
         let weights = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
         let count = weights.len();

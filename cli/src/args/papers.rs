@@ -1,4 +1,4 @@
-//! Words of `taustream bench papers`.
+//! Arguments of `taustream bench papers`.
 use clap::Args;
 use std::path::PathBuf;
 use taustream_claims::{Effort, PAPERS};
@@ -13,23 +13,23 @@ Examples:
 Papers: 0 or 000_518aefc8cd38e163 (IBFOA, Tau-J*), 1 or 001_5e4af5ebec08e134 (ISMA, B-splines), 2 or
 002_3862cf3632de683b (virtual obstacles), 3 or 003_b15e0e655e3bf4df (IEPSO, reward), 4 or 004_e19ad8423bd62d7d (IWO).
 
-A table has the paper's printed value, ours by the letter of the paper (printed) and ours with its errors mended
-(corrected), and a signed-rank test pair by pair at equal evaluations where two methods are compared. A verdict
-(holds, does not hold, cannot be checked) follows from the numbers by the rule beside it. The papers' own values are
-the only constants; one seed gives one answer, whatever --jobs is. Ctrl-C ends it; nothing is written then.
+Each table has the value that the paper prints, ours to the letter of the paper (printed) and ours with its errors
+corrected (corrected). Two methods are compared pair by pair with a signed-rank test at equal evaluations. The result
+of a claim (holds, does not hold, cannot be checked) follows from the numbers by the rule beside it. The papers' own
+values are the only constants. One seed gives one result with any --jobs. Ctrl-C aborts without output.
 A full run takes an hour or more, mostly papers 0 and 1; a build with --release is several times faster.";
 
 /// `taustream bench papers`
 #[derive(Args, Debug)]
 #[command(after_help = PAPERS_HELP)]
 pub(crate) struct PapersArgs {
-    /// One paper only, by its number or its file's name; without it all five.
+    /// Run one paper only, by its number; without it all five.
     #[arg(long, value_name = "N", value_parser = paper)]
     pub(crate) paper: Option<u8>,
-    /// Runs of everything random; without it the papers' own numbers (or, with --quick, few).
+    /// Number of runs of each experiment; without it the papers' own numbers (or, with --quick, few).
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = runs)]
     pub(crate) runs: Option<usize>,
-    /// Few and short runs.
+    /// Do few and short runs.
     #[arg(long)]
     pub(crate) quick: bool,
     /// Seed of every random choice.
@@ -38,13 +38,13 @@ pub(crate) struct PapersArgs {
     /// Threads.
     #[arg(long, value_name = "J", allow_negative_numbers = true, default_value_t = 1, value_parser = jobs)]
     pub(crate) jobs: usize,
-    /// Directory to write report.md, tables.json and the pictures into; made when it is missing.
+    /// Directory to write report.md, tables.json and the pictures into; created if missing.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
 }
 
 impl PapersArgs {
-    /// How much work that is.
+    /// The extent of the experiments.
     pub(crate) fn effort(&self) -> Effort {
         Effort { runs: self.runs, quick: self.quick, seed: self.seed, jobs: self.jobs }
     }

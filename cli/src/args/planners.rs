@@ -1,4 +1,4 @@
-//! Words of `taustream bench planners`.
+//! Arguments of `taustream bench planners`.
 use clap::Args;
 use std::env;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ const PLANNERS_HELP: &str = "\
 Examples:
   taustream bench planners --quick                            every planner on a few problems; proves nothing
   taustream bench planners --planners auto,rrt-connect,rbf    these three, on 20 problems a set
-  taustream bench planners --planners improvements            what the default does once it has found a path
+  taustream bench planners --planners improvements            the improvements of the default planner
   taustream bench planners --robot piper --scene my-cell.toml --problems 50 -o my-cell
   TAUSTREAM_MBM_DIR=../mbm taustream bench planners           with published problems, read from that directory
 
@@ -17,10 +17,10 @@ Start and goal are random, clear, and joined by a path by construction; the stra
 Sets: the scenes given (shelf and pillars, if none), clutter (other obstacles for every problem), cup (three walls
 between start and goal), and the published problems.
 
-The deadline grants work; the clock does not cut, so that all figures but the times are the same on any machine, with
-any --jobs. Times are processor time, and mean little but as ratios to the first planner in the same run.
+The deadline sets the budget and the clock does not abort, so all numbers except the times are the same on any machine,
+with any --jobs. Times are processor time; compare them only as ratios to the first planner of the same run.
 Names: those of `taustream plan --planner`; auto+none, auto+searches and auto+METHOD are the default planner with
-another improvement of what it found; `all` and `improvements` are lists of them. docs/planner.md has a full run.";
+another improvement; `all` and `improvements` are lists of them. docs/planner.md has a full run.";
 
 /// `taustream bench planners`
 #[derive(Args, Debug)]
@@ -32,34 +32,34 @@ pub(crate) struct PlannersArgs {
     /// Scenes: paths, or names of shipped scenes.
     #[arg(long, value_name = "FILE", num_args = 1.., default_values = ["shelf", "pillars"])]
     pub(crate) scene: Vec<PathBuf>,
-    /// Problems a set.
+    /// Problems per set.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 20, value_parser = count)]
     pub(crate) problems: usize,
-    /// Planners, the one first that the others are measured by.
+    /// Planners; the first one is the reference.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', default_value = "all")]
     pub(crate) planners: Vec<String>,
-    /// Deadline that grants work to each plan, ms.
+    /// Deadline that sets the budget of each plan, ms.
     #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) deadline_ms: u32,
-    /// Directory of published problems (see docs/planner.md); without it, what `TAUSTREAM_MBM_DIR` names.
+    /// Directory of published problems (see docs/planner.md); without it, `TAUSTREAM_MBM_DIR`.
     #[arg(long, value_name = "DIR")]
     pub(crate) published: Option<PathBuf>,
-    /// Two problems a set, and little work for each plan, whatever else is asked for.
+    /// Do two problems per set with a small budget, whatever the other options say.
     #[arg(long)]
     pub(crate) quick: bool,
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Threads; times are worth something with one only.
+    /// Threads; times are valid with one thread only.
     #[arg(long, value_name = "J", allow_negative_numbers = true, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(crate) jobs: u16,
-    /// Directory to write planners.md and planners.json into; made when it is missing.
+    /// Directory to write planners.md and planners.json into; created if missing.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
 }
 
 impl PlannersArgs {
-    /// How much work that is.
+    /// The extent of the experiments.
     pub(crate) fn effort(&self) -> Effort {
         Effort { runs: None, quick: self.quick, seed: self.seed, jobs: self.jobs.into() }
     }
@@ -70,7 +70,7 @@ impl PlannersArgs {
         self.published.clone().or_else(named)
     }
 
-    /// Who takes part.
+    /// The planners to compare.
     pub(crate) fn entrants(&self) -> Result<Vec<Entrant>, String> {
         let mut entrants: Vec<Entrant> = Vec::new();
         for name in &self.planners {

@@ -204,7 +204,7 @@ impl Process {
         }
         let killed = self.child.kill().and_then(|()| self.child.wait());
         let how = if killed.is_ok() { "and was killed" } else { "and could not be killed" };
-        Err(self.failed(&format!("did not end within {END_S_MAX} s of being told to, {how}")))
+        Err(self.failed(&format!("did not end within {END_S_MAX} s after SIGTERM, {how}")))
     }
 
     fn evaluate(&self, status: ExitStatus) -> Result<(), Failure> {
@@ -218,7 +218,7 @@ impl Process {
             text.lines().rev().filter(|l| !l.trim().is_empty()).take(QUOTED_LINES).collect();
         lines.reverse();
         let log = self.log.display();
-        let said = if lines.is_empty() { "it said nothing".to_owned() } else { lines.join(" | ") };
+        let said = if lines.is_empty() { "it printed nothing".to_owned() } else { lines.join(" | ") };
         Failure::Failed(format!("{} {how}: {said} (log: {log})", self.name))
     }
 }

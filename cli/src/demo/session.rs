@@ -195,7 +195,7 @@ impl<'a> Session<'a> {
         if well {
             "the arm was stopped on its path and de-energised, and all processes were ended"
         } else {
-            "the arm could not be stopped by command, so its streamer was told to end, which stops it"
+            "the arm could not be stopped by command; its streamer was terminated, which stops the arm"
         }
     }
 

@@ -140,8 +140,7 @@ fn queue(s: &Subject, settings: &Settings, index: usize, bus: &Bus, at: &str) ->
         );
         Finding::problem(NAME, what, remedy)
     } else if length > QUEUE_MAX && bus.kind != BusKind::Virtual {
-        let what =
-            format!("{interface} queues {length} frames: on a bus in trouble old setpoints wait in it");
+        let what = format!("{interface} queues {length} frames: after a bus fault old setpoints wait in it");
         Finding::warning(NAME, what, remedy)
     } else {
         Finding::ok(NAME, format!("{interface} queues {length} frames; a cycle sends {wanted}"))

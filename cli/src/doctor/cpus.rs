@@ -37,16 +37,18 @@ fn isolation(s: &Subject) -> Finding {
             format!("cycle.cpu is {cpu}, and this computer has {} only", shown(&describe(&online))),
             "set cycle.cpu to one of them, the last one preferably",
         ),
-        Some(cpu) if !isolated.contains(&cpu) => {
-            Finding::warning(NAME, format!("the cycle's CPU {cpu} is shared with all other work"), remedy)
-        }
+        Some(cpu) if !isolated.contains(&cpu) => Finding::warning(
+            NAME,
+            format!("the cycle's CPU {cpu} is shared with all other processes"),
+            remedy,
+        ),
         Some(cpu) if !tickless.contains(&cpu) => {
             let what = format!("the cycle's CPU {cpu} is isolated, but the scheduler's clock interrupts it");
             Finding::warning(NAME, what, remedy)
         }
         Some(cpu) => Finding::ok(NAME, format!("CPU {cpu} belongs to the cycle, without a scheduler tick")),
         None if isolated.is_empty() => {
-            Finding::warning(NAME, "none: any process can get in the way of the cycle", remedy)
+            Finding::warning(NAME, "none: any process can delay the cycle", remedy)
         }
         None => Finding::warning(
             NAME,
@@ -141,7 +143,7 @@ fn idle_states(s: &Subject) -> Finding {
         }
     }
     match deepest {
-        None => Finding::unknown(NAME, format!("the kernel does not tell those of CPU {cpu}")),
+        None => Finding::unknown(NAME, format!("the kernel does not report those of CPU {cpu}")),
         Some((us, name)) if us > IDLE_EXIT_US_MAX => Finding::warning(
             NAME,
             format!("CPU {cpu} may sleep as deep as {}, which takes {us} us to leave", shown(&name)),
@@ -156,10 +158,10 @@ fn threads_of_a_core(s: &Subject) -> Finding {
     match s.tree.text(&format!("{CPU}/smt/active")).as_deref() {
         Some("1") => Finding::warning(
             NAME,
-            "two CPUs share one core: work on the other one slows the cycle down",
+            "two CPUs share one core: load on the other one slows the cycle down",
             "boot with nosmt, or keep the core's other CPU idle (isolcpus both)",
         ),
         Some("0") => Finding::ok(NAME, "off"),
-        Some(_) | None => Finding::unknown(NAME, "the kernel does not tell"),
+        Some(_) | None => Finding::unknown(NAME, "the kernel does not report it"),
     }
 }

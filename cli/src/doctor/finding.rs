@@ -65,7 +65,7 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<8} {:<20} {}", self.grade.word(), self.name, self.what)?;
         match &self.remedy {
-            Some(remedy) => write!(f, "\n{:<30}cure: {remedy}", ""),
+            Some(remedy) => write!(f, "\n{:<30}remedy: {remedy}", ""),
             None => Ok(()),
         }
     }

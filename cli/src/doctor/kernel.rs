@@ -157,12 +157,12 @@ fn clock_source(s: &Subject) -> Finding {
         "timebase",
     ];
     match s.tree.text("sys/devices/system/clocksource/clocksource0/current_clocksource") {
-        None => Finding::unknown(NAME, "the kernel does not tell it"),
+        None => Finding::unknown(NAME, "the kernel does not report it"),
         Some(source) if FAST.contains(&source.as_str()) => Finding::ok(NAME, source),
         Some(source) => Finding::warning(
             NAME,
             format!("{}: every look at the clock is slow", shown(&source)),
-            "find out why in `dmesg | grep -i -e tsc -e clocksource`; firmware updates and tsc=reliable are the usual ways",
+            "look for the reason in `dmesg | grep -i -e tsc -e clocksource`; firmware updates and tsc=reliable are the usual remedies",
         ),
     }
 }

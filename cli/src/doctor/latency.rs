@@ -27,7 +27,7 @@ impl Latency {
     /// The grade of the worst wake-up against the period.
     pub(crate) fn evaluate(&self) -> Finding {
         const NAME: &str = "wake-up latency";
-        const REMEDY: &str = "mend what is named above, then measure under the load that the arm will meet, for minutes: \
+        const REMEDY: &str = "fix the findings above, then measure for minutes under the load of operation: \
                             taustream doctor --seconds 600";
         let lateness = &self.wake_ups.lateness;
         let (p50, p99, max) = (us(lateness.p50_ns), us(lateness.p99_ns), us(lateness.max_ns));

@@ -26,7 +26,7 @@ fn swap(s: &Subject) -> Finding {
             Finding::warning(
                 NAME,
                 format!(
-                    "{}: the streamer locks its memory, but the rest of the computer may stand still",
+                    "{}: the streamer locks its memory, but the rest of the computer may stall",
                     shown(first)
                 ),
                 "swapoff --all, and take it out of /etc/fstab",
@@ -38,7 +38,7 @@ fn swap(s: &Subject) -> Finding {
 fn shared_memory(s: &Subject) -> Finding {
     const NAME: &str = "/dev/shm";
     match s.shm_free {
-        None => Finding::unknown(NAME, "its size is not told"),
+        None => Finding::unknown(NAME, "its size is not readable"),
         Some(bytes) if bytes < SHM_FREE_MIN => Finding::problem(
             NAME,
             format!("{} MiB free; the services of an arm want {} MiB", bytes >> 20, SHM_FREE_MIN >> 20),
@@ -64,14 +64,14 @@ fn stale_segments(s: &Subject) -> Finding {
         return Finding::ok(NAME, "none");
     }
     if running {
-        return Finding::ok(NAME, "not judged: taustream is running, and its segments are in use");
+        return Finding::ok(NAME, "not checked: taustream is running, and its segments are in use");
     }
     let list: Vec<String> = owners.iter().take(4).map(|o| shown(o)).collect();
     let more = if owners.len() > list.len() { ", .." } else { "" };
     Finding::warning(
         NAME,
-        format!("nobody runs, but there are files of {}{more}", list.join(", ")),
-        "the next start cleans up what stands in its way; all at once, while nothing runs: rm /dev/shm/taustream.*",
+        format!("no process runs, but there are files of {}{more}", list.join(", ")),
+        "the next start removes its own; to remove all of them while nothing runs: rm /dev/shm/taustream.*",
     )
 }
 

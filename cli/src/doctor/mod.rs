@@ -24,6 +24,7 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 use subject::Subject;
+use taustream_arm::text::counted;
 use taustream_arm::{Settings, runtime, settings::CycleSettings};
 use taustream_streamer::bench::wake_ups;
 use tree::Tree;
@@ -79,12 +80,15 @@ impl Diagnosis {
             Grade::Unknown | Grade::Ok => "fit",
         };
         format!(
-            "{verdict}: {} ok, {} warnings, {} problems, {} unknown",
-            self.ok, self.warnings, self.problems, self.unknown
+            "{verdict}: {} ok, {}, {}, {} unknown",
+            self.ok,
+            counted(self.warnings, "warning"),
+            counted(self.problems, "problem"),
+            self.unknown
         )
     }
 
-    /// Names of what must be mended.
+    /// Names of the problems.
     fn problem_names(&self) -> String {
         let names = self.findings.iter().filter(|f| f.grade == Grade::Problem).map(|f| f.name);
         names.collect::<Vec<_>>().join(", ")
@@ -136,7 +140,7 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &DoctorArgs) -> Result
     form.print(&diagnosis)?;
     if diagnosis.grade == Grade::Problem {
         let names = diagnosis.problem_names();
-        return Err(Failure::Failed(format!("{} problems: {names}", diagnosis.problems)));
+        return Err(Failure::Failed(format!("{}: {names}", counted(diagnosis.problems, "problem"))));
     }
     Ok(())
 }

@@ -40,7 +40,7 @@ fn priority(wanted: u8, limit: Option<u64>, capabilities: u64, who: &str) -> Fin
                 format!("{who} may use {limit}; the cycle wants {wanted}, and the streamer will not start");
             Finding::problem(NAME, what, REMEDY)
         }
-        None => Finding::unknown(NAME, "RLIMIT_RTPRIO is not told"),
+        None => Finding::unknown(NAME, "RLIMIT_RTPRIO is not readable"),
     }
 }
 
@@ -55,7 +55,7 @@ fn memory(limit: Option<u64>, capabilities: u64, who: &str) -> Finding {
             let what = format!("{who} may lock {bytes} bytes only, and the streamer will not start");
             Finding::problem(NAME, what, REMEDY)
         }
-        None => Finding::unknown(NAME, "RLIMIT_MEMLOCK is not told"),
+        None => Finding::unknown(NAME, "RLIMIT_MEMLOCK is not readable"),
     }
 }
 

@@ -122,7 +122,7 @@ impl Watch {
             }
         }
         if r.trajectory_s + END_TOLERANCE_S < r.trajectory_duration_s {
-            return Err(stopped("dropped", "somebody stopped the arm"));
+            return Err(stopped("dropped", "the arm was stopped by another command"));
         }
         let executed_ns = self.first_ns.map_or(0, |first| r.time_ns.saturating_sub(first));
         Ok(Some(Executed {

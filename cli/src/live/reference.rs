@@ -55,7 +55,7 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &ReferenceArgs) -> Res
     let words = match (chosen, args.at_rad) {
         (Some(joint), Some(at_rad)) => vec![(joint, at_rad)],
         (None, Some(_)) => {
-            return Err(Failure::Usage("--at-rad says where one joint stands: name it with --joint".into()));
+            return Err(Failure::Usage("--at-rad sets the angle of one joint: name it with --joint".into()));
         }
         (chosen, None) => confirmed(&settings, &report, chosen)?,
     };
@@ -109,13 +109,11 @@ fn confirmed(
         }
         let [at_rad] = line.possible_rad.as_slice() else {
             let why = match line.possible_rad.len() {
-                0 => "its feedback tells no angle inside its range".to_owned(),
-                _ => format!("its feedback can mean {}", angles(&line.possible_rad)),
+                0 => "its feedback allows no angle inside its range".to_owned(),
+                _ => format!("its feedback allows {}", angles(&line.possible_rad)),
             };
-            let text = format!(
-                "joint {}: {why}; say where it stands with --joint {} --at-rad X",
-                line.joint, line.joint
-            );
+            let text =
+                format!("joint {}: {why}; set its angle with --joint {} --at-rad X", line.joint, line.joint);
             return Err(Failure::Refused(text));
         };
         words.push((joint, *at_rad));
@@ -167,7 +165,7 @@ impl fmt::Display for References {
             let state = if line.referenced { "referenced" } else { "NOT REFERENCED" };
             write!(f, "\n  {:<18} {:>10.6} rad  {state}: {}", line.joint, line.measured_rad, line.known)?;
             if !line.referenced && line.feedback == Feedback::Wraps.word() {
-                write!(f, "\n      may stand at {}", angles(&line.possible_rad))?;
+                write!(f, "\n      possible angles: {}", angles(&line.possible_rad))?;
             }
             if let Some(answer) = &line.answer {
                 write!(f, "\n      {answer}")?;

@@ -9,6 +9,7 @@ use crate::words::receipt_sentence;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use taustream_arm::text::counted;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::{Outcome, PlanRequest, Receipt, Report};
 use taustream_planner::PlannerKind;
@@ -54,7 +55,12 @@ impl fmt::Display for Answer {
 impl fmt::Display for Planned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s", self.planner, self.planning_s)?;
-        writeln!(f, "duration      {:.3} s at full speed, {} strokes", self.duration_s, self.strokes)?;
+        writeln!(
+            f,
+            "duration      {:.3} s at full speed, {}",
+            self.duration_s,
+            counted(self.strokes, "stroke")
+        )?;
         writeln!(f, "clearance     {:.4} m", self.clearance_m)?;
         write!(
             f,

@@ -102,7 +102,7 @@ fn load(args: &RunArgs, settings: &Settings) -> Result<TrajectoryFile, Failure> 
         None => arm::trajectory_for(path, &settings.robot)?,
     };
     if file.digest.is_none() {
-        let why = "has no `digest`, so nobody knows which robot it was made for; `taustream plan` writes one";
+        let why = "has no `digest`, so its robot is unknown; `taustream plan` writes one";
         return Err(Failure::unfit(path, why));
     }
     Ok(file)

@@ -6,6 +6,7 @@ use crate::output::Form;
 use crate::words::{fault_sentence, pause_sentence};
 use serde::Serialize;
 use std::fmt;
+use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
 use taustream_messages::{BusReport, Phase, ReferenceState, Report};
 
@@ -271,21 +272,22 @@ impl fmt::Display for BusStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "bus {} ({}): {}; {} sent, {} lost in {} cycles, {} received, {} in flight",
+            "bus {} ({}): {}; {} sent, {} lost in {}, {} received, {} in flight",
             self.name,
             self.interface,
             self.state,
             self.frames_sent,
             self.frames_lost,
-            self.cycles_lost,
+            counted(self.cycles_lost, "cycle"),
             self.frames_received,
             self.in_flight
         )?;
         if self.receive_lost + self.echoes_missing > 0 {
             writeln!(
                 f,
-                "  this computer read too slowly: {} frames were lost in receiving, {} of its own did not come back",
-                self.receive_lost, self.echoes_missing
+                "  this computer read too slowly: {} lost in receiving, {} of its own did not come back",
+                counted(self.receive_lost, "frame"),
+                self.echoes_missing
             )?;
         }
         Ok(())

@@ -178,10 +178,7 @@ impl Watch {
                     Tone::Bad,
                 )];
                 if let Some((report, phase)) = &self.last {
-                    lines.push(Line::of(
-                        "The last report, which says nothing of what the arm does now:",
-                        Tone::Warning,
-                    ));
+                    lines.push(Line::of("The last report (the arm may have changed since):", Tone::Warning));
                     lines.extend(picture.lines(report, *phase, None, screen.size().0));
                 }
                 lines.push(footer(self.missed));
@@ -219,5 +216,5 @@ fn closed(error: io::Error) -> Failure {
 fn footer(missed: u64) -> Line {
     let missed =
         if missed == 0 { String::new() } else { format!("; {missed} reports came too fast for this view") };
-    Line::of(format!("q leaves the view; the arm goes on with what it does{missed}"), Tone::Quiet)
+    Line::of(format!("q ends the view; the arm continues{missed}"), Tone::Quiet)
 }

@@ -6,6 +6,7 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use taustream_arm::text::counted;
 use taustream_streamer::bench::{BenchError, BenchOptions, CycleBench, Quantiles, cycle};
 
 /// The measurement, for people and programs.
@@ -31,7 +32,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         link: *link,
         allow_non_realtime: *allow_non_realtime,
     };
-    form.progress(format_args!("measuring for {seconds} s, the two loops in turns ({slices} slices) .."));
+    form.progress(format_args!("measuring for {seconds} s, the two loops alternately ({slices} slices) .."));
     form.print(&Answer(cycle(&options).map_err(|error| failure(&error))?))
 }
 
@@ -51,8 +52,11 @@ impl fmt::Display for Answer {
         let rights = if b.realtime { "SCHED_FIFO, memory locked" } else { "WITHOUT real-time rights" };
         writeln!(
             f,
-            "{} joints, {}, {} us, {rights}; {} deadlines skipped",
-            b.joints, b.link, b.period_us, b.skipped
+            "{}, {}, {} us, {rights}; {} skipped",
+            counted(b.joints, "joint"),
+            b.link,
+            b.period_us,
+            counted(b.skipped, "deadline")
         )?;
         writeln!(f, "                            p50 (us)   p99 (us)  p99.9 (us)    max (us)     cycles")?;
         row(f, "wake-up lateness, streamer", &b.streamer_lateness)?;

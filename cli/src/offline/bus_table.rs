@@ -4,6 +4,7 @@ use std::fmt;
 use taustream_arm::bus_load::flow::Flow;
 use taustream_arm::bus_load::frame::Format;
 use taustream_arm::bus_load::{BusLoad, REFUSED_PERCENT, WARNED_PERCENT};
+use taustream_arm::text::counted;
 use taustream_arm::{Bus, Settings, Traffic};
 
 /// One bus.
@@ -122,7 +123,7 @@ impl FrameLine {
 
 impl fmt::Display for BusTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "bus {} on {}: {} servos, ", self.bus, self.interface, self.servos)?;
+        write!(f, "bus {} on {}: {}, ", self.bus, self.interface, counted(self.servos, "servo"))?;
         match (self.bitrate_bit_s, self.data_bitrate_bit_s) {
             (None, _) => writeln!(
                 f,
@@ -149,7 +150,7 @@ impl fmt::Display for BusTable {
             REFUSED => write!(f, ": REFUSED, more than {REFUSED_PERCENT:.0} %")?,
             "warned" => write!(
                 f,
-                ": WARNING, above {WARNED_PERCENT:.0} % configuration and repetitions have little room"
+                ": WARNING, above {WARNED_PERCENT:.0} % configuration and repeated frames have little bandwidth left"
             )?,
             _ if fullest > REFUSED_PERCENT && self.bitrate_bit_s.is_some() => {
                 write!(f, "; the rest of it waits for the next one")?;
@@ -157,7 +158,7 @@ impl fmt::Display for BusTable {
             _ => {}
         }
         if !self.ways_out.is_empty() {
-            write!(f, "\n  ways out, and the load of the fullest bus then (* is enough by itself):")?;
+            write!(f, "\n  remedies, with the resulting load of the fullest bus (* suffices alone):")?;
         }
         for remedy in &self.ways_out {
             let mark = if remedy.suffices { '*' } else { ' ' };

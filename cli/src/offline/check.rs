@@ -9,6 +9,7 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use taustream_arm::text::counted;
 use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
@@ -89,7 +90,9 @@ impl fmt::Display for CheckedTrajectory {
         let Self { file, robot, joints, strokes, duration_s, .. } = self;
         write!(
             f,
-            "trajectory {file}: robot {robot}, {joints} joints, {strokes} strokes, {duration_s:.3} s; "
+            "trajectory {file}: robot {robot}, {}, {}, {duration_s:.3} s; ",
+            counted(*joints, "joint"),
+            counted(*strokes, "stroke")
         )?;
         match &self.digest {
             Some(digest) => write!(f, "digest {digest}; `taustream verify` checks limits and clearance"),
@@ -185,7 +188,7 @@ impl fmt::Display for CheckedSettings {
                 s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
         }
-        writeln!(f, "  when setpoints stop coming, because the streamer or the bus died:")?;
+        writeln!(f, "  when setpoints stop coming, because of a failure of streamer or bus:")?;
         for reaction in Reaction::ALL {
             let of = |s: &&ServoLine| s.reaction == reaction.word();
             let joints: Vec<&str> = self.servos.iter().filter(of).map(|s| s.joint.as_str()).collect();
@@ -193,16 +196,16 @@ impl fmt::Display for CheckedSettings {
                 writeln!(f, "    {}: {}: each {}", reaction.word(), joints.join(", "), reaction.sentence())?;
             }
         }
-        writeln!(f, "  after power-up, a joint's turn is known:")?;
+        writeln!(f, "  after power-up, the multi-turn offset of a joint is known:")?;
         for s in &self.servos {
             let [low, high] = s.feedback_range_rad;
             let how = match s.feedback {
-                "multi-turn" => "by its feedback".to_owned(),
+                "multi-turn" => "from its feedback".to_owned(),
                 "wraps" => format!(
-                    "by the last pose on disk or the operator, unless its range leaves one turn (its feedback repeats after {:.6} rad)",
+                    "from the last pose on disk or the operator, unless its range allows one offset only (its feedback wraps after {:.6} rad)",
                     high - low
                 ),
-                _ => "by the operator alone (`taustream reference`)".to_owned(),
+                _ => "from the operator only (`taustream reference`)".to_owned(),
             };
             writeln!(f, "    {:<18} {how}", s.joint)?;
         }

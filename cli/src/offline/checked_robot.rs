@@ -1,6 +1,7 @@
 //! A robot as `taustream check` shows it: joints, solid links, and everything that is let through.
 use serde::Serialize;
 use std::fmt;
+use taustream_arm::text::counted;
 use taustream_arm::{Robot, Shape};
 use taustream_motion::time_scale::ramp_duration_s;
 
@@ -33,21 +34,14 @@ impl LinkLine {
             let shapes = || robot.shapes.iter().filter(|shape| shape.link == link);
             let Some(first) = shapes().next() else { continue };
             let before = first.frame.checked_sub(1).and_then(|joint| robot.joints.get(joint));
-            let counted = KINDS.iter().filter_map(|kind| {
+            let shapes = KINDS.iter().filter_map(|kind| {
                 let count = shapes().filter(|shape| kind_of(&shape.shape) == *kind).count();
-                let plural = if count == 1 {
-                    ""
-                } else if kind.ends_with('x') || kind.ends_with('h') {
-                    "es"
-                } else {
-                    "s"
-                };
-                (count > 0).then(|| format!("{count} {kind}{plural}"))
+                (count > 0).then(|| counted(count, kind))
             });
             lines.push(Self {
                 name: name.clone(),
                 moved_by: before.map(|joint| joint.name.clone()),
-                shapes: counted.collect::<Vec<_>>().join(", "),
+                shapes: shapes.collect::<Vec<_>>().join(", "),
             });
         }
         lines
@@ -132,11 +126,11 @@ impl fmt::Display for CheckedRobot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "robot {} ({}): {} joints, {} collision shapes",
+            "robot {} ({}): {}, {}",
             self.name,
             self.file,
-            self.joints.len(),
-            self.shapes
+            counted(self.joints.len(), "joint"),
+            counted(self.shapes, "collision shape")
         )?;
         writeln!(f, "  digest {}", self.digest)?;
         writeln!(
@@ -162,8 +156,8 @@ impl fmt::Display for CheckedRobot {
             "links that MAY TOUCH by the contact rule (neighbours, and pairs that touch in every pose)",
             &self.may_touch_by_rule,
         )?;
-        contacts(f, "links that MAY TOUCH because the robot file says so", &self.may_touch_by_file)?;
-        contacts(f, "links that MAY TOUCH because the SRDF says so", &self.may_touch_by_srdf)?;
+        contacts(f, "links that MAY TOUCH by the robot file", &self.may_touch_by_file)?;
+        contacts(f, "links that MAY TOUCH by the SRDF", &self.may_touch_by_srdf)?;
         write!(
             f,
             "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
@@ -187,7 +181,7 @@ impl CheckedRobot {
                 // Planning could not change whether it meets an obstacle, so it is not held against any.
                 None => writeln!(
                     f,
-                    "  {:<26} stands still: {} (kept clear of the arm, not of obstacles)",
+                    "  {:<26} is fixed: {} (checked against the arm, not against obstacles)",
                     link.name, link.shapes
                 )?,
             }

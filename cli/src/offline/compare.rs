@@ -37,7 +37,7 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let realtime = self.0.iter().all(|arm| arm.realtime);
         let rights = if realtime { "SCHED_FIFO, memory locked" } else { "WITHOUT real-time rights" };
-        writeln!(f, "whole cycle of each arm, in turns in one run; {rights}")?;
+        writeln!(f, "whole cycle of each arm, alternately in one run; {rights}")?;
         write!(
             f,
             "arm            buses  joints  p50 (us)  p99 (us)  bare p50  against the first: p50    p99"

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
+use taustream_arm::text::counted;
 use taustream_planner::dynamics::Dynamics;
 use taustream_planner::{CostError, CostModel, paper_cost};
 
@@ -35,7 +36,11 @@ impl fmt::Display for Answer {
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy_J          {energy_j}")?;
         }
-        write!(f, "({} poses in the paper's model; `taustream verify` says what may move)", self.poses)
+        write!(
+            f,
+            "({} in the model of Wang et al. (2022); `taustream verify` proves whether it may move)",
+            counted(self.poses, "pose")
+        )
     }
 }
 

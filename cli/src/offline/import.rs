@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::fmt;
 use std::io;
 use std::path::Path;
+use taustream_arm::text::counted;
 use taustream_arm::{MotionTable, Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::import::{
@@ -51,14 +52,15 @@ impl fmt::Display for Summary {
         let (original_s, added_s) = (self.original_s, self.time_added_s);
         writeln!(
             f,
-            "duration      {:.3} s, {} strokes; the original takes {original_s:.3} s, {added_s:+.3} s",
-            self.duration_s, self.strokes
+            "duration      {:.3} s, {}; the original takes {original_s:.3} s, {added_s:+.3} s",
+            self.duration_s,
+            counted(self.strokes, "stroke")
         )?;
         if self.time_scale > 1.0 {
             writeln!(f, "SLOWED DOWN   {:.4} times, to keep the motion limits", self.time_scale)?;
         }
         if self.exact {
-            writeln!(f, "deviation     none: it is made of strokes as it stands")?;
+            writeln!(f, "deviation     none: the profile is a stroke")?;
         } else {
             let (joint, at_s) = (&self.deviation_joint, self.deviation_at_s);
             writeln!(f, "deviation     at most {:.6} rad, {joint} at t = {at_s:.3} s", self.deviation_rad)?;
@@ -112,12 +114,12 @@ fn from_table(
     };
     let mut notes = Vec::new();
     if !table.ignored.is_empty() {
-        notes.push(format!("columns that were let go: {}", table.ignored.join(", ")));
+        notes.push(format!("ignored columns: {}", table.ignored.join(", ")));
     }
     if table.began_s != 0.0 {
         notes.push(format!("its clock begins at {} s; that is 0 here", table.began_s));
     }
-    let words = format!("{} rows of {}", table.t_s.len(), path.display());
+    let words = format!("{} of {}", counted(table.t_s.len(), "row"), path.display());
     let reference = Reference::of_table(table).map_err(|e| refused(&e))?;
     let imported = import(robot, scene, &reference, args.tolerance_rad).map_err(|e| refused(&e))?;
     Ok((imported, Source { words, notes }))
@@ -148,7 +150,7 @@ fn from_points(args: &ImportArgs, robot: &Robot, scene: &Scene) -> Result<(Impor
         let reference = Reference::through(&via).map_err(|e| refused(&e))?;
         import(robot, scene, &reference, args.tolerance_rad)
     };
-    let words = format!("{} points by {}", points_rad.len(), profile.name());
+    let words = format!("{} by {}", counted(points_rad.len(), "point"), profile.name());
     Ok((imported.map_err(|e| refused(&e))?, Source { words, notes }))
 }
 

@@ -8,6 +8,7 @@ use crate::output::{Form, deliver};
 use serde::Serialize;
 use std::fmt;
 use std::time::Duration;
+use taustream_arm::text::counted;
 use taustream_arm::{Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::optimize::Method;
@@ -44,7 +45,7 @@ struct Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s (seed {})", self.planner, self.planning_s, self.seed)?;
-        writeln!(f, "duration      {:.3} s, {} strokes", self.duration_s, self.strokes)?;
+        writeln!(f, "duration      {:.3} s, {}", self.duration_s, counted(self.strokes, "stroke"))?;
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
         }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use taustream_arm::text::counted;
 use taustream_arm::{Scene, TrajectoryFile};
 
 /// What was drawn.
@@ -24,9 +25,9 @@ struct Answer {
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (duration_s, strokes) = (self.duration_s, self.strokes);
-        write!(f, "{}: {duration_s:.3} s, {strokes} strokes", self.picture)?;
+        write!(f, "{}: {duration_s:.3} s, {}", self.picture, counted(strokes, "stroke"))?;
         match &self.robot {
-            Some(robot) => write!(f, ", {robot} among {} obstacles", self.obstacles),
+            Some(robot) => write!(f, ", {robot} among {}", counted(self.obstacles, "obstacle")),
             None => write!(f, "; --robot and --scene add limits and the arm in three views"),
         }
     }

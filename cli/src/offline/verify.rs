@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
+use taustream_arm::text::counted;
 use taustream_arm::{Robot, RobotJoint};
 use taustream_motion::limits::Peaks;
 use taustream_planner::verify;
@@ -31,7 +32,7 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [a, b] = &self.clearance_between;
         writeln!(f, "verified      {} for robot {}", self.trajectory, self.robot)?;
-        writeln!(f, "duration      {:.3} s, {} strokes", self.duration_s, self.strokes)?;
+        writeln!(f, "duration      {:.3} s, {}", self.duration_s, counted(self.strokes, "stroke"))?;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
         writeln!(f, "continuity    {}", self.continuity)?;
         write!(f, "{}", PeakTable(&self.peak_use))

@@ -5,6 +5,7 @@ use super::views::Stage;
 use crate::failure::Failure;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::Path;
+use taustream_arm::text::counted;
 use taustream_arm::{Robot, RobotJoint, Scene, TrajectoryFile};
 use taustream_claims::chart::{Area, Curve, Drawn, LimitLine, thinned};
 use taustream_motion::trajectory::Cursor;
@@ -43,10 +44,10 @@ fn draw(root: &Area<'_>, path: &Path, file: &TrajectoryFile, arm: Option<(&Robot
         ""
     };
     let title = format!(
-        "{name}: {}, {:.3} s, {} strokes{views}",
+        "{name}: {}, {:.3} s, {}{views}",
         file.robot,
         trajectory.duration_s(),
-        trajectory.strokes().len()
+        counted(trajectory.strokes().len(), "stroke")
     );
     let body = root.titled(&title, ("sans-serif", 22).into_font())?;
     let curves_area = match arm {

@@ -105,7 +105,7 @@ impl Picture {
         }
         let way_out = match phase {
             Phase::Fault => "; then `taustream clear-fault`",
-            Phase::Locked => "; cleared: `taustream enable` goes on",
+            Phase::Locked => "; cleared: `taustream enable`",
             Phase::Configuring
             | Phase::Disabled
             | Phase::Enabling

@@ -136,8 +136,8 @@ fn piper_can_be_planned_for_and_its_settings_say_what_is_missing() {
         &[
             "servo[0].protocol = \"piper\"",
             "comes in a later version",
-            "the robot itself is sound",
-            "planned for",
+            "the robot itself is valid",
+            "can use it",
         ],
     );
 }

@@ -227,7 +227,7 @@ fn watch_on_a_terminal_draws_in_colour_and_leaves_on_q() {
         String::from_utf8_lossy(&seen).into_owned()
     };
     let coloured = picture("");
-    for word in ["MOVING", "shoulder_pan", "in its range", "1.00 of 4.00 s", "q leaves"] {
+    for word in ["MOVING", "shoulder_pan", "in its range", "1.00 of 4.00 s", "q ends"] {
         assert!(coloured.contains(word), "no `{word}`: {coloured:?}");
     }
     assert!(

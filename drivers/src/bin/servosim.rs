@@ -92,6 +92,6 @@ fn run(args: &Arguments, (settings, simulator): (Settings, LinkedSimulator)) -> 
     stdout.flush()?;
     Manager::from_environment().progress();
     let served = serve(links, simulator, Some(&mut StandardInput::default()), &stop)?;
-    tracing::info!("heard {} frames, sent {}, lost {}", served.received, served.sent, served.lost);
+    tracing::info!("received {} frames, sent {}, lost {}", served.received, served.sent, served.lost);
     Ok(())
 }

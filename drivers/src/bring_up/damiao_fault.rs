@@ -56,18 +56,16 @@ impl DamiaoFault {
                 "the motor does not answer; check its power, the wiring, the bit rate (register 35), node_id (register 8) \
                  and feedback_id (register 7)"
             }
-            Self::NoRegister => {
-                "the motor answers, but not when it is asked for this register; check its firmware"
-            }
+            Self::NoRegister => "the motor answers, but not to a read of this register; check its firmware",
             Self::OtherMaster => "another master commands this motor; end it first",
             Self::EnableTimeout => "the motor did not say that it is enabled; check its supply",
             Self::CommandFar => "not energised: the command lies too far from the measured position",
             Self::DroppedOut => {
-                "the motor let go by itself, or restarted; check its supply, and that nobody else disables it"
+                "the motor disabled itself, or restarted; check its supply, and that no other program disables it"
             }
-            Self::NoReply => "the motor fell silent; check its power and the wiring",
+            Self::NoReply => "the motor stopped answering; check its power and the wiring",
             Self::Restarted => {
-                "the motor has restarted, or somebody wrote its registers; clear the fault to set them again"
+                "the motor has restarted, or another program wrote its registers; clear the fault to set them again"
             }
         }
     }

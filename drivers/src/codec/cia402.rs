@@ -26,7 +26,7 @@ pub use crate::codec::cia402_words::{
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Cia402Error {
     /// There is no such bus.
-    #[error("bus {bus} was asked for, but the settings have {buses}")]
+    #[error("bus {bus} was requested, but the settings have {buses}")]
     NoSuchBus {
         /// Index asked for.
         bus: usize,
@@ -62,7 +62,7 @@ pub enum Cia402Error {
     },
     /// The period cannot be stated in object 0x60C2.
     #[error(
-        "a setpoint every {period_us} us (cycle.period_us x setpoint_every) cannot be told to a CiA 402 drive (object \
+        "a setpoint every {period_us} us (cycle.period_us x setpoint_every) cannot be configured in a CiA 402 drive (object \
          0x60C2 takes 1 to 255 times a power of ten); choose 500, 1000, 2000 or 4000"
     )]
     Period {

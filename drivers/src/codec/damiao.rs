@@ -16,7 +16,7 @@ use taustream_motion::MAX_JOINTS;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DamiaoError {
     /// There is no such bus.
-    #[error("bus {bus} was asked for, but the settings have {buses}")]
+    #[error("bus {bus} was requested, but the settings have {buses}")]
     NoSuchBus {
         /// Index asked for.
         bus: usize,

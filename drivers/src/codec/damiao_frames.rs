@@ -280,8 +280,8 @@ pub const fn status_words(status: u8) -> &'static str {
         0xB => "its power stage is too hot; let it cool down",
         0xC => "its winding is too hot; let it cool down",
         STATUS_LOST_COMMUNICATION => {
-            "no command came for longer than its TIMEOUT (watchdog_ms), so it let go; check the wiring and whether the \
-             streamer was held up"
+            "it received no command for longer than its TIMEOUT (watchdog_ms) and disabled itself; check the wiring, and whether the \
+             streamer was stalled"
         }
         0xE => "overload; check for a blocked joint",
         _ => "a state that its manual does not list",

@@ -108,7 +108,7 @@ impl ErrorFrame {
         if has(BUS_OFF | RESTARTED) || self.is_passive() {
             "see cable, termination at both ends, and that every node has the same bit rate"
         } else if has(NO_ACK) {
-            "nobody acknowledges: are the drives powered and connected, at this bit rate?"
+            "no node acknowledges: are the drives powered and connected, at this bit rate?"
         } else if has(TX_TIMEOUT) {
             "the adapter does not send: unplug it and plug it in again, or reload its driver"
         } else if has(TRANSCEIVER) {

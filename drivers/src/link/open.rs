@@ -111,7 +111,7 @@ pub enum OpenError {
         command: String,
     },
     /// The controller is out of order.
-    #[error("the controller of {interface} is {state}; mend cable, termination or bit rate, then: {remedy}")]
+    #[error("the controller of {interface} is {state}; fix cable, termination or bit rate, then: {remedy}")]
     Unfit {
         /// The interface.
         interface: String,

@@ -8,7 +8,7 @@ Each servo of the settings file becomes one CiA 402 drive (CANopen, cyclic synch
 dictionary, motor, gravity load and watchdog. Dynamics and watchdog are set in the file's optional [simulator] section.
 
 A fault is  joint=NAME|NUMBER,kind=KIND[,value=V][,after=start|enable|moving][,at_s=T][,for_s=T]
-  silence   the drive neither sends nor hears            delay    its frames come V ms late (5)
+  silence   the drive neither sends nor receives         delay    its frames come V ms late (5)
   drop      each of its frames is lost with chance V     fault    it reports EMCY code V (0x2310)
   stuck     the joint is jammed                          jump     its encoder reads V rad too far (0.2)
   warning   it sets the warning bit                      refuse   it refuses SDO writes with abort code V

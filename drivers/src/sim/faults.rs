@@ -88,7 +88,7 @@ pub enum FaultRequestError {
     #[error("{0:?} is no part of a fault: expected joint=, kind=, at_s=, after=, for_s= or value=")]
     Key(String),
     /// A key that stands twice.
-    #[error("{0} stands twice")]
+    #[error("{0} appears twice")]
     Twice(String),
     /// A key that must be there.
     #[error("{0} is missing: expected for example joint=3,kind=silence,at_s=2.0")]

@@ -41,7 +41,7 @@ fn motor_that_restarts_in_use_is_noticed_and_configured_anew() {
     let mut arm = Arm::enabled(edited(&[]));
     arm.fault(4, "kind=restart");
     arm.until_one(4, DriveState::Fault);
-    assert!(arm.why(4).contains("let go by itself, or restarted"), "{}", arm.why(4));
+    assert!(arm.why(4).contains("disabled itself, or restarted"), "{}", arm.why(4));
     arm.simulator.clear(None);
     arm.drive_target = DriveTarget::Disabled;
     arm.step();
@@ -76,16 +76,16 @@ fn motor_without_feedback_keeps_its_commands_until_disabled_and_is_configured_an
     let age_s = arm.now.since_s(arm.status(1).received.unwrap());
     assert!(age_s > 0.09, "its feedback grows old: {age_s} s");
     arm.until_one(1, DriveState::Fault);
-    assert!(arm.why(1).contains("fell silent"), "{}", arm.why(1));
+    assert!(arm.why(1).contains("stopped answering"), "{}", arm.why(1));
     arm.step();
     assert_eq!(arm.under(2).len(), 1, "it may still listen");
     arm.drive_target = DriveTarget::Disabled;
     arm.steps(1_000);
     assert_eq!(arm.status(1).state, DriveState::Absent);
-    assert_eq!(arm.nibble(1), 0xD, "it has let go by itself");
+    assert_eq!(arm.nibble(1), 0xD, "it has disabled itself");
     arm.simulator.clear(None);
     arm.until_one(1, DriveState::Fault);
-    assert!(arm.why(1).contains("no command came"), "{}", arm.why(1));
+    assert!(arm.why(1).contains("no command for longer"), "{}", arm.why(1));
     arm.clear_faults();
     arm.enable();
 }
@@ -97,7 +97,7 @@ fn gap_beyond_the_watchdog_is_a_fault_of_every_motor() {
     arm.now.0 += 150_000_000;
     arm.steps(3);
     assert_eq!(arm.states(), [DriveState::Fault; JOINTS]);
-    assert!(arm.why(0).contains("no command came for longer than its TIMEOUT"), "{}", arm.why(0));
+    assert!(arm.why(0).contains("no command for longer than its TIMEOUT"), "{}", arm.why(0));
     arm.drive_target = DriveTarget::Disabled;
     arm.step();
     arm.clear_faults();

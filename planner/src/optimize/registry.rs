@@ -91,7 +91,11 @@ pub const METHODS: &[Method] = &[
         BsoStep::set_up
     ),
     method!("greedy-bfoa", "bacterial foraging that takes worsening steps back", Bfoa::greedy),
-    method!("isma", "slime mould with crossover, bee search, parabolas (Li, Xing and Qin 2025)", Isma::set_up),
+    method!(
+        "isma",
+        "slime mould with crossover, bee search, parabolas (Li, Xing and Qin 2025)",
+        Isma::set_up
+    ),
     method!("sma", "slime mould (Li et al. 2020)", Sma::set_up),
     method!("boa", "butterflies (Arora and Singh 2019)", Boa::set_up),
     method!("gwo", "grey wolves (Mirjalili et al. 2014)", Gwo::set_up),

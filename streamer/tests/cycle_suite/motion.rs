@@ -83,7 +83,7 @@ fn stop_and_fast_stop_end_at_rest_on_the_path() {
             assert_within_stop_limits(&harness);
             let (last, before) =
                 (&harness.cycles[harness.cycles.len() - 1], &harness.cycles[harness.cycles.len() - 2]);
-            assert_eq!(last.position_rad, before.position_rad, "the arm rests");
+            assert_eq!(last.position_rad, before.position_rad, "the arm is at rest");
             let reason = harness.cause().map(|c| c.reason);
             assert_eq!(reason, (command == Command::FastStop).then_some(FaultReason::Operator));
         }

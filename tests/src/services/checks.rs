@@ -14,7 +14,7 @@ const ALL: [Check; 14] = [
     ("units verify", hardening::verified),
     ("exposure", hardening::exposures),
     ("hardening is enforced", hardening::enforced),
-    ("a stranger is refused with the cure", rights::stranger),
+    ("another user is refused with the remedy", rights::stranger),
     ("an operator moves the arm", rights::operator),
     ("the sudo rule gives nothing else away", rights::sudo_rule),
     ("real-time thread and locked memory", hardening::real_time),

@@ -20,7 +20,7 @@ pub(super) fn run(form: Form, args: &CostBenchArgs) -> Result<(), Failure> {
     let options =
         Options { seconds: args.seconds, case_1_runs: args.case_1_runs, case_2_runs: args.case_2_runs };
     form.progress(format_args!(
-        "measuring evaluations for {} s, then {} runs of case 1 and {} of case 2 ..",
+        "measuring evaluations for {} s, then case 1 ({}) and case 2 ({}) ..",
         args.seconds, args.case_1_runs, args.case_2_runs
     ));
     let answer = Answer(measure(&robot, &options)?);
