@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn runtime_directory_of_somebody_else_or_behind_a_link_is_refused_with_the_cure() {
+    fn runtime_directory_of_another_user_or_behind_a_link_is_refused_with_the_remedy() {
         let scratch = Scratch::new("refuse");
         let link = scratch.0.join("link");
         std::os::unix::fs::symlink(&scratch.0, &link).unwrap();

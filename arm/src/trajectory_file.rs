@@ -146,7 +146,7 @@ fn read_stroke(mut table: Table<'_>, joints: Option<usize>) -> Option<Stroke> {
 fn note(fault_list: &FaultList, error: &TrajectoryError) {
     let (key, value) = match error {
         TrajectoryError::JointCount { joints } => ("joints".to_owned(), joints.to_string()),
-        TrajectoryError::StrokeCount { strokes } => ("strokes".to_owned(), counted(strokes, "stroke")),
+        TrajectoryError::StrokeCount { strokes } => ("strokes".to_owned(), counted(*strokes, "stroke")),
         TrajectoryError::Base { joint, value_rad } => {
             (format!("base_rad[{joint}]"), format!("{value_rad:?}"))
         }

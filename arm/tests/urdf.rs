@@ -136,7 +136,7 @@ fn moments_of_a_urdf_are_read_and_those_of_no_body_are_said_and_left_out() {
 }
 
 #[test]
-fn what_a_urdf_says_in_vain_is_said_aloud() {
+fn ignored_parts_of_a_urdf_are_reported() {
     let robot = load("nasty.toml");
     let all = robot.notices.join("\n");
     for words in [

@@ -19,7 +19,7 @@ fn experiments_of_papers_000_and_002_are_whole_and_repeat_on_any_number_of_threa
         assert_eq!(report.chapters.len(), chapters);
         for chapter in &report.chapters {
             let outcome = &chapter.outcome;
-            assert!(!outcome.claims.is_empty(), "{}: nothing is judged", chapter.name);
+            assert!(!outcome.claims.is_empty(), "{}: nothing is checked", chapter.name);
             for table in &outcome.tables {
                 assert!(!table.rows.is_empty(), "{}: empty", table.name);
                 for row in &table.rows {
@@ -51,8 +51,8 @@ fn verdicts_that_need_no_runs_are_those_of_calculation() {
     let claims = || report.chapters.iter().flat_map(|c| &c.outcome.claims);
     let verdict = |start: &str| {
         let mut found = claims().filter(|c| c.says.starts_with(start));
-        let claim = found.next().expect("judged");
-        assert!(found.next().is_none(), "{start}: judged twice");
+        let claim = found.next().expect("a claim");
+        assert!(found.next().is_none(), "{start}: claimed twice");
         claim.verdict
     };
     let known = [

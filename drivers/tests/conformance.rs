@@ -147,7 +147,7 @@ fn local_link_survives_malformed_packets() {
     assert!(frames[1].is_fd() && frames[1].data() == [0xFF; 64]);
 }
 
-/// Goal: a server that polls the link sleeps while nothing happens, and wakes for a master, a frame and a farewell.
+/// Goal: a server that polls the link sleeps while nothing happens, and wakes for a master, a frame and a disconnect.
 #[test]
 fn local_servos_are_ready_only_when_there_is_work() {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};

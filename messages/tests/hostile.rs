@@ -108,7 +108,7 @@ fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
     ];
     for (corrupted, words) in cases {
         let message = TrajectoryMessage::new(&example()).corrupted(corrupted);
-        let error = CheckedTrajectory::try_from(&*message).expect_err("a doctored message is refused");
+        let error = CheckedTrajectory::try_from(&*message).expect_err("a corrupted message is refused");
         assert!(error.to_string().contains(words), "{corrupted:?} gave: {error}");
     }
     let other_robot = TrajectoryMessage::new(&example()).corrupted(Corrupted::Digest(1));

@@ -178,7 +178,7 @@ fn jacobian_at_two_thousand_poses_is_the_derivative_of_the_tip() {
         }
         assert!(columns[count..].iter().all(|column| *column == Column::ZERO), "seed {seed}");
         if count > 1 {
-            assert!(gap_to(0, &columns[1]) > 1e-6, "seed {seed}: the columns cannot be told apart");
+            assert!(gap_to(0, &columns[1]) > 1e-6, "seed {seed}: the columns do not differ");
         }
     }
 }

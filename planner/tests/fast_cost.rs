@@ -66,7 +66,7 @@ fn fast_cost_has_the_yardsticks_penalty_and_a_path_within_a_hundred_thousandth()
     }
 }
 
-/// Goal: what an optimiser reports is the yardstick's cost.
+/// Goal: what an optimiser reports is the reference's cost.
 #[test]
 fn winner_is_evaluated_again_by_the_reference_cost() {
     let robot = ur5();
@@ -95,7 +95,7 @@ fn fast_cost_of_what_makes_no_sense_is_refused_or_infinite() {
     for bad in [vec![], vec![0.0; 11], vec![0.0; 13], vec![f64::NAN; 12], vec![f64::INFINITY; 12]] {
         assert!(problem.rate(&bad).is_none() && problem.cost(&bad).is_infinite(), "{bad:?}");
     }
-    // Angles of many turns are the yardstick's.
+    // Angles of many turns are the reference's.
     for far in [1e3, 1e9, 1e300] {
         let (fast, plain) = (problem.rate(&[far; 12]), problem.rate_exactly(&[far; 12]));
         assert_eq!(fast.map(|c| c.penalty.to_bits()), plain.map(|c| c.penalty.to_bits()), "{far}");

@@ -109,7 +109,7 @@ fn optimiser_never_loses_its_best_and_shows_the_current_best_beside_it() {
         let run = Run { seed: 9, evaluations_max: 3_000, guesses: &[], is_over: &is_over, watch: &mut watch };
         let found = made.minimise(&problem, run).expect("sane");
         let (seen, name) = (seen.into_inner(), method.name);
-        assert!(!seen.is_empty(), "{name} told nobody");
+        assert!(!seen.is_empty(), "{name} reported nothing");
         for pair in seen.windows(2) {
             assert!(pair[1].best <= pair[0].best, "{name}: the best so far rose");
             assert_eq!(pair[1].iteration, pair[0].iteration + 1, "{name}");

@@ -60,7 +60,7 @@ fn worst_use(settings: &Settings, received: &[SentSetpoint]) -> [f64; 3] {
     let mut worst = [0.0_f64; 3];
     for (node, limits) in (1_u32..).zip(limits.iter().take(JOINTS)) {
         let mine: Vec<&SentSetpoint> = received.iter().filter(|setpoint| setpoint.node == node).collect();
-        assert!(mine.len() > 100, "node {node} was told {} targets", mine.len());
+        assert!(mine.len() > 100, "node {node} was sent {} targets", mine.len());
         let per_rad = 101.0 * 131_072.0 / std::f64::consts::TAU;
         for window in mine.windows(4) {
             let q = [0, 1, 2, 3].map(|i: usize| f64::from(window[i].counts) / per_rad);
@@ -302,7 +302,7 @@ fn lost_bus_stops_the_joints_of_the_other_on_the_path() {
     let cause = arm.core.supervisor().cause().unwrap();
     assert_eq!((arm.phase(), cause.reason), (Phase::Fault, FaultReason::BusFault), "{cause:?}");
     assert!(arm.visited.contains(&Phase::FastStopping), "{:?}", arm.visited);
-    assert!(sent_after > 150, "the joints within reach were told {sent_after} targets on their way to rest");
+    assert!(sent_after > 150, "the reachable joints were sent {sent_after} targets on their way to rest");
     for (joint, limits) in arm.settings.robot.limits().iter().enumerate().take(3) {
         let speed_rad_s = arm.simulator.simulator.drive(joint).unwrap().velocity_rad_s();
         assert!(speed_rad_s.abs() < 0.05 * limits.motion.velocity_rad_s, "joint {joint} moves");

@@ -143,12 +143,12 @@ def watchdog(motor):
 
 
 def errors(simulator, motor):
-    """A fault of the motor, and the way out of it."""
+    """A fault of the motor, and its remedy."""
     motor.enable()
     for name, code in (("OVER_CURRENT", "0xA"), ("ROTOR_OVER_TEMP", "0xC")):
         simulator.stdin.write(f"fault joint=1,kind=fault,value={code}\n")
         simulator.stdin.flush()
-        check(within(2, lambda: status(motor) == name), f"fault {name} is told", status(motor))
+        check(within(2, lambda: status(motor) == name), f"fault {name} is reported", status(motor))
         motor.enable()
         time.sleep(0.05)
         check(status(motor) == name, "it stays when enabled", status(motor))

@@ -39,7 +39,7 @@ def check(truth, what, seen=""):
 
 
 class Drive:
-    """The state machine of CiA 402 on a device of durand's; a motor that is where it was told to be one SYNC later."""
+    """The state machine of CiA 402 on a device of durand's; a motor that is at its target one SYNC later."""
 
     STATUS = {"off": 0x0240, "ready": 0x0221, "on": 0x0223, "enabled": 0x1227, "quick": 0x0207}
 
@@ -148,7 +148,7 @@ class Arm:
 
 
 def drives(interface, **of_third):
-    """Six drives; the third may be told apart."""
+    """Six drives; the third may differ."""
     counts = [round(angle * COUNTS_PER_RAD) * sign for angle, sign in zip(HOME, SIGNS)]
     return [Drive(interface, n, counts[n - 1], **(of_third if n == 3 else {})) for n in range(1, 7)]
 

@@ -1,4 +1,4 @@
-"""Facts that must hold: counted, each said in a line, judged together at the end."""
+"""Facts that must hold: counted, each said in a line, checked together at the end."""
 
 import sys
 import time

@@ -158,9 +158,9 @@ def main():
         ]:
             text = plain.read_text()
             assert old in text, old
-            doctored = Path(scratch) / "doctored.urdf"
-            doctored.write_text(text.replace(old, new, 1))
-            agrees = compare(program, f"doctored ({old} -> {new})", robots / "nasty.toml", doctored, "plinth", "tool0", nasty_held, 50)
+            corrupted = Path(scratch) / "corrupted.urdf"
+            corrupted.write_text(text.replace(old, new, 1))
+            agrees = compare(program, f"corrupted ({old} -> {new})", robots / "nasty.toml", corrupted, "plinth", "tool0", nasty_held, 50)
             if agrees:
                 raise SystemExit(f"the comparison did not see {old} become {new}")
     if not all(good):

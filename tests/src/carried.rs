@@ -60,7 +60,7 @@ impl<'a> Carried<'a> {
                 continue;
             }
             if !follows_target(data) {
-                return Err(flaw(format!("node {node} is not told to follow while {}", cycle.phase)));
+                return Err(flaw(format!("node {node} is not commanded to follow while {}", cycle.phase)));
             }
             let got = target(data).ok_or_else(|| flaw(format!("node {node} got {} bytes", data.len())))?;
             let requested = cycle.position_rad.get(encoding.joint).copied();

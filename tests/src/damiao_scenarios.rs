@@ -30,7 +30,11 @@ pub const ALL: &[Scenario] = &[
         kills: false,
     },
     Scenario { name: "damiao_motor_fault_mid_motion_fast_stop_names_joint", run: motor_fault, kills: false },
-    Scenario { name: "damiao_streamer_killed_mid_motion_motors_let_go", run: streamer_killed, kills: true },
+    Scenario {
+        name: "damiao_streamer_killed_mid_motion_motors_lose_torque",
+        run: streamer_killed,
+        kills: true,
+    },
 ];
 
 fn goals_with_pause(bench: &mut TestBench, goals: &Goals) -> Result<()> {
@@ -107,7 +111,7 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let since = Instant::now();
     // Every motor has its own watchdog; status 0xD says that it was what let go, and the brakes hold the arm.
     while bench.simulator.said().matches("status=0xD").count() < 6 {
-        ensure!(since.elapsed() < TIMEOUT, "motors do not let go: {}", bench.simulator.said());
+        ensure!(since.elapsed() < TIMEOUT, "motors keep their torque: {}", bench.simulator.said());
         bench.simulator.show("status")?;
         std::thread::sleep(Duration::from_millis(100));
     }

@@ -233,7 +233,7 @@ fn compare_command(
         let rate = (wanted - past) / period_s;
         let room = VELOCITY_ROOM_RAD_S + 2.0 * reach_rad_s / 4095.0;
         if (got - rate).abs() > room && cycle.sigma > 0.0 {
-            return Err(format!("motor {node} was told {got} rad/s, its angle changes by {rate} rad/s"));
+            return Err(format!("motor {node} was sent {got} rad/s, its angle changes by {rate} rad/s"));
         }
     }
     Ok(())

@@ -88,13 +88,13 @@ fn kill_and_restart(restart: &Restart, bench: &mut TestBench, goals: &Goals) -> 
     bench.cli_done(&["speed", "100"])?;
     let motion = bench.replan(&goals.text(1)?)?;
     bench.await_end_of(motion)?;
-    Ok(format!("{told} setpoints before enable, all of them the hold"))
+    Ok(format!("{holds} setpoints before enable, all of them the hold"))
 }
 
 /// Frames of a restart before `enable`, decoded here: reads, the master's heartbeat, SYNC, NMT start, and setpoints that
 /// keep each drive as it is. How many setpoints there were.
 fn only_keeping(recording: &str, since_us: u128) -> Result<usize> {
-    let mut told = 0;
+    let mut holds = 0;
     let mut targets = [const { None::<Vec<u8>> }; 128];
     let records = candump::parse(recording)?;
     for record in records.iter().filter(|record| u128::from(record.time_us) >= since_us) {
@@ -113,13 +113,13 @@ fn only_keeping(recording: &str, since_us: u128) -> Result<usize> {
                     before.as_slice() == target,
                     "the target of {id:03X} went from {before:02X?} to {target:02X?}"
                 );
-                told += 1;
+                holds += 1;
             }
             _ => {}
         }
     }
-    ensure!(told > 100, "only {told} setpoints were seen: nothing was kept");
-    Ok(told)
+    ensure!(holds > 100, "only {holds} setpoints were seen: nothing was kept");
+    Ok(holds)
 }
 
 #[cfg(test)]

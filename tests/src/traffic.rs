@@ -52,7 +52,7 @@ pub fn as_plain(
             (Some(node), None) => {
                 show(&mut nodes, node, |it| {
                     it.control = frame.data.iter().take(2).copied().collect();
-                    it.told = true;
+                    it.is_sent = true;
                 });
                 plain.push(frame);
             }
@@ -63,7 +63,7 @@ pub fn as_plain(
                 }
                 for (encoding, target) in pair.iter().zip(frame.data.chunks_exact(4)) {
                     let node = u32::from(encoding.node_id);
-                    show(&mut nodes, node, |it| it.told = true);
+                    show(&mut nodes, node, |it| it.is_sent = true);
                     let control = nodes.get(&node).map(|it| it.control.clone()).unwrap_or_default();
                     plain.push(BusFrame { id: RPDO1 + node, data: [&control, target].concat() });
                 }
@@ -84,7 +84,7 @@ struct Node {
     /// Newest controlword.
     control: Vec<u8>,
     /// It got a target in this cycle.
-    told: bool,
+    is_sent: bool,
     /// Cycles since the last one.
     waited: u32,
 }
@@ -119,10 +119,10 @@ fn fill(
     for encoding in encodings {
         let id = u32::from(encoding.node_id);
         let Some(node) = nodes.get_mut(&id) else { continue };
-        node.waited = if node.told { 0 } else { node.waited + 1 };
-        let told = std::mem::take(&mut node.told);
+        node.waited = if node.is_sent { 0 } else { node.waited + 1 };
+        let is_sent = std::mem::take(&mut node.is_sent);
         // Only what the log claims is filled in; a cycle beyond it stays as it was seen.
-        let Some((tick, position_rad)) = logged.filter(|_| !told && !node.control.is_empty()) else {
+        let Some((tick, position_rad)) = logged.filter(|_| !is_sent && !node.control.is_empty()) else {
             continue;
         };
         if node.waited >= traffic.setpoint_every {

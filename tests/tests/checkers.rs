@@ -170,7 +170,7 @@ fn drive_not_commanded_to_follow_fails_in_motion_and_passes_in_a_fault() {
     let at = place(&frames, 200, 3);
     frames[at].data = vec![0x06, 0, 1, 2, 3, 0];
     let flaw = check_setpoints(&frames, &log, 0, &encodings()).expect_err("a drive that does not follow");
-    assert!(flaw.to_string().contains("not told to follow while moving"), "{flaw}");
+    assert!(flaw.to_string().contains("not commanded to follow while moving"), "{flaw}");
     nth_cycle(&mut log, 199).phase = "fault".into();
     check_setpoints(&frames, &log, 0, &encodings()).expect("a drive that is off in a fault");
 }

@@ -160,7 +160,7 @@ fn frames_too_few_too_many_or_of_nobody_fail() {
     assert!(flaw.contains("the log does not know"), "{flaw}");
     // A streamer that was killed has sent what it did not write down; what it did write is judged all the same.
     check_setpoints((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early)
-        .expect("the tail is not judged");
+        .expect("the tail is not checked");
     let at = place(&frames, 300, 1);
     frames[at].data[1] ^= 0x10;
     check_setpoints((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early).expect_err("the rest is");

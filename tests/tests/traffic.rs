@@ -100,5 +100,5 @@ fn corrupted_recordings_fail_for_their_fault() {
     let (mut off, _) = recording();
     let at = shared(&off, 0x202, 0);
     off[at].data[0] = 0x07;
-    assert!(flaw_of(off, &log).unwrap().contains("node 2 is not told to follow"));
+    assert!(flaw_of(off, &log).unwrap().contains("node 2 is not commanded to follow"));
 }

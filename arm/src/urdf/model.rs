@@ -332,7 +332,7 @@ fn read_axis(element: &Element<'_, '_, '_>, kind: Option<Kind>) -> Option<[f64; 
 }
 
 /// `None` after a fault, `Some(None)` where the file states no range.
-#[expect(clippy::option_option, reason = "a missing range and a faulty one are told apart")]
+#[expect(clippy::option_option, reason = "a missing range and a faulty one are distinguished")]
 fn read_position(element: &Element<'_, '_, '_>) -> Option<Option<[f64; 2]>> {
     let Some(limit) = element.child("limit") else { return Some(None) };
     if !limit.has("lower") && !limit.has("upper") {
@@ -361,7 +361,7 @@ fn read_position(element: &Element<'_, '_, '_>) -> Option<Option<[f64; 2]>> {
 }
 
 /// As [`read_position`]; a velocity of 0 is what generators write when they know none.
-#[expect(clippy::option_option, reason = "a missing velocity and a faulty one are told apart")]
+#[expect(clippy::option_option, reason = "a missing velocity and a faulty one are distinguished")]
 fn read_velocity(element: &Element<'_, '_, '_>) -> Option<Option<f64>> {
     let Some(limit) = element.child("limit").filter(|limit| limit.has("velocity")) else { return Some(None) };
     let velocity = limit.number("velocity", &VELOCITY)?;

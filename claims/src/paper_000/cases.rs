@@ -261,7 +261,7 @@ impl Trials<'_> {
     /// A claim about the populations at the end.
     fn compared(&self, says: &str, end: Paired, numbers: String) -> Claim {
         if self.runs < PAIRS_MIN {
-            return Claim::unchecked(says, "with so few runs no difference can be told from chance", numbers);
+            return Claim::unchecked(says, "with so few runs no difference is significant", numbers);
         }
         let rule = "the population's best at the end is less than the other's by the signed-rank test at 5 %";
         Claim::decided(says, rule, end.is_less(), numbers)

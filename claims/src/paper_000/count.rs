@@ -65,8 +65,7 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     outcome.tables.push(table);
     let rule =
         "no fixed number from 1 to 6 is better by the signed-rank test at 5 %, at the same evaluations";
-    let says =
-        "Wish of section 6: a criterion finds the best number of control points (ours: grow while it pays)";
+    let says = "Section 6 asks for it: a criterion finds the best number of control points (ours: grow while it pays)";
     outcome.claims.push(Claim::decided(says, rule, never_worse, words.join("; ")));
     Ok(outcome)
 }

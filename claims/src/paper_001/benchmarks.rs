@@ -146,7 +146,7 @@ fn own_schedules(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), 
     let cells = METHODS.len() * Function::ALL.len();
     outcome.claims.push(Claim::decided(
         "Tables 2 and 3 are what the five methods reach in 5000 iterations of 50, 30 runs",
-        "every mean is reproduced by one of the readings: within a tenth, within 1e-13, or not told apart by Welch's \
+        "every mean is reproduced by one of the readings: within a tenth, within 1e-13, or not significantly different by Welch's \
          test at 5 %",
         same.contains(&cells),
         format!("{} of {cells} cells as printed, {} corrected", same[0], same[1]),

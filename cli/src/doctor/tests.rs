@@ -138,7 +138,7 @@ impl Computer {
         let needs_remedy = matches!(grade, Grade::Warning | Grade::Problem);
         assert_eq!(found.remedy.is_some(), needs_remedy, "{found}");
         for other in findings.iter().filter(|f| f.name != name) {
-            assert_eq!(other.grade, Grade::Ok, "only {name} was doctored: {other}");
+            assert_eq!(other.grade, Grade::Ok, "only {name} was corrupted: {other}");
         }
     }
 }

@@ -103,7 +103,7 @@ impl Picture {
         if r.fault_reason == 0 {
             return pause_sentence(r).map_or_else(Line::default, |text| Line::of(text, Tone::Warning));
         }
-        let way_out = match phase {
+        let remedy = match phase {
             Phase::Fault => "; then `taustream clear-fault`",
             Phase::Locked => "; cleared: `taustream enable`",
             Phase::Configuring
@@ -118,7 +118,7 @@ impl Picture {
             | Phase::Braking
             | Phase::Disabling => "",
         };
-        Line::of(format!("FAULT: {}{way_out}", fault_sentence(r, &self.arm)), Tone::Bad)
+        Line::of(format!("FAULT: {}{remedy}", fault_sentence(r, &self.arm)), Tone::Bad)
     }
 }
 

@@ -179,7 +179,7 @@ fn cost_counts_the_papers_481_poses_and_its_parts_add_up() {
 }
 
 #[test]
-fn check_says_aloud_what_may_touch_and_how_long_a_pause_takes() {
+fn check_prints_allowed_contacts_and_pause_times() {
     let scratch = Scratch::new();
     let text = scratch.run(&["check", "vcan6"]);
     for word in [

@@ -51,6 +51,6 @@ fn manual_is_formatted_without_a_warning() {
     for file in scratch.files() {
         assert_eq!(warnings(&file), "", "{file}");
     }
-    scratch.write("doctored.1", ".TH doctored 1\n.SH NAME\n.NOSUCHMACRO\n");
-    assert!(warnings("doctored.1").contains("NOSUCHMACRO"), "{}", warnings("doctored.1"));
+    scratch.write("corrupted.1", ".TH corrupted 1\n.SH NAME\n.NOSUCHMACRO\n");
+    assert!(warnings("corrupted.1").contains("NOSUCHMACRO"), "{}", warnings("corrupted.1"));
 }

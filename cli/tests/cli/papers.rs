@@ -5,20 +5,21 @@ use std::fs;
 #[test]
 fn bench_papers_answers_in_words_and_data_and_writes_what_it_is_asked_for() {
     let scratch = Scratch::new();
-    let text = scratch.run(&["bench", "papers", "--quick", "--paper", "4", "-o", "judged"]).done().to_owned();
+    let text =
+        scratch.run(&["bench", "papers", "--quick", "--paper", "4", "-o", "checked"]).done().to_owned();
     for word in ["paper 004", "HOLD", "rule:", "claims: "] {
         assert!(text.contains(word), "no `{word}`: {text}");
     }
-    let judged = scratch.dir.join("judged");
-    let report = fs::read_to_string(judged.join("report.md")).unwrap();
+    let checked = scratch.dir.join("checked");
+    let report = fs::read_to_string(checked.join("report.md")).unwrap();
     assert!(report.contains("`taustream bench papers --seed 1 --paper 4 --quick`"), "{report}");
     let data: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(judged.join("tables.json")).unwrap()).unwrap();
+        serde_json::from_str(&fs::read_to_string(checked.join("tables.json")).unwrap()).unwrap();
     let mut pictures = 0;
     for chapter in data["chapters"].as_array().unwrap() {
         assert_eq!(chapter["paper"], 4);
         for figure in chapter["figures"].as_array().unwrap() {
-            let svg = fs::read_to_string(judged.join(figure["file"].as_str().unwrap())).unwrap();
+            let svg = fs::read_to_string(checked.join(figure["file"].as_str().unwrap())).unwrap();
             assert!(svg.contains("</svg>"), "{figure}");
             pictures += 1;
         }

@@ -179,10 +179,10 @@ impl ServoDriver for DamiaoDriver {
     }
 
     fn decode(&mut self, now: Nanos, frame: &CanFrame) {
-        let patient = self.clock.now();
+        let now = self.clock.now();
         for joint in &mut self.motors {
             if let Some(reply) = Reply::decode(frame, joint.node_id, joint.feedback_id) {
-                if joint.motor.take(patient, reply) {
+                if joint.motor.take(now, reply) {
                     joint.received = Some(now);
                 }
                 return;
@@ -219,16 +219,16 @@ impl ServoDriver for DamiaoDriver {
     }
 
     fn clear_faults(&mut self) {
-        let patient = self.clock.now();
+        let now = self.clock.now();
         for joint in &mut self.motors {
-            joint.motor.clear_faults(patient);
+            joint.motor.clear_faults(now);
         }
     }
 
     fn start_over(&mut self) {
-        let patient = self.clock.now();
+        let now = self.clock.now();
         for joint in &mut self.motors {
-            joint.motor.start_over(patient);
+            joint.motor.start_over(now);
             joint.received = None;
         }
         self.clock.forget_other_master();

@@ -117,7 +117,7 @@ impl Motor {
         self.move_on(now);
         let timeout_s = self.registers.timeout_s();
         if self.is_enabled() && timeout_s > 0.0 && now.since_s(self.fed) > timeout_s {
-            self.let_go(STATUS_LOST_COMMUNICATION);
+            self.disable(STATUS_LOST_COMMUNICATION);
         }
         let every_s = f64::from(self.parameters.continuous_ms) * 1e-3;
         if every_s > 0.0 && self.receives() && now.since_s(self.sent) >= every_s {
@@ -163,14 +163,14 @@ impl Motor {
         match disturbance {
             Disturbance::Fault(code) => {
                 let named = u8::try_from(code).ok().filter(|code| (0x8..=0xE).contains(code));
-                self.let_go(named.unwrap_or(OVER_CURRENT));
+                self.disable(named.unwrap_or(OVER_CURRENT));
             }
             Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.registers.locked = code != 0,
             Disturbance::Restart => {
-                self.let_go(STATUS_DISABLED);
+                self.disable(STATUS_DISABLED);
                 self.registers.restart();
                 self.commanded = MitCommand::default();
                 self.powered = Some(self.now);
@@ -218,7 +218,7 @@ impl Motor {
         self.fed = self.now;
         match special {
             Special::Enable if self.status == STATUS_DISABLED => self.energise(),
-            Special::Disable if self.is_enabled() => self.let_go(STATUS_DISABLED),
+            Special::Disable if self.is_enabled() => self.disable(STATUS_DISABLED),
             Special::SetZero if !self.is_enabled() => self.zero_shift_rad += self.motor_rad(0.0),
             Special::ClearError if !self.is_enabled() => self.status = STATUS_DISABLED,
             Special::Enable | Special::Disable | Special::SetZero | Special::ClearError => {}
@@ -233,7 +233,7 @@ impl Motor {
         self.controller.energise(at_rad);
     }
 
-    fn let_go(&mut self, status: u8) {
+    fn disable(&mut self, status: u8) {
         self.status = status;
         self.torque_nm = 0.0;
         self.controller.release();

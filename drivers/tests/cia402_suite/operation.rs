@@ -33,7 +33,7 @@ fn enabling_climbs_one_confirmed_rung_after_the_other() {
     let mut words = Vec::new();
     for _ in 0..20 {
         bench.step();
-        assert_ne!(bench.status(0).state, DriveState::Disabled, "the wish shows at once");
+        assert_ne!(bench.status(0).state, DriveState::Disabled, "the drive target takes effect at once");
         words.push(bench.rpdo(0).unwrap().0);
     }
     words.dedup();

@@ -26,11 +26,11 @@ fn check_value(s: Setpoint) -> Result<(), &'static str> {
         return Err("a controlword that the table does not have");
     }
     if s.drive_target == DriveTarget::TorqueOff && s.control != 0x00 && s.control != 0x80 {
-        return Err("torque off was wished");
+        return Err("torque off was requested");
     }
     if s.control == 0x0F {
         if s.drive_target != DriveTarget::Enabled {
-            return Err("enable without the wish");
+            return Err("enable without a request");
         }
         if state != 0x23 && state != 0x27 {
             return Err("enable to a drive that is not switched on");
@@ -80,7 +80,7 @@ fn check_of_setpoints_finds_every_planted_fault() {
 
 #[test]
 fn random_statuswords_targets_and_commands_never_break_the_rules_of_setpoints() {
-    let (mut judged, mut enables, mut reached) = (0, 0, 0);
+    let (mut checked, mut enables, mut reached) = (0, 0, 0);
     for seed in 0..400 {
         let mut rng = SeededRng::from_seed(seed);
         let mut bench = Bench::new(2);
@@ -116,12 +116,12 @@ fn random_statuswords_targets_and_commands_never_break_the_rules_of_setpoints() 
                     );
                 }
                 before[drive] = target;
-                judged += 1;
+                checked += 1;
                 enables += usize::from(control == 0x0F);
             }
         }
     }
-    assert!(judged > 100_000 && enables > 5_000 && reached > 2_000, "{judged} {enables} {reached}");
+    assert!(checked > 100_000 && enables > 5_000 && reached > 2_000, "{checked} {enables} {reached}");
 }
 
 /// Changes something of the world, seldom enough that sequences get somewhere.

@@ -46,7 +46,7 @@ fn wrong_toggle_aborts_with_the_toggle_code() {
     client.accept(SdoResponse::ValueSegmented(NAME, None));
     sent(&mut client, 1);
     client.accept(segment(true, b"x", true));
-    assert_eq!(client.take(), None, "the drive is told first");
+    assert_eq!(client.take(), None, "the drive is informed first");
     assert_eq!(sent(&mut client, 2), "601 80 08 10 00 00 00 03 05");
     assert_eq!(client.take(), Some((SdoJob::Read(NAME), SdoOutcome::Aborted(0x0503_0000))));
 }

@@ -66,7 +66,7 @@ proptest! {
                         Some(Request::Special(Special::Enable | Special::SetZero, _)
                             | Request::Mit(_) | Request::PosVel { .. } | Request::OtherMode(_) | Request::Store)
                     );
-                    assert!(!moves, "{request:?} without a wish");
+                    assert!(!moves, "{request:?} without a request");
                 }
             }
         }

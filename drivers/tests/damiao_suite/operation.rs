@@ -167,7 +167,7 @@ fn command_far_from_the_joint_energises_nothing() {
 }
 
 #[test]
-fn disabling_lets_go_and_torque_off_does_so_in_the_same_cycle_from_every_state() {
+fn disabling_removes_torque_and_torque_off_does_so_in_the_same_cycle_from_every_state() {
     let mut arm = Arm::enabled(edited(&[]));
     arm.drive_target = DriveTarget::Disabled;
     arm.step();
@@ -185,7 +185,7 @@ fn disabling_lets_go_and_torque_off_does_so_in_the_same_cycle_from_every_state()
         let off = Request::Special(Special::Disable, 0);
         for servo in &arm.settings.servos {
             let commanded = arm.sent.iter().any(|frame| Request::decode(frame, servo.node_id) == Some(off));
-            assert!(commanded, "{cycles} cycles after enable: node {} is not told", servo.node_id);
+            assert!(commanded, "{cycles} cycles after enable: node {} gets no command", servo.node_id);
         }
         arm.steps(5);
         assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0), "{cycles} cycles after enable");
@@ -198,7 +198,7 @@ fn disabling_lets_go_and_torque_off_does_so_in_the_same_cycle_from_every_state()
 
 /// The motor keeps the time by itself; what is limp and has no brake falls.
 #[test]
-fn motors_let_go_when_commands_stop_and_fall_without_a_brake() {
+fn motors_disable_themselves_when_commands_stop_and_fall_without_a_brake() {
     let mut arm = Arm::without_brakes(edited(&[]));
     for joint in 0..JOINTS {
         arm.commands[joint].position_rad = super::START_RAD[joint];

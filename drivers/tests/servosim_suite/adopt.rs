@@ -209,6 +209,6 @@ fn taking_over_that_is_called_off_leaves_the_drives_holding() {
     assert_still(&arm, &rest, "called off");
     assert!(
         (0..6).all(|joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 != 0),
-        "one let go"
+        "one was de-energised"
     );
 }

@@ -254,7 +254,7 @@ fn pdos_rest_outside_operational_and_sdo_rests_in_stopped() {
     assert!(bench.sent.is_empty(), "answers while stopped");
     bench.send(0x000, &[0x01, NODE + 1]);
     bench.send(0x080, &[]);
-    assert!(bench.sent.is_empty(), "obeys another's command");
+    assert!(bench.sent.is_empty(), "follows a command for another node");
     bench.send(0x000, &[0x01, 0]);
     bench.send(0x080, &[]);
     assert_eq!(bench.take(0x183).len(), 1);

@@ -33,7 +33,7 @@ pub struct ControlPointCost<'a> {
     model: CostModel,
     /// Of a stroke, at each of its waypoints.
     phases: Vec<f64>,
-    /// `None` where only the yardstick can rate.
+    /// `None` where only the reference can evaluate.
     fast: Option<Fast>,
     bounds_rad: Vec<[f64; 2]>,
 }
@@ -124,7 +124,7 @@ impl<'a> ControlPointCost<'a> {
         }
     }
 
-    /// The same by plain f64 arithmetic, pose by pose: the yardstick, and what is reported in the end.
+    /// The same by plain f64 arithmetic, pose by pose: the reference, and what is reported in the end.
     #[must_use]
     pub fn rate_exactly(&self, x: &[f64]) -> Option<PaperCost> {
         self.rate_poses(&self.corners(x)?)

@@ -1,6 +1,6 @@
-//! The fast way to the cost: the kernel sorts out the poses that are surely free, the yardstick weighs the others.
+//! The fast way to the cost: the kernel sorts out the poses that are surely free, the reference evaluates the others.
 //!
-//! So penalty and collision are the yardstick's own, to the last bit: only the tip's path is f32. A pose that is
+//! So penalty and collision are the reference's own, to the last bit: only the tip's path is f32. A pose that is
 //! sorted out by mistake would be a collision called free; [`super::margin`] has the proof that none is.
 use super::flat::Flat;
 use super::level::Level;

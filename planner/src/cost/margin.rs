@@ -19,7 +19,7 @@
 //!    Pythagoras: d'^2 <= d^2 + (8 e)^2.
 //!
 //! A pose is surely free when d'^2 >= (limit + 2 e + 16 u rho + 1e-9)^2 + (8 e)^2. The nanometre is for constants
-//! that count as nothing below 1e-12 and for the yardstick's own rounding. As printed, distances are summed, and first
+//! that count as nothing below 1e-12 and for the reference's own rounding. As printed, distances are summed, and first
 //! order has to do in step 4: each link may add 2 e + 8 e + 16 u rho.
 use super::flat::Flat;
 use super::prefilter::Angles;

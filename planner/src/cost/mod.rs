@@ -1,7 +1,7 @@
 //! The paper's cost of a motion, in the paper's own model.
 //!
 //! Links are bare segments between frame origins, obstacles are spheres, and the penalty takes the least distance
-//! over the links. This is a yardstick to compare with the paper; what may move is decided by [`crate::verify()`].
+//! over the links. This is a reference to compare with the paper; what may move is decided by [`crate::verify()`].
 //!
 //! Source: Wang et al. (2022), eq. 3.5 to 3.10 in the corrected reading (its eq. 3.9 sums the distances over the links,
 //! so that its penalty never acts). [`Reading::Printed`] selects that sum.

@@ -1,4 +1,4 @@
-//! The promise of the fast cost: it never calls a pose free that the yardstick calls a contact.
+//! The promise of the fast cost: it never calls a pose free that the reference calls a contact.
 use super::fast::Fast;
 use super::level::Level;
 use super::phases::phases;
@@ -57,7 +57,7 @@ fn shipped(name: &str) -> Chain {
     Robot::load(&file).expect("shipped").chain
 }
 
-/// The yardstick's distance of a sphere in a pose.
+/// The reference's distance of a sphere in a pose.
 fn distance_m(chain: &Chain, position_rad: &JointArray, center: &Point, reading: Reading) -> f64 {
     let frames = chain.frames(position_rad);
     let links = frames[..=chain.joints()].windows(2);

@@ -23,7 +23,7 @@ def reward(e, eps=0.005, s=0.5e-6, k=10000.0, j=3.0, e_max=674.0):
     return -j * (-4.0 / (eps - s) * e + 0.02 / (eps - s)) if e > s else -j * (-4.0 / s * e + 8.0)
 
 
-# The upright pose, table 5's rows (GA, DE, PSO, SPSO, IEPSO with the sign of its fourth angle mended), the optimum.
+# The upright pose, table 5's rows (GA, DE, PSO, SPSO, IEPSO with the sign of its fourth angle corrected), the optimum.
 for q in ((0, 0, 0, 0), (0.9, 0.92, 0.84, -1.54), (0.9, 0.09, 1.13, -0.09), (-2.24, -1.31, 1.06, -1.11),
           (0.89, 0.12, 1.47, -0.67), (0.9, 1.49, -0.23, -1.17), (0.903, 0.129, 0.903, 0.202), (-1.1, 0.4, -2.0, 1.3)):
     p = tip(q)

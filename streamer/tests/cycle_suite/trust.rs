@@ -40,7 +40,7 @@ fn adopted_drives_are_kept_and_moved_only_after_enable() {
         harness.run(1);
         assert_eq!((harness.phase(), drive_target(&harness)), (Phase::Locked, Some(DriveTarget::Keep)));
     }
-    assert!(harness.world.lock().unwrap().arrived.is_empty(), "a command was meant for metal");
+    assert!(harness.world.lock().unwrap().arrived.is_empty(), "a command was sent to the drives");
     let decision = harness.offer(swing(&HOLD_POSITION_RAD, 1.0));
     assert_eq!(decision, Decision::NotReady { phase: Phase::Locked });
     assert_eq!(harness.ask(Command::Enable).why, AnswerReason::TakingOver);
@@ -78,7 +78,7 @@ fn adopted_drives_that_stop_answering_are_a_fault_and_still_hold() {
     harness.run_until(Phase::Fault, 100);
     assert_eq!(harness.cause().unwrap().reason, FaultReason::FeedbackLate);
     harness.run(200);
-    assert_eq!(drive_target(&harness), Some(DriveTarget::Keep), "it let go");
+    assert_eq!(drive_target(&harness), Some(DriveTarget::Keep), "it lost its torque");
     harness.script(|w| w.silent = None);
     harness.run(5);
     harness.accept(Command::ClearFault);
@@ -100,7 +100,7 @@ fn adopted_drives_that_cannot_be_taken_over_go_on_holding() {
     let cause = harness.cause().unwrap();
     assert_eq!((cause.reason, cause.joint.is_some()), (FaultReason::DriveFault, true));
     harness.run(100);
-    assert_eq!(drive_target(&harness), Some(DriveTarget::Keep), "it let go");
+    assert_eq!(drive_target(&harness), Some(DriveTarget::Keep), "it lost its torque");
     harness.script(|w| w.error_code = 0);
     harness.run(5);
     harness.script(|w| w.states = [DriveState::Adopted; MAX_JOINTS]);
@@ -112,7 +112,7 @@ fn adopted_drives_that_cannot_be_taken_over_go_on_holding() {
 }
 
 #[test]
-fn adopted_drives_are_let_go_by_torque_off() {
+fn adopted_drives_are_de_energised_by_torque_off() {
     let mut harness = adopted(&[]);
     harness.run(50);
     harness.accept(Command::TorqueOff);

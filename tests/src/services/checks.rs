@@ -99,7 +99,7 @@ const DOCTOR: [Check; 3] = [
 fn corrupted(unit: &str, text: &str) -> Result<()> {
     let folder = format!("{DROP_INS}/{unit}.d");
     fs::create_dir_all(&folder)?;
-    fs::write(format!("{folder}/zz-doctored.conf"), text)?;
+    fs::write(format!("{folder}/zz-corrupted.conf"), text)?;
     done(&["systemctl", "daemon-reload"])?;
     if unit == STREAMER {
         done(&["systemctl", "restart", unit])?;
@@ -109,7 +109,7 @@ fn corrupted(unit: &str, text: &str) -> Result<()> {
 
 fn must_fail(check: impl Fn() -> Result<String>) -> Result<String> {
     match check() {
-        Ok(words) => bail!("the check passed on a doctored unit: {words}"),
+        Ok(words) => bail!("the check passed on a corrupted unit: {words}"),
         Err(error) => Ok(format!("as it must: {error:#}")),
     }
 }

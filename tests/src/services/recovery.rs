@@ -81,7 +81,7 @@ pub fn cycle_stalled(limit: Duration) -> Result<String> {
     let process = number(STREAMER, "MainPID")?;
     let mut debugger = Debugger::hold(process, "cycle")?;
     let back = wait_restarted(STREAMER, restarts, limit);
-    debugger.let_go();
+    debugger.detach();
     back?;
     watchdog_set(STREAMER)?;
     ensure!(number(STREAMER, "MainPID")? != process, "the same process goes on");
@@ -101,8 +101,9 @@ fn back_on_command() -> Result<String> {
 
 fn watchdog_set(unit: &str) -> Result<()> {
     let entries = guest::journal(unit)?;
-    let told = entries.iter().any(|e| e["MESSAGE"].as_str().is_some_and(|m| m.contains("Watchdog timeout")));
-    ensure!(told, "systemd does not speak of the watchdog of {unit}");
+    let reported =
+        entries.iter().any(|e| e["MESSAGE"].as_str().is_some_and(|m| m.contains("Watchdog timeout")));
+    ensure!(reported, "systemd does not speak of the watchdog of {unit}");
     Ok(())
 }
 
@@ -114,7 +115,7 @@ type Loss = (&'static str, &'static [&'static str], &'static [&'static [&'static
 /// # Errors
 /// What did not happen.
 pub fn link_lost() -> Result<String> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let losses: [Loss; 2] = [
         ("down", &["ip", "link", "set", "vcan0", "down"], &[&["ip", "link", "set", "vcan0", "up"]]),
         (
@@ -150,9 +151,9 @@ pub fn link_lost() -> Result<String> {
             number(STREAMER, "NRestarts")? == restarts,
             "the streamer did not outlive a link that was {what}"
         );
-        told.push(format!("{what}: {fault}, {how:?}"));
+        reported.push(format!("{what}: {fault}, {how:?}"));
     }
-    Ok(told.join("; "))
+    Ok(reported.join("; "))
 }
 
 /// The journal has what happened: ordinary lines with fields, faults with their priority.
@@ -188,7 +189,7 @@ impl Debugger {
         Ok(Self(child))
     }
 
-    fn let_go(&mut self) {
+    fn detach(&mut self) {
         // Either may say that it has ended by itself, its thread being gone.
         let _ended = self.0.kill();
         let _reaped = self.0.wait();
@@ -197,6 +198,6 @@ impl Debugger {
 
 impl Drop for Debugger {
     fn drop(&mut self) {
-        self.let_go();
+        self.detach();
     }
 }

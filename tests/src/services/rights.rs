@@ -90,8 +90,8 @@ pub fn operator() -> Result<String> {
 /// When the arm listens.
 pub fn stranger() -> Result<String> {
     let answer = as_user(STRANGER, &["taustream", "status"])?;
-    let told = answer.err.contains("usermod -aG taustream-operators stan");
-    ensure!(answer.status == Some(1) && told, "a stranger got {answer:?}");
+    let has_remedy = answer.err.contains("usermod -aG taustream-operators stan");
+    ensure!(answer.status == Some(1) && has_remedy, "another user got {answer:?}");
     let by_settings = as_user(STRANGER, &["taustream", "status", "--settings", ARM, "--json"])?;
     ensure!(by_settings.status == Some(1) && by_settings.err.starts_with("{\"error\""), "{by_settings:?}");
     Ok(answer.err.trim().to_owned())
