@@ -3,7 +3,7 @@ use std::fmt::Display;
 
 /// A count with its noun, in the plural unless the count is 1.
 #[must_use]
-pub fn counted<N: Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+pub fn counted<N: Copy + Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let ending = if count == N::from(1) {
         ""
     } else if ["s", "x", "sh", "ch"].iter().any(|end| noun.ends_with(end)) {

@@ -39,7 +39,7 @@ pub fn note(note: &Note, names: &Names) {
             bus_fault.remedy(names.interface(*bus))
         ),
         Note::Stall { gap_s } => {
-            warn!("no setpoint was sent for {gap_s:.4} s: trajectory time does not advance")
+            warn!("no setpoint was sent for {gap_s:.4} s: trajectory time does not advance");
         }
     }
 }

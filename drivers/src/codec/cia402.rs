@@ -317,7 +317,7 @@ impl ServoDriver for Cia402Driver {
             self.clock.note_other_master(frame.id());
         } else if let Some((node, status, position)) = decode_tpdo(frame) {
             if let Some(drive) = self.drive_mut(node)
-                && drive.node.take_tpdo(now, status, position)
+                && drive.node.take_tpdo(step_now, status, position)
             {
                 drive.received = Some(now);
             }
@@ -332,7 +332,7 @@ impl ServoDriver for Cia402Driver {
         } else if let Some((node, state)) = NmtState::decode(frame)
             && let Some(drive) = self.drive_mut(node)
         {
-            drive.node.take_heartbeat(now, state);
+            drive.node.take_heartbeat(step_now, state);
         }
     }
 
@@ -362,16 +362,16 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn clear_faults(&mut self) {
-        let now = self.clock.now();
+        let step_now = self.clock.now();
         for drive in &mut self.drives {
-            drive.node.clear_faults(now);
+            drive.node.clear_faults(step_now);
         }
     }
 
     fn start_over(&mut self) {
-        let now = self.clock.now();
+        let step_now = self.clock.now();
         for drive in &mut self.drives {
-            drive.node.start_over(now);
+            drive.node.start_over(step_now);
             drive.received = None;
         }
         self.clock.forget_other_master();

@@ -179,10 +179,10 @@ impl ServoDriver for DamiaoDriver {
     }
 
     fn decode(&mut self, now: Nanos, frame: &CanFrame) {
-        let now = self.clock.now();
+        let step_now = self.clock.now();
         for joint in &mut self.motors {
             if let Some(reply) = Reply::decode(frame, joint.node_id, joint.feedback_id) {
-                if joint.motor.take(now, reply) {
+                if joint.motor.take(step_now, reply) {
                     joint.received = Some(now);
                 }
                 return;
@@ -219,16 +219,16 @@ impl ServoDriver for DamiaoDriver {
     }
 
     fn clear_faults(&mut self) {
-        let now = self.clock.now();
+        let step_now = self.clock.now();
         for joint in &mut self.motors {
-            joint.motor.clear_faults(now);
+            joint.motor.clear_faults(step_now);
         }
     }
 
     fn start_over(&mut self) {
-        let now = self.clock.now();
+        let step_now = self.clock.now();
         for joint in &mut self.motors {
-            joint.motor.start_over(now);
+            joint.motor.start_over(step_now);
             joint.received = None;
         }
         self.clock.forget_other_master();
