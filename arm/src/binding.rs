@@ -1,7 +1,7 @@
 //! Which servo of which bus moves which joint.
 //!
 //! A wrong sign, gear or zero sends a joint the wrong way at full speed, so none of them has a default, and every
-//! angle that the joint may be told must be a position that the servo can be told.
+//! angle that the joint may be commanded must be a position that the servo can represent.
 use crate::document::{Node, shown};
 use crate::identifiers::{self, Use};
 use crate::protocol;
@@ -202,7 +202,7 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
     index
 }
 
-/// Nothing here has a default: each of these moves metal, or says how it falls.
+/// Nothing here has a default: each of these moves the arm, or says how it falls.
 fn read_servo(
     table: &mut Table<'_>,
     robot: Option<&Robot>,
@@ -251,7 +251,7 @@ fn check_identifiers(
             taken.push(UsedIdentifier { bus: servo.bus, joint: servo.joint, by: mine });
             continue;
         };
-        // One sentence a servo: another id mends all of them.
+        // One message per servo: another id fixes all of them.
         if !clashed {
             clashed = true;
             let joint = robot.and_then(|robot| robot.joints.get(other.joint));

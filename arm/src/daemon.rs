@@ -20,7 +20,7 @@ const FIELD_PREFIX: &str = "TAUSTREAM";
 const FEEDINGS: u32 = 4;
 
 /// Starts the log: to the journal where stderr leads there anyway, with a field for every value, else to stderr.
-/// `RUST_LOG` chooses what is told (default: info and above).
+/// `RUST_LOG` selects what is logged (default: info and above).
 pub fn start_log() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     let registry = tracing_subscriber::registry().with(filter);
@@ -59,7 +59,7 @@ fn is_stream(named: &str, device: u64, inode: u64) -> bool {
     d.parse() == Ok(device) && i.parse() == Ok(inode)
 }
 
-/// The service manager, as far as it wants to hear of this process.
+/// The service manager, as far as it supervises this process.
 #[derive(Debug)]
 pub struct Manager {
     feed_every: Option<Duration>,
@@ -74,7 +74,7 @@ impl Default for Manager {
 }
 
 impl Manager {
-    /// The manager that has started this process; nobody, if none has.
+    /// The manager that has started this process; none, if no manager has.
     #[must_use]
     pub fn from_environment() -> Self {
         let feed_every = sd_notify::watchdog_enabled().map(|period| period / FEEDINGS);
@@ -105,7 +105,7 @@ impl Manager {
     }
 }
 
-/// Without `$NOTIFY_SOCKET` there is nobody to tell. A socket that refuses is mentioned once: the manager will act.
+/// Without `$NOTIFY_SOCKET` there is no manager to notify. A socket that refuses is mentioned once: the manager will act.
 fn notify(states: &[NotifyState<'_>]) {
     static COMPLAINT: Once = Once::new();
     if let Err(error) = sd_notify::notify(states) {

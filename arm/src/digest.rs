@@ -1,7 +1,7 @@
 //! The robot digest: a hash over everything that changes what a setpoint means.
 //!
 //! A trajectory made for one description must not run on another, and a description must not change its digest
-//! because somebody moved a comment. So the hash is SHA-256 over canonical bytes of the checked values, not over the
+//! because a comment has moved. So the hash is SHA-256 over canonical bytes of the checked values, not over the
 //! file. What is in it and why, and why servo bindings are not: docs/adr/0002-robot-digest.md.
 //!
 //! The bytes, integers and floats little-endian:

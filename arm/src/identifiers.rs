@@ -24,7 +24,7 @@ const CANOPEN_NODE: [(u16, &str); 12] = [
 ];
 /// What all CANopen nodes of a bus share.
 const CANOPEN_BUS: [(u16, &str); 3] = [(0x000, "NMT"), (0x080, "SYNC"), (0x77F, "the master's heartbeat")];
-/// Where a Damiao motor listens, each plus `ESC_ID`: it answers in the mode of the day, but hears all of them.
+/// Where a Damiao motor listens, each plus `ESC_ID`: it answers in its present mode, but receives all of them.
 const DAMIAO_MOTOR: [(u16, &str); 4] = [
     (0x000, "MIT commands"),
     (0x100, "POS_VEL commands"),

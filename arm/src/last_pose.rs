@@ -186,7 +186,7 @@ impl LastPose {
     }
 }
 
-/// Reads a file of our own that is a file: a pipe would keep us waiting, and somebody else's tells what somebody else wants.
+/// Reads a file of our own that is a file: a pipe would block, and another user's file is not trusted.
 fn read(path: &Path) -> std::io::Result<String> {
     let refused = |why: &str| std::io::Error::other(why.to_owned());
     let metadata = fs::symlink_metadata(path)?;

@@ -156,7 +156,7 @@ fn check(corners: Vec<[f32; 3]>, triangles: Vec<[usize; 3]>, scale: f64) -> Resu
     Ok(Mesh { vertices_m, triangles: checked })
 }
 
-/// An obstacle without triangles would be no obstacle at all, and nobody would notice.
+/// An obstacle without triangles would be no obstacle at all, without any sign of it.
 fn check_count(triangles: &[[usize; 3]]) -> Result<(), Refusal> {
     if triangles.is_empty() {
         return Err(("has no triangles".to_owned(), "a mesh of at least one triangle".to_owned()));

@@ -1,6 +1,6 @@
 //! A sampled motion of joints as a table (CSV), as `taustream sample` writes it and as recorders do.
 //!
-//! The first line names the columns: `t_s`, then `q1_rad` to `qN_rad` in any order; others are let go and named. A table comes
+//! The first line names the columns: `t_s`, then `q1_rad` to `qN_rad` in any order; others are ignored and named. A table comes
 //! from anywhere and may be of any length, so it is read line by line, and lines, rows and columns are bounded.
 use crate::document::shown;
 use crate::reader::{Bounds, FaultList};
@@ -33,7 +33,7 @@ pub struct MotionTable {
     pub position_rad: Vec<JointArray>,
     /// The time of the first row, which was taken off all of them.
     pub began_s: f64,
-    /// Columns that were let go, by name.
+    /// Ignored columns, by name.
     pub ignored: Vec<String>,
 }
 

@@ -1,7 +1,7 @@
 //! What a servo speaks, with the numbers that only its protocol needs, and whether they can hold the joint.
 //!
 //! A number of one protocol means nothing to another, so the keys of a protocol are unknown keys beside the name of
-//! another. Everything here moves metal or says how it falls: no key has a default.
+//! another. Everything here moves the arm or says how it falls: no key has a default.
 use crate::document::shown;
 use crate::reader::{Bounds, Table};
 use crate::robot::{Robot, RobotJoint};
@@ -40,7 +40,7 @@ pub struct Damiao {
     pub velocity_range_rad_s: f64,
     /// Torques on the wire span minus to plus this (register 23, `TMAX`).
     pub torque_range_nm: f64,
-    /// Without a command for this long it lets go: limp (register 9, `TIMEOUT`).
+    /// Without a command for this long it disables itself: limp (register 9, `TIMEOUT`).
     pub watchdog_ms: u32,
 }
 
@@ -169,7 +169,7 @@ pub(crate) fn read(table: &mut Table<'_>, robot: Option<&Robot>) -> (Option<u8>,
                 };
                 table.fault("protocol", &shown(other), &words);
             }
-            // Whose keys they are cannot be told, so none of them is called unknown.
+            // Their protocol is unknown, so none of them is called unknown.
             for key in CIA402_KEYS.into_iter().chain(DAMIAO_KEYS) {
                 table.take(key);
             }
@@ -228,7 +228,7 @@ fn read_damiao_mode(table: &mut Table<'_>) -> Option<DamiaoMode> {
     }
 }
 
-/// Every angle and speed that the joint may be told must be one that the servo can be told.
+/// Every angle and speed that the joint may be commanded must be one that the servo can represent.
 pub(crate) fn check_joint(
     table: &Table<'_>,
     protocol: &Protocol,
@@ -259,7 +259,7 @@ fn check_counts(table: &Table<'_>, cia402: &Cia402, joint: &RobotJoint, [sign, z
     }
 }
 
-/// Share of a range that joints may use: in the rest, feedback of a motor cannot be told from the value of a register.
+/// Share of a range that joints may use: in the rest, feedback of a motor cannot be distinguished from the value of a register.
 const USED_RANGE: f64 = 127.0 / 128.0;
 
 /// Both ends of the joint's range, and its speed, inside what the wire spans: outside they would be cut off silently.

@@ -1,6 +1,6 @@
-//! Walks a tree of values and notes every fault in a book, so that a file is mended in one go.
+//! Walks a tree of values and adds every fault to a list, so that a file can be fixed at once.
 //!
-//! A [`Table`] hands out its keys one by one; what nobody asked for is an unknown key. A getter returns `None` after
+//! A [`Table`] hands out its keys one by one; a key that is not requested is unknown. A getter returns `None` after
 //! noting the fault, and the caller goes on to the next key: a description is only built when the book is empty.
 use crate::document::{Entry, Node, Value, key_shown};
 use crate::{Fault, Faults};
@@ -340,7 +340,7 @@ impl<'b> Table<'b> {
         let table = |(i, item)| Self::from_node(self.fault_list, self.path_of(&format!("{key}[{i}]")), item);
         items.into_iter().enumerate().filter_map(table).collect()
     }
-    /// Notes what nobody asked for.
+    /// Notes the keys that were not requested.
     pub(crate) fn done(self) {
         let known: Vec<&str> = self.requested.iter().map(|requested| requested.key).collect();
         let expected = format!("no such key; known here are {}", known.join(", "));

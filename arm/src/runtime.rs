@@ -26,8 +26,8 @@ pub fn user_of_services() -> Option<u32> {
     (metadata.is_dir() && metadata.uid() != 0).then(|| metadata.uid())
 }
 
-/// The runtime directory, made (mode 0700) when it is missing and refused when it belongs to somebody else:
-/// `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (its owner, or root where it is nobody's yet), else `/run/user/UID/taustream`,
+/// The runtime directory, made (mode 0700) when it is missing and refused when it belongs to another user:
+/// `$TAUSTREAM_RUNTIME_DIR`, else `/run/taustream` (its owner, or root where it has no owner yet), else `/run/user/UID/taustream`,
 /// else `/tmp/taustream-UID`.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ mod tests {
     fn runtime_directory_is_the_asked_then_the_systems_then_the_users_then_a_temporary_one() {
         let scratch = Scratch::new("choose");
         let run = scratch.0.as_path();
-        // Nobody has this uid, and what the test makes does not belong to it.
+        // No user has this uid, and what the test makes does not belong to it.
         let stranger = own_uid() + 4_242;
         assert_eq!(choose(Some("/x/y".into()), stranger, run), Path::new("/x/y"));
         let temporary = PathBuf::from(format!("/tmp/taustream-{stranger}"));

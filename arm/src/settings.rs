@@ -177,7 +177,7 @@ pub struct Settings {
     pub simulator: Option<toml::Table>,
 }
 
-/// Where the file gives none. Nothing here moves metal: what does has no default.
+/// Where the file gives none. Nothing here moves an arm: what does has no default.
 mod default {
     /// One late cycle is bridged by every drive that interpolates; the design's number.
     pub(super) const TOLERATED_GAP_PERIODS: i64 = 2;
@@ -189,7 +189,7 @@ mod default {
     pub(super) const REPORT_RATE_HZ: f64 = 100.0;
     pub(super) const LOST_CYCLES_MAX: i64 = 3;
     pub(super) const DRIVE_TIMEOUT_S: f64 = 5.0;
-    /// The first enable after start runs at reduced speed until told otherwise.
+    /// The first enable after start runs at reduced speed until changed.
     pub(super) const FIRST_SPEED_PERCENT: f64 = 25.0;
 }
 
@@ -236,7 +236,7 @@ impl Settings {
         let settings = Self::read(&fault_list, document::parse_toml(file, text)?, text);
         fault_list.close(settings)
     }
-    /// Cycles in a row that a bus may lose. Where the others go on, the drives of the lost one must not be told to catch
+    /// Cycles in a row that a bus may lose. Where the others go on, the drives of the lost one must not be commanded to catch
     /// up beyond what they bridge: it has failed before.
     #[must_use]
     pub fn lost_cycles_max(&self) -> u32 {

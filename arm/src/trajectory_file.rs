@@ -78,7 +78,7 @@ impl TrajectoryFile {
     #[must_use]
     pub fn to_json(&self) -> String {
         let joints = self.trajectory.joints();
-        // Writing to a string cannot fail, so the results are let go.
+        // Writing to a string cannot fail, so the results are dropped.
         let mut out =
             format!("{{\"version\":{VERSION},\"robot\":{}", serde_json::Value::from(self.robot.as_str()));
         if let Some(digest) = &self.digest {

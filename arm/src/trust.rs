@@ -1,7 +1,7 @@
-//! What a servo can be trusted with: to keep its load when nobody speaks to it, and to know its turn after power-up.
+//! What a servo can be trusted with: to hold its load without commands, and to know its multi-turn offset after power-up.
 //!
 //! Both are properties of the drive that no frame tells, and a wrong belief breaks arms: so neither has a default, and
-//! what does not fit the joint is refused with the ways out.
+//! what does not fit the joint is refused with the remedies.
 use crate::document::shown;
 use crate::reader::Table;
 use crate::robot::RobotJoint;
@@ -13,9 +13,9 @@ use std::f64::consts::TAU;
 pub enum Reaction {
     /// It comes to rest by its own ramp and holds there, energised.
     Hold,
-    /// It comes to rest by its own ramp, then lets go of the torque.
+    /// It comes to rest by its own ramp, then removes the torque.
     Ramp,
-    /// It lets go of the torque at once.
+    /// It removes the torque at once.
     Limp,
 }
 
@@ -106,7 +106,7 @@ pub(crate) fn read_feedback(table: &mut Table<'_>) -> Option<Feedback> {
     found
 }
 
-/// Arms fall when torque goes: a reaction that ends without torque is taken only where somebody says that it may.
+/// Arms fall when torque goes: a reaction that ends without torque is accepted only where the settings allow it.
 pub(crate) fn check_reaction(table: &Table<'_>, servo: &Servo, joint: &RobotJoint) {
     let known = servo.protocol.reactions();
     if !known.contains(&servo.reaction) {

@@ -294,7 +294,7 @@ fn bad_urdf_of_every_kind_is_refused_with_words_that_help() {
     assert!(folder.load().is_ok());
 }
 
-/// Goal: two faults in one file are both said, so that it is mended in one go.
+/// Goal: two faults in one file are both said, so that it can be fixed at once.
 #[test]
 fn several_faults_of_a_urdf_are_reported_at_once() {
     let folder = Folder::new("several");

@@ -1,4 +1,4 @@
-//! The load of the buses of settings: what is refused, what is warned of, and the ways out.
+//! The load of the buses of settings: what is refused, what is warned of, and the remedies.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;

@@ -1,4 +1,4 @@
-//! A bus with servos of two protocols: taken when nobody's identifiers meet, refused by name when they do.
+//! A bus with servos of two protocols: accepted when no identifiers collide, refused by name when they do.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 use std::path::{Path, PathBuf};
 use taustream_arm::{Protocol, Settings};
@@ -40,7 +40,7 @@ fn identifiers_that_meet_across_protocols_are_refused_with_joint_and_number() {
         ),
         (9, 0x080, "joint shoulder_pan has it for SYNC"),
         (9, 0x77F, "joint shoulder_pan has it for the master's heartbeat"),
-        // The servo that comes later in the file is the one that is told.
+        // The servo that comes later in the file is the one that is named.
         (
             9,
             0x585,

@@ -34,7 +34,7 @@ fn shipped_file_of_every_kind_loads() {
     );
 }
 
-/// The arm is there before its protocol is: nothing may pass for drivable, and nobody shall look for a misspelt word.
+/// The arm is there before its protocol is: it must not be taken for supported, nor for a misspelt name.
 #[test]
 fn piper_settings_are_refused_for_their_protocol_alone_and_the_robot_is_reported_valid() {
     let faults = Settings::load(&config().join("settings/piper.toml")).unwrap_err();

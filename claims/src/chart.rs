@@ -13,7 +13,7 @@ const POINTS_MAX: usize = 1200;
 const LEGEND_SHARE: f64 = 0.16;
 /// Least value that a logarithmic axis shows: what is below is rounding.
 const LOG_LEAST: f64 = 1e-16;
-/// Colours told apart by colour-blind eyes too (Okabe and Ito).
+/// Colours distinguished by colour-blind eyes too (Okabe and Ito).
 pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -35,7 +35,7 @@ pub fn palette(i: usize) -> RGBColor {
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// A point of a panel.
 pub type Point = (f64, f64);
-/// plotters' errors have a type for every backend; nobody tells them apart.
+/// plotters' errors have a type for every backend; they are not distinguished.
 pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// A curve.

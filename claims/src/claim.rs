@@ -1,4 +1,4 @@
-//! A claim, the rule that judges it, and what the rule said.
+//! A claim, its rule, and the result.
 use crate::number::figures;
 use crate::statistics::{Moments, Paired, Summary, welch, wilcoxon};
 use crate::trial::Sample;
@@ -40,7 +40,7 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// A claim that a rule has judged.
+    /// A claim with the result of its rule.
     #[must_use]
     pub fn decided(says: &str, rule: &str, holds: bool, numbers: String) -> Self {
         let verdict = if holds { Verdict::Holds } else { Verdict::DoesNotHold };

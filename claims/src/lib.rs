@@ -3,7 +3,7 @@
 //! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_planner::papers`]) and answers
 //! with tables, pictures and claims. The papers' own values are the only constants in them ([`Cell::Paper`]);
 //! everything else was measured in this run, and a verdict follows from those numbers by a rule that stands beside
-//! it. One seed gives one answer on any number of threads. Nothing here plans for metal, and no time is measured
+//! it. One seed gives one answer on any number of threads. Nothing here plans for a real arm, and no time is measured
 //! but as a ratio.
 //!
 //! `taustream bench papers` runs them; docs/papers.md holds what a full run said.

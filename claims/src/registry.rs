@@ -34,14 +34,14 @@ pub struct Outcome {
     pub tables: Vec<Table>,
     /// Pictures.
     pub figures: Vec<Figure>,
-    /// Claims, judged.
+    /// Claims with results.
     pub claims: Vec<Claim>,
 }
 
 /// An experiment.
 #[derive(Clone, Copy)]
 pub struct Experiment {
-    /// Number of the paper whose claims it judges.
+    /// Number of the paper whose claims it checks.
     pub paper: u8,
     /// What it looks at.
     pub name: &'static str,

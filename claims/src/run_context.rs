@@ -46,7 +46,7 @@ impl From<SplineError> for Stop {
 /// What experiments run in.
 pub struct RunContext<'a> {
     effort: Effort,
-    /// Told what is going on, a sentence at a time.
+    /// Called with progress messages.
     say: &'a (dyn Fn(&str) + Sync),
     /// Asked before every batch of evaluations; true ends everything.
     is_over: &'a (dyn Fn() -> bool + Sync),

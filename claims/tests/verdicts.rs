@@ -1,4 +1,4 @@
-//! The rules say what the numbers say: doctored numbers turn every verdict.
+//! The rules say what the numbers say: corrupted numbers turn every verdict.
 use taustream_claims::statistics::{Moments, Summary};
 use taustream_claims::{Sample, agrees, better};
 

@@ -33,10 +33,10 @@ pub(crate) enum Failure {
         /// The operating system's reason.
         error: io::Error,
     },
-    /// The reader of our output has gone; nobody is left to tell.
+    /// The reader of our output has closed; no message can be written.
     #[error("the reader of the output has gone")]
     BrokenPipe,
-    /// Shared memory cannot be used, or nobody serves.
+    /// Shared memory cannot be used, or no process serves.
     #[error(transparent)]
     Service(#[from] ServiceError),
     /// There is no runtime directory to meet the streamer in.
@@ -74,7 +74,7 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// A failure to write `what`; a reader that has gone is told apart because it is no error of a filter.
+    /// A failure to write `what`; a reader that has gone is a kind of its own because it is no error of a filter.
     pub(crate) fn writing(what: impl Into<String>, error: io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe {
             Self::BrokenPipe

@@ -1,6 +1,6 @@
 //! Commands to the installed services, by people who are not the services' user.
 //!
-//! Shared memory belongs to the services' user alone, so a command of somebody else has to run as that user. The packaged
+//! Shared memory belongs to the services' user alone, so a command of another user has to run as that user. The packaged
 //! sudo rule permits one thing, `taustream handed-over` without any further argument: the words of the command travel on
 //! its standard input, where they are parsed anew and only commands to running services are taken. So a member of the
 //! group can neither read nor write a file as the services' user: a trajectory file is read by the caller, and settings
@@ -56,7 +56,7 @@ pub(crate) fn to_services(cli: &Cli) -> Result<(), Failure> {
     if !is_for_services(&cli.action) || elsewhere || !theirs {
         return Ok(());
     }
-    // Settings that cannot be read are told about by the command itself.
+    // Settings that cannot be read are reported by the command itself.
     let Some(arm) = arm::name_at_a_glance(cli.settings.as_deref()) else { return Ok(()) };
     if users_of(&arm).contains(&own) {
         // Services of one's own, in a session of one's own, come first.
@@ -126,7 +126,7 @@ fn sudo() -> Command {
     command
 }
 
-/// The order as a standard input. A pipe would hold 64 KiB and need somebody to fill it.
+/// The order as a standard input. A pipe would hold 64 KiB and need a writer.
 fn paper(order: &Order) -> Result<Stdio, Failure> {
     let failed =
         |e: &dyn std::fmt::Display| Failure::Failed(format!("the command cannot be handed over: {e}"));

@@ -22,7 +22,7 @@ pub(crate) fn has_come() -> bool {
     CAME.get().is_some_and(|came| came.load(Ordering::SeqCst))
 }
 
-/// Lets the next signal be told apart from those that have come.
+/// Lets the next signal be distinguished from those that have come.
 pub(crate) fn forget() {
     if let Some(came) = CAME.get() {
         came.store(false, Ordering::SeqCst);

@@ -114,7 +114,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         let reason = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").trim();
         return report(Form::Json, &Failure::Usage(reason.to_owned()));
     }
-    // A closed stdout or stderr leaves nobody to tell.
+    // A closed stdout or stderr leaves no place for a message.
     let _closed = error.print();
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }

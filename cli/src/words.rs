@@ -54,7 +54,7 @@ mod tests {
         ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], buses: Vec::new() }
     }
 
-    /// Goal: what crossed the wire is told with this arm's names, and what another release wrote is not taken for "no fault".
+    /// Goal: a received report is printed with this arm's names, and what another release wrote is not taken for "no fault".
     #[test]
     fn fault_sentence_reads_the_report_of_this_arm() {
         let mut report = Report { joint_count: 2, ..Report::default() };

@@ -28,7 +28,7 @@ pub struct BusDriver {
 /// The driver for every servo of `settings.buses[bus]`.
 ///
 /// # Errors
-/// When the settings cannot be told to the servos of one of the protocols.
+/// When the settings cannot be configured in the servos of one of the protocols.
 pub fn of_bus(settings: &Settings, bus: usize) -> Result<BusDriver, DriverError> {
     let spoken = || settings.servos.iter().filter(|servo| servo.bus == bus).map(|servo| servo.protocol);
     let mut drivers: Vec<Box<dyn ServoDriver>> = Vec::new();

@@ -30,7 +30,7 @@ impl CanId {
         self.0
     }
     /// The 11-bit id of a standard data frame; `None` for extended, remote and error frames, and for an id that no
-    /// kernel gives (more than 11 bits without the flag): its low bits must not pass for somebody's id.
+    /// kernel gives (more than 11 bits without the flag): its low bits must not be taken for an id.
     #[must_use]
     pub const fn as_standard_data(self) -> Option<u16> {
         if self.0 <= STANDARD_MAX { Some((self.0 & STANDARD_MAX) as u16) } else { None }

@@ -20,7 +20,7 @@ impl Nanos {
     }
 }
 
-/// What one joint is told, on the link side.
+/// The command of one joint, on the link side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointCommand {
     /// Target angle.
@@ -43,21 +43,21 @@ pub enum DriveTarget {
     /// What holds goes on holding, what is off stays off: nothing is energised, de-energised or moved. Drives that were
     /// found holding ([`DriveState::Adopted`]) are taken into the cycle.
     Keep,
-    /// De-energised at once, whatever the state: the emergency wish.
+    /// De-energised at once, whatever the state: the emergency target.
     TorqueOff,
 }
 
 /// Where one drive is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveState {
-    /// Nothing heard yet.
+    /// No feedback yet.
     Absent,
     /// Being configured.
     Configuring,
     /// It was found energised before anything was sent to it, and not as this master would have left it; nothing was
     /// changed, and nothing will be. [`ServoStatus::error_code`] and [`ServoStatus::refused_object`] say what differs.
     EnergisedUnowned,
-    /// Found energised exactly as this master leaves its drives; it holds [`ServoStatus::hold_position_rad`] until the wish
+    /// Found energised exactly as this master leaves its drives; it holds [`ServoStatus::hold_position_rad`] until the target
     /// changes from `Keep`.
     Adopted,
     /// Configured, communicating, not energised.
@@ -117,7 +117,7 @@ pub struct ServoStatus {
 }
 
 impl ServoStatus {
-    /// Before anything was heard.
+    /// Before any feedback.
     pub const UNKNOWN: Self = Self {
         state: DriveState::Absent,
         position_rad: f64::NAN,

@@ -107,7 +107,7 @@ fn local_meeting_point_is_private_exclusive_and_survives_a_crash() {
     assert!(matches!(bench.open(LinkRole::Servos), Err(OpenError::ServosPresent { .. })));
     drop(servos);
     assert!(!bench.socket().exists(), "left its socket behind");
-    // As after a SIGKILL: a socket file to which nobody listens.
+    // As after a SIGKILL: a socket file without a listener.
     drop(std::os::unix::net::UnixListener::bind(bench.socket()).unwrap());
     assert!(matches!(bench.master(), Err(OpenError::NoServos { .. })));
     let _servos = bench.servos();

@@ -22,7 +22,7 @@ pub enum FaultReason {
     Stall = 7,
     /// A drive did not get ready in time; value = timeout in s.
     BringUp = 8,
-    /// A drive left its operating state without being told; code = statusword.
+    /// A drive left its operating state without a command; code = statusword.
     DriveDropped = 9,
     /// A drive was found energised, and not as this arm's settings would have left it; code = its error code,
     /// object = what differs.
@@ -135,7 +135,7 @@ impl BusFault {
     pub fn code(self) -> u32 {
         self as u32
     }
-    /// The trouble of a code.
+    /// The fault of a code.
     #[must_use]
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|t| t.code() == code)

@@ -1,10 +1,10 @@
-//! Whether it is known on which turn a joint stands, and whence.
+//! Whether the multi-turn offset of a joint is known, and its source.
 
 /// What is known of a joint's turn. Only a joint whose turn is known may be energised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum ReferenceState {
-    /// Its drive was not heard yet.
+    /// No feedback from its drive yet.
     #[default]
     NoFeedback = 0,
     /// The feedback tells every angle of the joint.

@@ -77,11 +77,11 @@ pub struct Report {
     pub tracking_error_rad: [f64; MAX_JOINTS],
     /// Largest tracking error since the last enable, rad.
     pub tracking_error_rad_max: [f64; MAX_JOINTS],
-    /// [`ReferenceState::code`](crate::ReferenceState::code) of every joint: whether its turn is known, and whence.
+    /// [`ReferenceState::code`](crate::ReferenceState::code) of every joint: whether its multi-turn offset is known, and its source.
     pub reference_state: [u32; MAX_JOINTS],
     /// What was added to every joint's reading to get the measured position, rad.
     pub multi_turn_offset_rad: [f64; MAX_JOINTS],
-    /// 1 while the speed override is that of the start, and nobody has chosen one.
+    /// 1 while the speed override is that of the start, and no other was set.
     pub first_speed: u32,
     /// 1 while drives are kept as they were found holding at start; `enable` takes them over.
     pub adopted: u32,

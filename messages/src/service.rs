@@ -62,7 +62,7 @@ pub enum ServiceError {
         /// The name that was given.
         name: String,
     },
-    /// Nobody serves this arm.
+    /// No process serves this arm.
     #[error("{who} of arm `{arm}` is not running for this user (uid {uid}){others}; start {who} first")]
     NotRunning {
         /// `taustream-streamer` or `taustream-planner`.
@@ -71,7 +71,7 @@ pub enum ServiceError {
         arm: String,
         /// Our user.
         uid: u32,
-        /// Who serves it instead, as a clause; empty when nobody does.
+        /// Other users who serve it, as a clause; empty if none.
         others: String,
     },
     /// iceoryx2 refused.
@@ -175,7 +175,7 @@ impl Wire {
         &self.arm
     }
 
-    /// That nobody serves this arm, naming other users who do.
+    /// That no process serves this arm, naming other users who do.
     #[must_use]
     pub fn not_running(&self, who: &'static str) -> ServiceError {
         let uids = users_of(&self.arm).into_iter().filter(|uid| *uid != self.uid);
@@ -190,7 +190,7 @@ impl Wire {
 
     fn refused(&self, what: &'static str, why: &dyn std::fmt::Debug) -> ServiceError {
         let mut why = format!("{why:?}");
-        // The one refusal that users bring about by themselves, and can mend.
+        // The one refusal that users cause, and can fix.
         if why.contains("ExceedsMaxSupportedSubscribers") {
             why = format!(
                 "all {SUBSCRIBERS_MAX} places for readers are taken; end one, such as a `taustream watch`"

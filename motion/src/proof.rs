@@ -19,7 +19,7 @@ use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
 const BUDGET_MAX: usize = 5_000_000;
 /// How much of it sharper peaks may take: they are a service, not a part of the proof.
 const PEAK_BUDGET: usize = 1_000_000;
-/// What it costs to judge an interval, in evaluations of one stroke.
+/// What it costs to check an interval, in evaluations of one stroke.
 const INTERVAL_BUDGET: usize = 8;
 /// Most halvings of one piece: 2^-40 of a day is 80 ns.
 const DEPTH_MAX: u32 = 40;

@@ -1,7 +1,7 @@
 //! The time scale sigma: pause, resume and speed override as strokes.
 //!
 //! Trajectory time advances by sigma times real time. sigma is the sum of Tau-J* ramps of ONE duration, so it
-//! is the convolution of the wished (stepwise) speed with the kernel phi'. Hence for any sequence of wishes in
+//! is the convolution of the requested (stepwise) speed with the kernel phi'. Hence for any sequence of requests in
 //! [0, 1]: sigma stays in [0, 1], `|sigma'| <= c_v/D`, and `|sigma''| <= (c_a+ + c_a-)/D^2` where `c_a+` and `c_a-`
 //! are the highest positive and negative peaks of phi''. The duration D follows from the two limit sets in closed form:
 //!
@@ -28,7 +28,7 @@ pub struct Scale {
     pub sigma_d2_s2: f64,
 }
 
-/// Too many ramps run at once; the wish is refused, nothing changes.
+/// Too many ramps run at once; the request is refused, nothing changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("too many speed changes at once; wait until the running ones have ended")]
 pub struct Busy;
@@ -58,7 +58,7 @@ pub fn ramp_duration_s(limits: &[JointLimits; MAX_JOINTS], joints: usize) -> f64
     longest_s
 }
 
-/// One change of the wished speed.
+/// One change of the requested speed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ramp {
     start_s: f64,
@@ -66,10 +66,10 @@ struct Ramp {
     rise: f64,
 }
 
-/// The wished speed and the ramps that lead there. Time is seconds on any one monotonic axis.
+/// The requested speed and the ramps that lead there. Time is seconds on any one monotonic axis.
 ///
-/// sigma is kept as the wish less what the running ramps still owe, rise * (1 - phi). A ramp that has ended owes
-/// exactly nothing: that makes sigma exactly the wish when settled, and forgetting the ramp changes no bit.
+/// sigma is stored as the request less what the running ramps still owe, rise * (1 - phi). A ramp that has ended owes
+/// exactly nothing: that makes sigma exactly the request when settled, and forgetting the ramp changes no bit.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeScale {
     ramp_duration_s: f64,
@@ -97,7 +97,7 @@ impl TimeScale {
         self.ramp_duration_s
     }
 
-    /// Wishes another speed from `now_s` on; clamps to [0, 1], and takes NaN for 0. After it, ask only for times
+    /// Requests another speed from `now_s` on; clamps to [0, 1], and takes NaN for 0. After it, ask only for times
     /// from `now_s` on: ramps that had ended by then are forgotten.
     ///
     /// Real time: no allocation.
@@ -204,7 +204,7 @@ impl TimeScale {
         }
     }
 
-    /// False when all slots are taken, which the kept-back one rules out: it is used only on the way to a wish of
+    /// False when all slots are taken, which the kept-back one rules out: it is used only on the way to a request of
     /// zero, and from zero there is nothing to stop.
     fn push(&mut self, ramp: Ramp) -> bool {
         let Some(slot) = self.ramps.get_mut(self.count) else { return false };

@@ -1,4 +1,4 @@
-//! The time scale: whatever is wished, a motion inside its motion limits stays inside its stop limits.
+//! The time scale: whatever is requested, a motion inside its motion limits stays inside its stop limits.
 #![expect(clippy::unwrap_used, reason = "a case that cannot be made fails its test")]
 mod common;
 use common::{SeededRng, random_limits, slope};
@@ -11,7 +11,7 @@ use taustream_motion::time_scale::{
 };
 use taustream_motion::{JointLimits, MAX_JOINTS, Setpoint, Stroke, Trajectory};
 
-/// What a run of wishes does to trajectory time: one entry a wish, with the scale that holds from then on.
+/// What a sequence of requests does to trajectory time: one entry per request, with the scale that holds from then on.
 struct Run {
     from: Vec<(f64, f64, TimeScale)>,
 }
@@ -56,7 +56,7 @@ fn timed_trajectory(rng: &mut SeededRng, limits: &[JointLimits; MAX_JOINTS]) -> 
     Trajectory::new(4, [0.0; MAX_JOINTS], &strokes).unwrap()
 }
 
-/// Random wishes: pauses and resumptions only, or any speeds, some apart, some as fast as the slots allow.
+/// Random requests: pauses and resumptions only, or any speeds, some apart, some as fast as the slots allow.
 fn requests(rng: &mut SeededRng, ramp_s: f64, until_s: f64) -> Vec<(f64, f64)> {
     let (mut t_s, mut list) = (0.0, Vec::new());
     let pauses = rng.whole(0, 1) == 0;
@@ -175,7 +175,7 @@ fn sigma_under_any_requests_stays_inside_the_bounds_of_the_header() {
     }
 }
 
-/// The bound of the second derivative is no larger than it must be: the worst wishes reach it. They are 1 where phi'''
+/// The bound of the second derivative is no larger than it must be: the worst requests reach it. They are 1 where phi'''
 /// is positive, seen back from the instant that is asked for.
 #[test]
 fn sigma_under_the_worst_requests_reaches_both_bounds() {
@@ -273,7 +273,7 @@ fn ramps_that_have_ended_are_forgotten_without_changing_a_bit() {
         }
         let before = scale;
         t_s += rng.within(0.0, 0.6);
-        // The same wish again adds nothing, and only forgets.
+        // The same request again adds nothing, and only forgets.
         scale.request(scale.requested(), t_s).unwrap();
         for _ in 0..50 {
             let later_s = t_s + rng.within(0.0, 0.6);
@@ -298,7 +298,7 @@ fn request_with_all_slots_taken_is_busy_and_changes_nothing_while_stop_still_wor
     assert_eq!(scale.requested().to_bits(), 0.0_f64.to_bits());
     assert_eq!(scale.request(1.0, 0.07), Err(Busy));
     assert_eq!(bits(scale.sample(1.1)), [0, 0, 0]);
-    // As ramps end, wishes are served again, and a stop always is.
+    // As ramps end, requests are served again, and a stop always is.
     for round in 0..200 {
         let t_s = 1.0 + 0.01 * f64::from(round);
         let _ = scale.request(0.9, t_s);
@@ -319,7 +319,7 @@ proptest! {
     ) {
         let mut rng = SeededRng::from_seed(seed);
         let mut scale = TimeScale::settled(rng.within(0.0, 1.0), 0.7);
-        // All wishes lie ahead of some of the interval: sigma is defined before a ramp begins, too.
+        // All requests lie ahead of some of the interval: sigma is defined before a ramp begins, too.
         for step in 0..8 {
             scale.request(rng.within(0.0, 1.0), 0.05 * f64::from(step) + rng.within(0.0, 0.05)).unwrap();
         }
@@ -337,7 +337,7 @@ proptest! {
         prop_assert!(scale.advance_s(from + span, from) == 0.0 || span == 0.0);
     }
 
-    /// Times and wishes of any kind: no panic, sigma stays in [0, 1], time does not run back.
+    /// Times and requests of any kind: no panic, sigma stays in [0, 1], time does not run back.
     #[test]
     fn time_scale_of_any_bits_stays_in_its_range(
         sigma in any::<f64>(), ramp in any::<f64>(),

@@ -1,7 +1,7 @@
-//! The way out of the margin, for an arm that stands nearer to something than it should.
+//! The exit path from the margin, for an arm that stands nearer to something than it should.
 //!
 //! After a stop or a sag an arm may touch nothing and yet stand inside the margin, or so close to its edge that no
-//! motion of the search's wary steps begins there. Then a short straight way out is found first; planning goes on
+//! motion of the search's wary steps begins there. Then a short straight exit path is found first; planning goes on
 //! from its end with the full margin. Only until the arm has left are the distances those that the start has.
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
@@ -20,7 +20,7 @@ const SLACK_M: f64 = 5e-4;
 const CLEAR_M: f64 = 8e-4;
 /// A motion has left when it keeps this beyond the margin: above what candidates of timing keep and resolve.
 const LEFT_M: f64 = 5e-5;
-/// How far the way out may go, in metres of weighted distance; the shortest rings come first.
+/// How long the exit path may be, in metres of weighted distance; the shortest rings come first.
 const RINGS_M: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
 /// Directions that are tried a ring.
 const DIRECTIONS: u32 = 48;
@@ -33,7 +33,7 @@ const INSTANTS: u32 = 2_000;
 pub struct Relaxed<'a> {
     /// The world, in which pairs that are too near at the start keep what they have there.
     pub world: World<'a>,
-    /// What users are told.
+    /// What is reported.
     pub note: Note,
 }
 
@@ -85,7 +85,7 @@ pub struct MarginExit<'a> {
     pub near: &'a World<'a>,
     /// Where it begins.
     pub start_rad: JointArray,
-    /// What users are told, when less than the margin is kept.
+    /// What is reported when less than the margin is kept.
     pub note: Option<Note>,
 }
 
@@ -115,7 +115,7 @@ pub fn is_clear(world: &World, pose_rad: &JointArray) -> bool {
     world.is_free(pose_rad, CLEAR_M, &mut Snapshot::default())
 }
 
-/// The end of a short straight way out, clear in the second world and proven in the first: the one that makes the
+/// The end of a short straight exit path, clear in the second world and proven in the first: the one that makes the
 /// least detour to the goal among the shortest. `None` when there is none nearby.
 #[must_use]
 pub fn find_margin_exit(

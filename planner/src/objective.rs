@@ -60,7 +60,7 @@ pub struct Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// A judge of one arm's motions.
+    /// Compares motions of one arm.
     ///
     /// # Errors
     /// When energy counts and the robot states no masses.

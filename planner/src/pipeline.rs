@@ -250,7 +250,7 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// The corners of a whole motion: the way out of the margin comes before the path.
+    /// The corners of a whole motion: the exit path from the margin comes before the path.
     fn whole_path(&self, path: &[JointArray]) -> Vec<JointArray> {
         self.margin_exit.iter().map(|l| l.start_rad).chain(path.iter().copied()).collect()
     }
@@ -285,7 +285,7 @@ impl<'a> Pipeline<'a> {
                 self.tried.push("straight line".to_owned());
                 self.propose(line, "straight line");
                 if self.margin_exit.is_some() {
-                    // The way out ends in a corner, or on the line: no need to stop there.
+                    // The exit path ends in a corner, or on the line: no need to stop there.
                     self.round(line, "straight line");
                 }
                 self.best.is_some()

@@ -258,7 +258,7 @@ fn plan_out(
                 .run(&pose_rad, &task.goal_rad);
         }
     }
-    // No way out nearby: the reduced margin all the way, rather than an arm that nobody can move.
+    // No exit path nearby: the reduced margin along the whole motion, rather than an arm that cannot be moved.
     let Some(relaxed) = relaxed else {
         return Pipeline::new(world, budget, options, evaluator).run(&task.start_rad, &task.goal_rad);
     };

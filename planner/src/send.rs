@@ -79,7 +79,7 @@ pub struct Outbox<'a> {
 }
 
 impl<'a> Outbox<'a> {
-    /// Opens the ports. Nobody needs to listen yet.
+    /// Opens the ports. No subscriber is needed yet.
     ///
     /// # Errors
     /// When shared memory refuses.

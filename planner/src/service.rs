@@ -3,7 +3,7 @@
 //! A request is answered from a report that was published after it arrived. At rest the motion starts at the
 //! commanded pose; while a motion runs, `AfterCurrent` plans from its end and waits until it has ended, and `AtOnce`
 //! asks the streamer to cut, whose answer (this version of it: refused) is handed back. A motion whose requester has
-//! gone in the meantime is not sent: nobody waits for the arm to move.
+//! gone in the meantime is not sent: no client waits for the arm to move.
 use crate::kind::PlannerKind;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
 use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
@@ -185,7 +185,7 @@ impl<'a> Service<'a> {
         requested: &CheckedPlanRequest,
         options: &PlanOptions,
     ) -> Result<Plan, String> {
-        // The arm stands where it stands: after a stop or a sag nobody could move it otherwise.
+        // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         self.promise.back_within(options.deadline + OVERRUN_MAX);

@@ -108,7 +108,7 @@ impl<'a> Space<'a> {
         self.checks.get()
     }
 
-    /// Counts poses that somebody else has checked.
+    /// Counts poses that were checked elsewhere.
     pub fn note_checks(&self, checks: usize) {
         self.checks.set(self.checks.get() + checks);
     }
@@ -161,7 +161,7 @@ enum Reached {
 /// Share of the random poses that are the goal, for a single tree; 5 to 10 % are usual.
 const GOAL_BIAS: f64 = 0.05;
 
-/// A search has checked its poses, grown all the nodes that it may, or was told to end.
+/// A search has checked its poses, grown all the nodes that it may, or was cancelled.
 fn is_spent(field: &impl Field, nodes: usize, checks_end: usize) -> bool {
     field.checks() >= checks_end || nodes >= NODES_MAX || field.is_over()
 }

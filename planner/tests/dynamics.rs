@@ -166,7 +166,7 @@ fn torques_change_with_every_part_of_the_description() {
     assert!(change(&|r| r.masses.push(carry)) > 1e-2, "a payload");
 }
 
-/// Instants of the sums that the planner's integrals are held against.
+/// Instants of the sums that the planner's integrals are compared with.
 const STEPS: u32 = 4_000;
 
 fn one_stroke(base_rad: JointArray, delta_rad: JointArray, joints: usize, duration_s: f64) -> Trajectory {

@@ -9,7 +9,7 @@ use taustream_planner::optimize::{
 };
 use taustream_planner::papers::{Benchmark, Function};
 
-/// A problem made of a closure; notes that nobody asks outside the box.
+/// A problem made of a closure; notes that no evaluation is outside the box.
 struct CountedObjective<F> {
     bounds: Vec<[f64; 2]>,
     cost: F,

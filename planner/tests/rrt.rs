@@ -90,7 +90,7 @@ fn rrt_path_joins_its_ends_by_free_edges_no_longer_than_a_step() {
     }
 }
 
-/// Goal: a search that cannot succeed ends, by its budget to the check, or when it is told to.
+/// Goal: a search that cannot succeed ends, by its budget to the check, or when cancelled.
 #[test]
 fn rrt_to_a_walled_goal_ends_with_its_budget_or_its_cancellation() {
     let mut walled = Square::new();

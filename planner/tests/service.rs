@@ -278,7 +278,7 @@ fn service_while_moving_cuts_are_the_streamers_to_refuse_and_after_current_waits
         let outcome = ask(arm, &request(When::AfterCurrent, "", pose(THERE)), || {
             thread::sleep(Duration::from_millis(700));
             assert_eq!(played.accepted.load(Ordering::SeqCst), 0, "sent before the arm was at rest");
-            // Meanwhile, nobody else gets in between.
+            // Meanwhile no other request gets in between.
             let other = ask(arm, &request(When::AfterCurrent, "", pose(HOME)), || ());
             assert!(reason_of(&other).contains("waits"), "{other:?}");
             played.show(Phase::Holding);

@@ -1,4 +1,4 @@
-//! The proof: doctored motions are refused with the offender, and nothing slips through between samples.
+//! The proof: corrupted motions are refused with the offender, and nothing slips through between samples.
 #![expect(clippy::expect_used, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::{pose, scene, sphere, ur5};

@@ -1,6 +1,6 @@
 //! The way from the pose that is held to the base of a trajectory that begins there, within the base tolerance.
 //!
-//! A tenth of a milliradian in one period is a jerk of 1e5 rad/s^3. So a difference is let go along a Tau-J* curve in
+//! A tenth of a milliradian in one period is a jerk of 1e5 rad/s^3. So a difference fades out along a Tau-J* curve in
 //! real time, on top of the trajectory, which keeps the sum C3. It takes one ramp of the time scale: a stop that
 //! begins later ends later, so at rest is at rest. Without a difference nothing is added, to the last bit.
 use taustream_motion::stroke::Phi;

@@ -8,7 +8,7 @@
 //!
 //! No servos are needed: the driver writes the frames of the configured drives (SYNC and one setpoint each), calls them
 //! energised, and reports the commanded pose as measured. The arm swings along a trajectory all the time, so sampling,
-//! guard, encoding and supervision do their full work; decoding of answers is not in the figures, since nobody answers.
+//! guard, encoding and supervision do their full work; decoding of answers is not in the figures, since nothing answers.
 mod compare;
 mod peers;
 mod stages;
@@ -375,7 +375,7 @@ impl Bench {
         (lateness_ns, time_ns)
     }
 
-    /// Offers the way back when one has ended, and empties the queues that nobody reads here.
+    /// Offers the way back when one has ended, and empties the queues that are not read here.
     fn keep_moving(&mut self) {
         while self.command_queue.trajectory_result().is_some() || self.command_queue.answer().is_some() {}
         if self.core.supervisor().phase() != Phase::Holding {

@@ -2,7 +2,7 @@
 //!
 //! One cycle makes one `sendmmsg` and one or two `recvmmsg` a bus, whatever arrives. A frame that was not
 //! taken is counted, never sent again: an old setpoint is worse than none. A bus that has failed is silent
-//! (`health.rs`) until its link was started over by the service thread.
+//! (`health.rs`) until its link was restarted by the service thread.
 use crate::cycle_state::{BUSES_MAX, CycleState};
 use crate::health::{BusActivity, Health};
 use taustream_arm::Settings;
@@ -40,7 +40,7 @@ impl std::fmt::Debug for Bus {
 }
 
 impl Bus {
-    /// A bus of which nothing was sent or heard; the settings say when it has failed.
+    /// A bus on which nothing was sent or received; the settings say when it has failed.
     #[must_use]
     pub fn new(link: Box<dyn CanLink>, driver: Box<dyn ServoDriver>, settings: &Settings) -> Self {
         Self {
@@ -131,7 +131,7 @@ impl Buses {
         }
     }
 
-    /// Takes what has arrived, judges each bus, and asks the drivers what they know now.
+    /// Takes what has arrived, evaluates each bus, and reads the state of the drives.
     ///
     /// Real time: at most `RECEIVES_MAX` system calls a bus, never waits.
     pub fn receive(&mut self, now: Nanos, cycle_state: &mut CycleState) {
@@ -179,7 +179,7 @@ impl Buses {
         }
     }
 
-    /// Hands out the links of failed buses, to be started over.
+    /// Hands out the links of failed buses, to be restarted.
     ///
     /// Real time: moves pointers.
     pub fn hand_out(&mut self) -> Links {

@@ -157,7 +157,7 @@ pub struct LostSetpoints {
 pub struct Restored {
     /// The `clear-fault` that asked for it.
     pub sequence: u64,
-    /// Every one of them is there again. If not, the one who asked was told why.
+    /// Every one of them works again. If not, the client got the reason.
     pub recovered: bool,
 }
 
@@ -185,7 +185,7 @@ pub struct CycleState {
     pub commands: [Option<PendingCommand>; COMMANDS_MAX],
     /// What became of the trajectory that was offered.
     pub trajectory_result: Option<TrajectoryResult>,
-    /// The drives are wished energised: the setpoint is meant for metal.
+    /// The drives are to be energised: the setpoint is meant for the drives.
     pub live: bool,
     /// Id of the trajectory that made the setpoint; 0 when the arm holds or brakes.
     pub trajectory_id: u64,
@@ -213,7 +213,7 @@ pub struct CycleState {
     pub sweep_rad: [[f64; 2]; MAX_JOINTS],
     /// The buses.
     pub buses: [BusState; BUSES_MAX],
-    /// Failed buses came back from being started over.
+    /// Failed buses came back from being restarted.
     pub restored: Option<Restored>,
     /// Joints on failed buses: what is known of them is old, and no command reaches them.
     pub unreachable: [bool; MAX_JOINTS],

@@ -1,4 +1,4 @@
-//! The last gate before metal: what it lets pass is finite, inside the position and stop limits against the
+//! The last check before the bus: what passes it is finite, inside the position and stop limits against the
 //! commands before it, and slow enough to stop before the position limit.
 //!
 //! Differences are divided differences over the commands that left, on their true times. Each of them is an average
@@ -6,8 +6,8 @@
 //! its limits cannot exceed them by discretisation, skipped cycles included; what is left is rounding, for which
 //! `SLACK` is plenty. Hence the guard never trips in a verified motion.
 //!
-//! Each joint is judged against what it was told itself: where setpoints take turns, its last command is older than the
-//! cycle before. A command that is held back is judged all the same, since the average holds for any step.
+//! Each joint is checked against the setpoint that it was last sent: with decimated setpoints, its last command is older than the
+//! cycle before. A command that is not sent is checked too, since the average holds for any step.
 //!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
 use crate::cycle_state::{Braking, CycleState, Trip, TripKind};
@@ -336,7 +336,7 @@ mod tests {
         assert_eq!(first_trip(wave(0.5, 4.0), 5_000), None);
     }
 
-    /// Feeds positions of which every `every`-th is told, and returns the first trip.
+    /// Feeds positions of which every `every`-th is sent, and returns the first trip.
     fn first_trip_sent_every(
         every: u32,
         motion: impl Fn(f64) -> JointState,
@@ -365,7 +365,7 @@ mod tests {
         let smooth = wave(0.5, 4.0);
         for every in [1, 2, 4, 10] {
             assert_eq!(first_trip_sent_every(every, &smooth, 5_000), None, "every {every}");
-            // A leap of the commands is seen in the cycle in which it comes, told or not.
+            // A leap of the commands is seen in the cycle in which it comes, sent or not.
             let leap = |t: f64| {
                 let state = smooth(t);
                 let by_rad = if t > 1.0 { 0.1 } else { 0.0 };

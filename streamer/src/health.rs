@@ -1,4 +1,4 @@
-//! Whether a bus still carries setpoints: lost cycles, frames that nobody acknowledges, error frames, a lost interface.
+//! Whether a bus still carries setpoints: lost cycles, frames that are not acknowledged, error frames, a lost interface.
 //!
 //! A bus that has failed is *silent* from then on: no setpoint leaves on it until `clear-fault` has started it over. Its
 //! drives have stopped where their own watchdogs left them while the other buses went on along the path, so the first
@@ -21,7 +21,7 @@ struct Tolerance {
 }
 
 impl Tolerance {
-    /// From the settings. A bus that does not acknowledge must be told as such before its silence shows as late
+    /// From the settings. A bus that does not acknowledge must be reported as such before its missing feedback shows as late
     /// feedback, and one that is late by less than feedback may be is none: so half of that.
     fn of(settings: &Settings) -> Self {
         let (cycle, rules) = (&settings.cycle, &settings.supervision);
@@ -49,7 +49,7 @@ pub(crate) struct Health {
 /// What one cycle has seen of a link, beside [`BusState`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BusActivity {
-    /// The drives were wished energised: lost setpoints matter.
+    /// The drives were to be energised: lost setpoints matter.
     pub(crate) live: bool,
     /// Own frames that came back, since the link was opened; `None` where none do.
     pub(crate) confirmed: Option<u64>,
@@ -162,7 +162,7 @@ impl Echoes {
 }
 
 impl Health {
-    /// A bus of which nothing was sent or heard.
+    /// A bus on which nothing was sent or received.
     pub(crate) fn new(settings: &Settings) -> Self {
         Self::with(Tolerance::of(settings))
     }
@@ -194,7 +194,7 @@ impl Health {
         self.failed
     }
 
-    /// The link was started over: what was lost, unconfirmed or told by its controller is history.
+    /// The link was restarted: earlier losses, unconfirmed frames and error frames do not count any more.
     pub(crate) fn start_over(&mut self) {
         let fresh = Self::with(self.tolerance);
         *self = Self { newest_error: self.newest_error, error_frames: self.error_frames, ..fresh };
@@ -218,7 +218,7 @@ impl Health {
         }
     }
 
-    /// Judges the cycle that ends, and completes its facts.
+    /// Evaluates the cycle that ends, and completes its state.
     ///
     /// Real time: arithmetic only.
     pub(crate) fn evaluate(&mut self, seen: BusActivity, found: &mut BusState) {
@@ -253,7 +253,7 @@ impl Health {
         seen.live && self.consecutive_lost >= self.tolerance.lost_cycles
     }
 
-    /// The first trouble is the one to report, unless a later one says more: a lost interface hides behind a full queue.
+    /// The first fault is the one to report, unless a later one says more: a lost interface hides behind a full queue.
     fn fail(&mut self, bus_fault: BusFault) {
         if self.failed.is_none_or(|before| severity(bus_fault) > severity(before)) {
             self.failed = Some(bus_fault);
@@ -261,7 +261,7 @@ impl Health {
     }
 }
 
-/// How much a trouble tells of its cause.
+/// How specific a fault is about its cause.
 fn severity(bus_fault: BusFault) -> u8 {
     match bus_fault {
         BusFault::QueueFull

@@ -34,13 +34,13 @@ pub enum Shutdown {
     AtOnce,
 }
 
-/// Links of failed buses, on their way to be started over or back. One at a time is on its way.
+/// Links of failed buses, on their way to be restarted or back. One at a time is on its way.
 pub struct Handover {
     /// The `clear-fault` that asked for it.
     pub sequence: u64,
     /// The links; none of the buses that are well.
     pub links: Links,
-    /// On the way back: every one of them was started over.
+    /// On the way back: every one of them was restarted.
     pub recovered: bool,
 }
 
@@ -118,7 +118,7 @@ impl Intake {
         }
     }
 
-    /// Hands links out to be started over; gives them back when others are still on their way.
+    /// Hands links out to be restarted; gives them back when others are still on their way.
     ///
     /// Real time: moves pointers.
     pub fn hand_out(&mut self, links: Handover) -> Option<Handover> {
@@ -185,7 +185,7 @@ impl CommandQueue {
         self.0.pending.push(pending).is_ok()
     }
 
-    /// Links that are to be started over.
+    /// Links that are to be restarted.
     #[must_use]
     pub fn failed_links(&self) -> Option<Handover> {
         self.0.failed_links.pop()
@@ -221,7 +221,7 @@ impl CommandQueue {
 pub struct ShutdownHandle(Arc<Queues>);
 
 impl ShutdownHandle {
-    /// Asks; a stronger wish replaces a weaker one.
+    /// Requests; a stronger request replaces a weaker one.
     pub fn request(&self, shutdown: Shutdown) {
         let level = match shutdown {
             Shutdown::No => 0,

@@ -52,7 +52,7 @@ impl Supervisor {
         Some(CommandAnswer { sequence: pending.sequence, accepted, phase: self.phase, why })
     }
 
-    /// Whether clearing the fault is a matter of failed buses alone; if so, has them started over.
+    /// Whether clearing the fault is a matter of failed buses alone; if so, has them restarted.
     fn begin_restoring(&mut self, sequence: u64, cycle_state: &CycleState, actions: &mut Actions) -> bool {
         let begins = self.phase == Phase::Fault
             && self.restoring.is_none()

@@ -7,7 +7,7 @@ use taustream_messages::Phase;
 /// What can happen to the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// Every drive is configured, not energised, and was heard for long enough to know its speed.
+    /// Every drive is configured, not energised, and has given feedback for long enough to know its speed.
     DrivesReady,
     /// A drive that was ready is not any more, without a fault.
     DrivesLost,

@@ -68,7 +68,7 @@ impl Recorder {
         let pending = Arc::clone(&stop);
         let work = move || {
             loop {
-                // Read before the queue is emptied: what was pushed before the wish is still written.
+                // Read before the queue is emptied: what was pushed before the request is still written.
                 let last = pending.load(Ordering::Acquire);
                 log.take(&records, &candidates)?;
                 if last {

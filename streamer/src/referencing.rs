@@ -1,8 +1,8 @@
 //! On which turn each joint stands: what is added to a drive's angle to get the joint's.
 //!
 //! A drive whose feedback repeats itself, or counts from where it was switched on, tells an angle but for an offset.
-//! The offset is found when the drive is first heard, stays while it is heard, and is forgotten with it. It is added to
-//! what the drives answer and taken off what they are told, so nothing between knows of it. A joint whose offset is
+//! The offset is resolved at the first feedback of the drive, is valid while feedback comes, and is dropped without it. It is added to
+//! the feedback of the drives and subtracted from their commands, so nothing between depends on it. A joint whose offset is
 //! not known has none, and is not energised.
 use crate::answer::AnswerReason;
 use crate::cycle_state::CycleState;
@@ -31,7 +31,7 @@ pub type LastPoses = [Option<Recorded>; MAX_JOINTS];
 pub struct Resolved {
     /// What is to be added to it; 0 while it is not known.
     pub offset_rad: f64,
-    /// Whether it is known, and whence.
+    /// Whether it is known, and its source.
     pub reference_state: ReferenceState,
     /// Where it is not known for being too far: by how much the nearest turn misses the last pose.
     pub by_rad: f64,
@@ -88,7 +88,7 @@ impl Rule {
         Resolved { offset_rad: if near { offset_rad } else { 0.0 }, reference_state, by_rad }
     }
 
-    /// The offset when somebody says that a joint which reads `reading_rad` stands at `at_rad`.
+    /// The offset when the operator sets a joint that reads `reading_rad` to `at_rad`.
     fn stated(&self, joint: usize, reading_rad: f64, at_rad: f64) -> Result<f64, AnswerReason> {
         if !(self.range_rad[0]..=self.range_rad[1]).contains(&at_rad) {
             return Err(AnswerReason::ReferenceOutside { joint, at_rad, range_rad: self.range_rad });

@@ -107,7 +107,7 @@ pub enum Record {
         tick: u64,
         /// The trajectory.
         trajectory_id: u64,
-        /// The held pose less the trajectory's base, let go smoothly at the start, rad.
+        /// The held pose less the trajectory's base, faded out at the start, rad.
         start_offset_rad: JointArray,
     },
     /// The phase changed.
@@ -262,7 +262,7 @@ impl Reporter {
         }
     }
 
-    /// The trajectory begins to stand still because the loop was late; a failed bus is told as what it is.
+    /// The trajectory begins to stand still because the loop was late; a failed bus is reported as such.
     fn stalls_now(&self, cycle_state: &CycleState) -> bool {
         cycle_state.frozen && !self.frozen_before && cycle_state.failed_bus().is_none()
     }

@@ -1,6 +1,6 @@
 //! What makes a thread hard real-time: priority, CPU, locked memory, absolute sleep. All unsafe calls of the streamer.
 //!
-//! The streamer refuses to move an arm without these rights, unless it is told to: a loop that can be preempted by a
+//! The streamer refuses to move an arm without these rights, unless `--allow-non-realtime` is given: a loop that can be preempted by a
 //! browser is no servo loop.
 #![expect(unsafe_code, reason = "scheduling and memory locking are system calls without a safe wrapper")]
 use crate::cycle::{Core, Next, NoProbe, run_cycle};

@@ -142,7 +142,7 @@ impl Service {
     /// Serves until `stop`; then tells what is left to tell.
     pub fn serve(&mut self, stop: &AtomicBool) {
         loop {
-            // Read first: what the cycle pushed before the wish is still published.
+            // Read first: what the cycle pushed before the request is still published.
             let last = stop.load(Ordering::Acquire);
             self.take_commands();
             self.take_trajectories();

@@ -1,6 +1,6 @@
 //! The supervisor: turns one cycle's facts into events, and events into the next phase by the table of `phases`.
 //!
-//! It is the only owner of the phase. What it decides steers the next cycle: what the drives are wished to be, how the
+//! It is the only owner of the phase. What it decides steers the next cycle: the target of the drives, how the
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
 //! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
 use crate::answer::{AnswerReason, CommandAnswer};
@@ -25,7 +25,7 @@ const SHUTDOWN_S_MAX: f64 = 10.0;
 /// How long torque off is repeated before leaving at once, s.
 const SHUTDOWN_AT_ONCE_S: f64 = 0.05;
 
-/// What one cycle's judgement asks of the other stages.
+/// What the evaluation of one cycle requires of the other stages.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Actions {
     /// How the speed along the path changes.
@@ -36,7 +36,7 @@ pub struct Actions {
     pub pose_rad: Option<JointArray>,
     /// Drives are asked to forget their faults.
     pub clear_faults: bool,
-    /// Failed buses are started over, as this command asked.
+    /// Failed buses are restarted, as this command asked.
     pub restore_buses: Option<u64>,
     /// The changes of phase, in order.
     pub transitions: [Option<Transition>; TRANSITIONS_MAX],
@@ -64,7 +64,7 @@ pub struct Supervisor {
     pub(crate) referencing: Referencing,
     pub(crate) torque_off: bool,
     pub(crate) speed: f64,
-    /// Somebody has chosen the speed since the start.
+    /// The speed was set since the start.
     pub(crate) speed_chosen: bool,
     /// A stall froze the motion; it goes on when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
@@ -75,7 +75,7 @@ pub struct Supervisor {
     /// The newest gap that the drives do not bridge: when it ended, and how long it was, s.
     stall: Option<(Nanos, f64)>,
     pub(crate) resetting_since: Option<Nanos>,
-    /// Failed buses are being started over, for this `clear-fault`.
+    /// Failed buses are being restarted, for this `clear-fault`.
     pub(crate) restoring: Option<u64>,
     pub(crate) shutting_down: Shutdown,
     shutdown_since: Nanos,
@@ -183,7 +183,7 @@ impl Supervisor {
         }
     }
 
-    /// Judges one cycle: its facts first, then its commands, then leaving. `answers` takes the commands' answers.
+    /// Evaluates one cycle: its state first, then its commands, then leaving. `answers` takes the commands' answers.
     ///
     /// Real time: bounded work, no allocation.
     pub fn evaluate(
@@ -223,7 +223,7 @@ impl Supervisor {
         } else if to != Phase::Paused {
             self.paused_by = None;
         }
-        // Drives that follow commands, or are let go, are kept no more.
+        // Drives that follow commands, or are de-energised, are no longer kept.
         self.adopted &= !matches!(to, Phase::Holding | Phase::Disabling | Phase::Disabled);
         match to {
             Phase::Holding | Phase::Fault | Phase::Disabling | Phase::Locked => {
@@ -349,7 +349,7 @@ impl Supervisor {
     }
 
     fn evaluate_drives(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
-        // Buses that just came back are judged from the next cycle on.
+        // Buses that just came back are evaluated from the next cycle on.
         let failed = cycle_state.failed_bus().is_some() && cycle_state.restored.is_none();
         match self.phase {
             Phase::Configuring | Phase::Disabled | Phase::Disabling if failed => {
@@ -415,7 +415,7 @@ impl Supervisor {
             self.step(Event::HoldAdopted, cycle_state, actions);
         } else if self.all(cycle_state, |s| s.state == DriveState::Disabled) && self.watch.fastest().is_some()
         {
-            // Ready to be energised includes that rest can be told from motion: the first `enable` is not refused for it.
+            // Ready to be energised includes that rest can be distinguished from motion: the first `enable` is not refused for it.
             self.step(Event::DrivesReady, cycle_state, actions);
         } else {
             self.step(Event::DrivesLost, cycle_state, actions);
@@ -561,7 +561,7 @@ impl Supervisor {
         others.next().map(|(joint, s)| AnswerReason::NotConfigured { joint, state: s.state })
     }
 
-    /// The first drive that carries torque, or did when it was last heard.
+    /// The first drive that carries torque, or did at its last feedback.
     pub(crate) fn energised(&self, cycle_state: &CycleState) -> Option<(usize, DriveState)> {
         self.servos(cycle_state).find(|(_, s)| is_energised(s.state)).map(|(joint, s)| (joint, s.state))
     }

@@ -13,7 +13,7 @@ use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
 use taustream_motion::trajectory::Cursor;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
 
-/// Settled scales are started over after this many periods, so that their time axis stays short and exact.
+/// Settled scales are restarted after this many periods, so that their time axis stays short and exact.
 const AXIS_PERIODS_MAX: u64 = 60_000;
 
 /// What the guard is asked to let pass.
@@ -223,7 +223,7 @@ impl Track {
         let now_s = self.seconds(self.sent.axis);
         match order {
             SpeedChange::Stop => self.scale.stop(now_s),
-            // `CycleState::can_ramp` was asked first; a wish that is refused changes nothing.
+            // `CycleState::can_ramp` was checked first; a refused request changes nothing.
             SpeedChange::Target(sigma) => {
                 let _ = self.scale.request(sigma, now_s);
             }

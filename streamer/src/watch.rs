@@ -33,7 +33,7 @@ struct Answers {
     jump_limit_rad: f64,
     tracking_rad: f64,
     tracking_rad_max: f64,
-    /// Cycles in a row in which the drive told its position.
+    /// Cycles in a row in which the drive sent its position.
     commanded_cycles: u32,
     past_rad: [f64; REST_CYCLES],
     past_at: [Nanos; REST_CYCLES],
@@ -75,7 +75,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Nothing heard yet.
+    /// No feedback yet.
     #[must_use]
     pub fn new(settings: &Settings) -> Self {
         Self {
@@ -262,7 +262,7 @@ impl Watch {
         received.map_or(f64::INFINITY, |at| cycle_state.tick.wake_time.since_s(at))
     }
 
-    /// The fastest joint and its speed over the last cycles, rad/s. `None` while one of the joints was heard for too
+    /// The fastest joint and its speed over the last cycles, rad/s. `None` while one of the joints has given feedback for too
     /// short a time to tell: after bring-up, and again after its drive was configured anew.
     ///
     /// Real time: no allocation.

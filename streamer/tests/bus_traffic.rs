@@ -23,7 +23,7 @@ fn six_with(keys: &str) -> Settings {
     settings
 }
 
-/// A target that a drive was told, read from the wire without a line of the product's codec.
+/// A target that was sent to a drive, read from the wire without a line of the product's codec.
 #[derive(Clone, Copy, Debug)]
 struct SentSetpoint {
     tick: u64,
@@ -54,7 +54,7 @@ fn setpoints_in(tick: u64, frames: &[CanFrame]) -> Vec<SentSetpoint> {
     found
 }
 
-/// Largest use of the stop limits by the targets that each drive was told, by plain differences over their true times.
+/// Largest use of the stop limits by the targets that were sent to each drive, by plain differences over their true times.
 fn worst_use(settings: &Settings, received: &[SentSetpoint]) -> [f64; 3] {
     let limits = settings.robot.limits();
     let mut worst = [0.0_f64; 3];
@@ -88,7 +88,7 @@ fn gaps(received: &[SentSetpoint], node: u32) -> (u64, u64) {
     (steps().min().unwrap(), steps().max().unwrap())
 }
 
-/// Enables, moves to and fro, and returns what the drives were told while moving, and the largest tracking error.
+/// Enables, moves to and fro, and returns what was sent to the drives while moving, and the largest tracking error.
 fn move_once(name: &str, settings: Settings) -> (Arm, Vec<SentSetpoint>, f64) {
     let mut arm = Arm::new(name, settings);
     arm.enable();
@@ -129,7 +129,7 @@ fn every_setpoint_packing_follows_at_its_rate_inside_the_stop_limits() {
         let used = worst_use(&arm.settings, &received);
         assert!(used.iter().all(|share| *share <= 1.001), "{name}: {used:?} of the stop limits");
         assert!(used[0] > 0.2, "{name}: hardly moved, {used:?}");
-        // The end of the motion itself was told, not the last turn before it.
+        // The end of the motion itself was sent, not the last setpoint before it.
         let goal = arm.hold_position_rad;
         for servo in &arm.settings.servos {
             let node = u32::from(servo.node_id);
@@ -172,7 +172,7 @@ fn staggered_setpoints_come_in_equal_shares() {
     }
 }
 
-/// Goal: a pause of the process with setpoints that take turns: the joints stand where each was told, and come together
+/// Goal: a pause of the process with decimated setpoints: each joint rests at its last setpoint, and come together
 /// again inside the stop limits.
 #[test]
 fn stall_with_decimated_setpoints_brings_the_joints_together_again() {
@@ -282,7 +282,7 @@ fn overloaded_bus_starves_the_heartbeats_and_never_holds() {
     assert!(seen.longest_wait_ns > 100_000_000, "{seen:?}");
 }
 
-/// Goal: when one bus is lost, the joints of the other are stopped on the path, and the lost ones are told nothing more.
+/// Goal: when one bus is lost, the joints of the other are stopped on the path, and nothing more is sent to the lost ones.
 #[test]
 fn lost_bus_stops_the_joints_of_the_other_on_the_path() {
     let mut arm = Arm::new("lost-bus", shipped("dual-bus.toml", str::to_owned));

@@ -64,7 +64,7 @@ fn record_at_rest_is_believed_and_one_of_a_motion_is_not() {
     let settings = settings();
     let rest = kept("rest", &settings, &[(Disabled, 0, 0.5); 6]).unwrap();
     assert_eq!(rest, Recorded { position_rad: 0.5, offset_rad: 2.5, at_rest: true });
-    // It holds, and may be let go where it stands: the power may be cut.
+    // It holds, and may lose torque where it is: the power may be cut.
     assert!(kept("hold", &settings, &[(Holding, 1, 0.5); 6]).unwrap().at_rest);
     let mut falls = settings.clone();
     falls.servos[0].limp_is_safe = false;

@@ -16,7 +16,7 @@ pub(crate) struct Carried<'a> {
     encodings: &'a [Encoding],
     cycles: Vec<Vec<Setpoint>>,
     claimed: Vec<bool>,
-    /// SYNCs that the log claims and nobody saw.
+    /// SYNCs that the log claims and the recording lacks.
     missing: u64,
 }
 
@@ -55,7 +55,7 @@ impl<'a> Carried<'a> {
             let (Some((_, data)), None) = (of_node.next(), of_node.next()) else {
                 return Err(flaw(format!("node {node} has not exactly one setpoint frame")));
             };
-            // A drive that is not told to follow gets its own position as target; that is right only outside of motion.
+            // A drive that is not commanded to follow gets its own position as target; that is right only outside of motion.
             if !follows_target(data) && may_be_off(&cycle.phase) {
                 continue;
             }
@@ -138,7 +138,7 @@ fn split_at_syncs(frames: &[BusFrame], encodings: &[Encoding]) -> Vec<Vec<Setpoi
     cycles
 }
 
-/// The drive is told to follow: bit 3 of the controlword (CiA 402, "enable operation").
+/// The drive is commanded to follow: bit 3 of the controlword (CiA 402, "enable operation").
 fn follows_target(data: &[u8]) -> bool {
     data.first().is_some_and(|low| low & 0x08 != 0)
 }

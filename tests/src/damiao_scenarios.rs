@@ -6,7 +6,7 @@ use rustix::process::Signal;
 use std::time::{Duration, Instant};
 use taustream_messages::{FaultReason, Phase};
 
-/// A spring under a load does not stand where it is told: this far off it may rest. The shipped shoulder carries 10 Nm on
+/// A spring under a load does not rest at its command: this far off it may rest. The shipped shoulder carries 10 Nm on
 /// 400 Nm/rad.
 const AT_GOAL_RAD: f64 = 0.04;
 
@@ -109,7 +109,7 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.streamer.signal(Signal::KILL)?;
     bench.streamer.await_end()?;
     let since = Instant::now();
-    // Every motor has its own watchdog; status 0xD says that it was what let go, and the brakes hold the arm.
+    // Every motor has its own watchdog; status 0xD says that it has tripped, and the brakes hold the arm.
     while bench.simulator.said().matches("status=0xD").count() < 6 {
         ensure!(since.elapsed() < TIMEOUT, "motors keep their torque: {}", bench.simulator.said());
         bench.simulator.show("status")?;

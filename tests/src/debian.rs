@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 /// What a controller has that runs the services, and what the tests look with.
 const PACKAGES: &str = "systemd,systemd-sysv,udev,iproute2,kmod,can-utils,dbus,sudo";
-/// What nobody reads in a test.
+/// What is not read in a test.
 const WITHOUT: [&str; 4] =
     ["/usr/share/man/*", "/usr/share/locale/*", "/usr/share/doc/*", "/usr/share/info/*"];
 
@@ -36,7 +36,7 @@ pub fn image(cache: &Path) -> Result<PathBuf> {
     // An empty suite: the list of sources names it.
     run(bootstrap.arg("").arg(&tar).arg(&list))?;
     let mut pack = Command::new("tar2sqfs");
-    // It warns of ACLs that squashfs does not keep and nobody here needs.
+    // It warns of ACLs that squashfs does not keep and is not needed here.
     pack.args(["--quiet", "--force", "--compressor", "zstd", "--comp-extra", "level=3"]).arg(&image);
     run(pack.stdin(fs::File::open(&tar)?).stderr(Stdio::null()))?;
     fs::remove_file(&tar)?;

@@ -1,8 +1,8 @@
-//! Scenarios over the real processes on a real vcan0: the machine they run in and what judges their recordings.
+//! Scenarios over the real processes on a real vcan0: the machine they run in and the checks of their recordings.
 //!
-//! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`bench`] starts the real processes
+//! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`test_bench`] starts the real processes
 //! for one of the [`scenarios`], [`bus_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what the `bus-recorder`
-//! saw on the bus, [`cycle_log`] what the streamer claims, and [`setpoints`] judges the one by the other ([`mit_setpoints`]
+//! saw on the bus, [`cycle_log`] what the streamer claims, and [`setpoints`] compares the two ([`mit_setpoints`]
 //! for motors in MIT mode).
 //!
 //! [`booted`] boots a whole Debian ([`debian`]) with systemd in that machine, and [`services`] tries the installed services

@@ -66,7 +66,7 @@ pub enum MachineError {
         /// The operating system's word.
         source: Error,
     },
-    /// The caller asked to stop, or nobody reads the output any more.
+    /// The caller asked to stop, or the output is closed.
     #[error("the vcan machine was stopped before its command had ended")]
     Stopped,
     /// The guest ended without a status.
@@ -123,7 +123,7 @@ impl Machine {
             cpu,
         }
     }
-    /// Time that the command may take; past it, it is told to end (status 124), and killed 5 s later (137).
+    /// Time that the command may take; past it, it gets SIGTERM (status 124), and killed 5 s later (137).
     #[must_use]
     pub fn limit_s(mut self, limit_s: u32) -> Self {
         self.limit_s = limit_s;
@@ -153,7 +153,7 @@ impl Machine {
         self.nice = nice;
         self
     }
-    /// `SCHED_FIFO` priority on the host instead, where permitted (said aloud where not). For guests that sleep most of the
+    /// `SCHED_FIFO` priority on the host instead, where permitted (with a message where not). For guests that sleep most of the
     /// time: a guest that computes takes its whole CPU, and the host's limit for real-time processes then stops it for
     /// 50 ms of every second.
     #[must_use]
@@ -391,7 +391,7 @@ fn own_umask() -> u32 {
 /// The guest's processes, killed with this value.
 struct Guest {
     launched: Child,
-    /// Set once it was reaped: from then on its number is nobody's to signal.
+    /// Set once it was reaped: from then on its number must not be signalled.
     ended: Option<ExitStatus>,
 }
 
@@ -416,7 +416,7 @@ impl Guest {
         Ok(true)
     }
 
-    /// Looks without reaping: as long as its zombie is there, nobody else gets its number, which is its group's.
+    /// Looks without reaping: as long as its zombie is there, no other process gets its number, which is its group's.
     fn has_ended(&self) -> bool {
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         self.pid().is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), options), Ok(None)))
@@ -459,7 +459,7 @@ impl Drop for Guest {
     }
 }
 
-/// Copies a console to a writer until it ends. When the writer fails (`| head`), nobody hears the guest any more, so it is
+/// Copies a console to a writer until it ends. When the writer fails (`| head`), the output of the guest is lost, so it is
 /// stopped; until then the console is still emptied, for the guest would wait on a full one.
 fn copy(
     mut from: PipeReader,

@@ -1,4 +1,4 @@
-//! The judge of a recording of Damiao motors in MIT mode: was every command on the bus the one that the log claims?
+//! The checker of a recording of Damiao motors in MIT mode: was every command on the bus the one that the log claims?
 //!
 //! It shares no packing with the product: bits are taken from the bytes by their printed places, and a value is right when
 //! it lies at most half a step from what the bits say. There is no SYNC on such a bus, so the log's
@@ -6,7 +6,7 @@
 //!
 //! For each cycle of the log: each motor has one frame; outside of enabling and faults that is a command with the whole
 //! gains, the logged angle, and the velocity that this angle has from cycle to cycle. That logged angles are those of the
-//! accepted trajectory is judged as for every other arm.
+//! accepted trajectory is checked as for every other arm.
 use crate::cycle_log::{Event, LoggedCycle};
 use crate::on_path::PathCheck;
 use crate::setpoints::{BusFrame, CheckResult, Flaw, may_be_off};
@@ -108,7 +108,7 @@ pub enum LogEnds {
     Early,
 }
 
-/// Judges one bus of a recording that began before the streamer's first frame.
+/// Checks one bus of a recording that began before the streamer's first frame.
 ///
 /// # Errors
 /// The first flaw.
@@ -147,7 +147,7 @@ pub fn check_setpoints(
         let known = claimed.iter().rposition(|claimed| *claimed).map_or(0, |at| at + 1);
         claimed.split_at_mut(known).1.fill(true);
     }
-    // Whatever has stiffness moves an arm: nobody sends it but a cycle that the log knows.
+    // Whatever has stiffness moves an arm: only a cycle sends it that the log knows.
     let unclaimed = sent.iter().zip(&claimed).find(|(frame, claimed)| {
         !**claimed && frame.id != REGISTERS && Command::of(&frame.data).is_some_and(|c| c.stiffness > 0)
     });

@@ -1,6 +1,6 @@
-//! A streamer that is killed while its drives hold, and the next one, judged by what was on the bus.
+//! A streamer that is killed while its drives hold, and the next one, checked by what was on the bus.
 //!
-//! The stage's recording goes on over the kill; the judge of setpoints does not, because a log ends with its streamer.
+//! The stage's recording goes on over the kill; the check of setpoints does not, because a log ends with its streamer.
 use crate::candump;
 use crate::retry::Failed;
 use crate::scenarios::{Goals, set_off};
@@ -82,7 +82,7 @@ fn kill_and_restart(restart: &Restart, bench: &mut TestBench, goals: &Goals) -> 
             joint + 1
         );
     }
-    let told = only_keeping(&bench.recorded()?, restarted_us)?;
+    let holds = only_keeping(&bench.recorded()?, restarted_us)?;
     bench.cli_done(&["enable"])?;
     bench.await_phase(Phase::Holding)?;
     bench.cli_done(&["speed", "100"])?;

@@ -1,4 +1,4 @@
-//! Scenarios one after another, each tried again, aloud, where the host held the whole machine up: the arm then pauses or faults, as it must, and the
+//! Scenarios one after another, each repeated, with a message, where the host held the whole machine up: the arm then pauses or faults, as it must, and the
 //! scenario's own event never comes. A fault of the product comes back in every try.
 use anyhow::{Error, Result};
 use std::time::Instant;
@@ -21,7 +21,7 @@ impl<E: Into<Error>> From<E> for Failed {
     }
 }
 
-/// Performs a scenario, which is told the number of the attempt and says what was seen; prints how it went. Whether it
+/// Performs a scenario, which gets the number of the attempt and says what was seen; prints how it went. Whether it
 /// passed.
 pub fn passes(name: &str, perform: impl Fn(usize) -> Result<String, Failed>) -> bool {
     let since = Instant::now();

@@ -34,13 +34,13 @@ pub struct Scenario {
     pub name: &'static str,
     /// What it does; it fails by an error.
     pub run: fn(&mut TestBench, &Goals) -> Result<()>,
-    /// How its recording is judged.
+    /// How its recording is checked.
     pub check_mode: CheckMode,
     /// Settings, beside those of the run, that it needs instead.
     pub settings: Option<&'static str>,
 }
 
-/// How a recording is judged.
+/// How a recording is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CheckMode {
     /// Every cycle's frames are on the bus, whole.
@@ -125,7 +125,7 @@ fn arrive(bench: &mut TestBench, motion: Motion, goal_rad: &[f64]) -> Result<Rep
     arrive_within(bench, motion, goal_rad, AT_GOAL_RAD)
 }
 
-/// Like [`arrive`], for joints that rest within `off_rad` of where they are told to be.
+/// Like [`arrive`], for joints that rest within `off_rad` of their commands.
 pub(crate) fn arrive_within(
     bench: &mut TestBench,
     motion: Motion,

@@ -17,7 +17,7 @@ impl Scratch {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let path = std::env::temp_dir().join(format!("vcan-machine-{}-{number}", std::process::id()));
-        // Fails if it is there: a directory that somebody else has prepared is not ours.
+        // Fails if it is there: a directory that another user has prepared is not ours.
         DirBuilder::new().mode(0o700).create(&path)?;
         Ok(Self(path))
     }

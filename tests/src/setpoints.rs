@@ -1,4 +1,4 @@
-//! The judge of a recording: was every setpoint on the bus the one that the trajectory demands?
+//! The checker of a recording: was every setpoint on the bus the one that the trajectory demands?
 //!
 //! It shares no encoding with the product. The bus is what the recorder wrote; the claim is the streamer's cycle log. For
 //! each cycle: the frames between two SYNCs are exactly one RPDO per servo, their targets equal the encoding
@@ -139,7 +139,7 @@ pub enum Losses {
     AsLogged,
 }
 
-/// Judges one bus of a recording that began before the first SYNC.
+/// Checks one bus of a recording that began before the first SYNC.
 ///
 /// # Errors
 /// The first flaw.
@@ -152,7 +152,7 @@ pub fn check_setpoints(
     check_setpoints_with(Losses::None, (frames, log), bus, encodings)
 }
 
-/// Judges one bus of a recording in which cycles may have been lost.
+/// Checks one bus of a recording in which cycles may have been lost.
 ///
 /// # Errors
 /// The first flaw.
@@ -172,7 +172,7 @@ pub fn check_setpoints_with(
     other.flatten().map_or(whole, Ok)
 }
 
-/// Judges with cycles that did not fare as the log says.
+/// Checks with cycles that did not fare as the log says.
 fn check_assuming(
     outcomes: &ProcessOutcomes,
     losses: Losses,

@@ -13,7 +13,7 @@ use taustream_arm::Settings;
 use taustream_messages::service::{ReportSubscriber, Wire};
 use taustream_messages::{FaultReason, Phase, Report};
 
-/// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it judges no speed.
+/// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it checks no speed.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
 /// The recorder's file in the folder of a scenario.
 const RECORDING: &str = "bus.log";
@@ -458,8 +458,8 @@ impl TestBench {
         })
     }
 
-    /// Like [`Self::await_report`] for a motion that nobody pauses: a host that held the machine up for longer than
-    /// `stall_resume_ms` leaves the arm paused, and this resumes it, aloud, as an operator would.
+    /// Like [`Self::await_report`] for a motion without a pause: a host that held the machine up for longer than
+    /// `stall_resume_ms` leaves the arm paused, and this resumes it with a message, as an operator would.
     ///
     /// # Errors
     /// When it does not come to hold, or the arm paused without a stall.
@@ -494,7 +494,7 @@ impl TestBench {
         Failed { error: error.context(state), stalled: self.is_stalled(&report) }
     }
 
-    /// The streamer counted stalls, or hears from no joint in time (the simulator is held up with the rest, a fault of
+    /// The streamer counted stalls, or has no feedback in time (the simulator is stalled with the rest, a fault of
     /// the arm concerns one joint or one bus).
     fn is_stalled(&self, report: &Report) -> bool {
         let limit_s = self.settings.supervision.feedback_age_s_max;

@@ -1,7 +1,7 @@
-//! Recordings of buses whose setpoints take turns or share frames, made into the plain ones that the judge compares.
+//! Recordings of buses whose setpoints take turns or share frames, converted into the plain ones that the checker compares.
 //!
 //! It shares no encoding with the product. What the bus did not carry because it was not a servo's turn is filled in from
-//! the log, but only after the turns themselves were checked: each servo is told a target in every so many cycles.
+//! the log, but only after the turns themselves were checked: each servo is sent a target in every so many cycles.
 use crate::cycle_log::Event;
 use crate::setpoints::{BusFrame, Encoding, Flaw};
 use std::collections::BTreeMap;
@@ -78,7 +78,7 @@ pub fn as_plain(
 /// Logged setpoints by the number of the SYNC that they follow, with the cycle's number.
 type Wanted = BTreeMap<u64, (u64, Vec<f64>)>;
 
-/// What was heard of a node.
+/// What was received of a node.
 #[derive(Clone, Debug, Default)]
 struct Node {
     /// Newest controlword.

@@ -1,4 +1,4 @@
-//! The judge of recordings is itself judged: a faithful recording passes, and every doctored one fails for its fault.
+//! The checker of recordings is itself checked: a faithful recording passes, and every corrupted one fails for its fault.
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 use std::f64::consts::TAU;
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
@@ -303,7 +303,7 @@ fn recording_with_losses_passes_only_where_they_are_allowed() {
     assert_eq!((check_result.syncs, check_result.setpoints), (299, 298 * JOINTS + 2));
 }
 
-/// Goal: what the losses excuse is only what the log claims: a frame after the bus failed, a frame that nobody claims, a
+/// Goal: what the losses excuse is only what the log claims: a frame after the bus failed, a frame that the log lacks, a
 /// wrong target in a cycle that was lost in part are all found.
 #[test]
 fn recording_with_losses_that_carries_what_the_log_does_not_claim_fails() {

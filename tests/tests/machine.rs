@@ -85,7 +85,7 @@ fn machine_writes_only_where_it_may() {
         std::fs::create_dir(folder).unwrap();
         std::fs::write(folder.join("old"), "host").unwrap();
     }
-    // A comma cannot be told in a mount option: refused before anything boots.
+    // A comma cannot be part of a mount option: refused before anything boots.
     let refused = dirs.run(&["--writable", open.to_str().unwrap()], "true");
     assert_eq!(refused.status.code(), Some(125));
     assert!(text(&refused.stderr).contains("comma"), "{}", text(&refused.stderr));
@@ -113,7 +113,7 @@ fn machine_command_out_of_time_ends_with_124() {
     assert_eq!((output.status.code(), text(&output.stdout)), (Some(124), "begun\n".into()));
 }
 
-/// Goal: a machine whose output nobody reads any more ends early, by itself.
+/// Goal: a machine whose output is closed ends early, by itself.
 #[test]
 fn machine_whose_reader_has_gone_ends() {
     let dirs = MachineDirs::new("unread");
@@ -150,7 +150,7 @@ fn machine_ended_on_request_leaves_nothing() {
     assert_eq!(processes_naming(&dirs.folder), Vec::<u32>::new(), "still running");
 }
 
-/// Processes whose command line holds a path (linux.uml is told its directories there).
+/// Processes whose command line holds a path (linux.uml gets its directories there).
 fn processes_naming(folder: &std::path::Path) -> Vec<u32> {
     let needle = folder.as_os_str().as_bytes();
     let mut found = Vec::new();

@@ -1,5 +1,5 @@
-//! The judge of MIT recordings is itself judged: a faithful recording passes, and every doctored one fails for its fault.
-//! The frames are packed here by shifting, apart from the product and from the judge.
+//! The checker of MIT recordings is itself checked: a faithful recording passes, and every corrupted one fails for its fault.
+//! The frames are packed here by shifting, independently of the product and of the checker.
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 use taustream_tests::cycle_log::{Event, LoggedCycle};
@@ -121,7 +121,7 @@ fn faithful_recording_passes_and_everything_was_compared() {
     }
 }
 
-/// Each: what is doctored in the frame of motor 2 in cycle 200, and words of the flaw.
+/// Each: what is corrupted in the frame of motor 2 in cycle 200, and words of the flaw.
 #[test]
 fn command_with_any_field_corrupted_fails() {
     type Doctor = fn(&mut Vec<u8>);
@@ -158,7 +158,7 @@ fn frames_too_few_too_many_or_of_nobody_fail() {
     frames.push(stray.clone());
     let flaw = check_mode(&frames, &log).expect_err("a command after the end").to_string();
     assert!(flaw.contains("the log does not know"), "{flaw}");
-    // A streamer that was killed has sent what it did not write down; what it did write is judged all the same.
+    // A streamer that was killed has sent what it did not write down; what it did write is checked.
     check_setpoints((&frames, &log), 0, (&motors(), PERIOD_S), LogEnds::Early)
         .expect("the tail is not checked");
     let at = place(&frames, 300, 1);

@@ -231,8 +231,8 @@ fn socketcan_frames_are_confirmed_when_they_were_on_the_wire() {
     assert_eq!(receive_all(servos.as_mut(), 7), frames);
 }
 
-/// Goal: what still waits in a queue after a fault never reaches a drive behind our back: a link is not started over
-/// before it has left, or was dropped by taking the interface down, which is the cure that the refusal names.
+/// Goal: what still waits in a queue after a fault never reaches a drive behind our back: a link is not restarted
+/// before it has left, or was dropped by taking the interface down, which is the remedy that the refusal names.
 #[test]
 fn socketcan_is_not_reopened_while_old_frames_wait_and_down_drops_them() {
     let vcan = EchoingVcan::new("stale");
@@ -398,7 +398,7 @@ fn helper_master_that_holds_on() {
     std::thread::sleep(Duration::from_secs(60));
 }
 
-/// Goal: what cannot be a bus of its declared kind is refused with one sentence and the cure; and a refusal locks nothing.
+/// Goal: what cannot be a bus of its declared kind is refused with one message and the remedy; a refusal locks nothing.
 #[test]
 fn socketcan_open_refuses_what_the_kernel_does_not_confirm() {
     let vcan = Vcan::new("kinds");

@@ -1,4 +1,4 @@
-//! Recordings with turns and shared frames: faithful ones become plain ones, doctored ones fail for their fault.
+//! Recordings with turns and shared frames: faithful ones become plain ones, corrupted ones fail for their fault.
 #![expect(clippy::unwrap_used, reason = "a test ends by panicking")]
 use taustream_arm::Traffic;
 use taustream_tests::cycle_log::{Event, LoggedCycle};
@@ -60,7 +60,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
 
 const TRAFFIC: Traffic = Traffic { setpoint_every: 2, stagger: true, feedback_every: 1, packed: true };
 
-/// The first flaw of the turns or of the judge.
+/// The first flaw of the alternation or of the checker.
 fn flaw_of(frames: Vec<BusFrame>, log: &[Event]) -> Option<String> {
     let plain = match as_plain(frames, log, 0, &encodings(), TRAFFIC) {
         Ok(plain) => plain,

@@ -105,7 +105,7 @@ pub(crate) fn undo(arguments: &RootArguments) -> Result<ExitCode> {
             Err(e) if e.kind() == ErrorKind::NotFound => {}
             Err(e) => return Err(e).with_context(|| format!("{} cannot be removed", path.display())),
         }
-        // Folders of our own go with their last file; what somebody has put there keeps them.
+        // Folders of our own go with their last file; other files there keep them.
         for folder in to.ancestors().skip(1).take_while(|f| f.to_string_lossy().contains("taustream")) {
             if fs::remove_dir(root.join(folder)).is_err() {
                 break;
@@ -168,7 +168,7 @@ fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// A file is written beside its place and moved there: a program that runs goes on with its old file, and nobody meets
+/// A file is written beside its place and moved there: a program that runs goes on with its old file, and no process meets
 /// half a rule.
 fn place(item: &Item, to: &Path) -> Result<()> {
     if let Some(folder) = to.parent() {
@@ -188,7 +188,7 @@ fn is_this_machine(root: &Path) -> bool {
     root.canonicalize().is_ok_and(|root| root == Path::new("/"))
 }
 
-/// Lets systemd take notice. A machine that systemd does not run has nobody to tell.
+/// Lets systemd take notice. A machine that systemd does not run is not notified.
 fn manager(commands: &[&[&str]]) -> Result<()> {
     if !Path::new("/run/systemd/system").is_dir() {
         println!("systemd does not run here: not notified");

@@ -67,7 +67,7 @@ impl Place {
         Ok(python)
     }
 
-    /// The folder of programs that use somebody else's work to judge ours.
+    /// The folder of programs that check our work with independent work.
     pub(crate) fn peers(&self) -> PathBuf {
         self.root.join("tests/peers")
     }

@@ -9,7 +9,7 @@ const FD_DATA_BIT_S: u32 = 5_000_000;
 /// Nominal rate that CAN FD is reckoned with.
 const FD_BIT_S: u32 = 1_000_000;
 
-/// One way out.
+/// One remedy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadRemedy {
     /// What to change.

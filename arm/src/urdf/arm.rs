@@ -255,7 +255,7 @@ fn weight(inertial: &Inertial) -> Weight {
     Weight { mass_kg, center_m: [0.0; 3], inertia_kg_m2 }
 }
 
-/// Moments that no body has: files that nobody simulates are full of them, and no setpoint depends on them.
+/// Moments that no body has: files that are not used for simulation often have them, and no setpoint depends on them.
 fn say_odd_moments(model: &Model, notices: &mut Vec<String>) {
     let is_odd = |link: &&Link| link.inertial.is_some_and(|inertial| !weight(&inertial).is_possible());
     for link in model.links.iter().filter(is_odd) {

@@ -155,7 +155,7 @@ impl Model {
             link_elements.iter().zip(&link_names).filter_map(|(e, name)| read_link(e, name.as_deref()));
         let links = links.collect();
         let mut names = BTreeSet::new();
-        // Held against all names, so that a faulty link is not also called missing.
+        // Compared with all names, so that a faulty link is not also called missing.
         let joints = joint_elements.iter().filter_map(|e| read_joint(e, &link_names, &mut names)).collect();
         context.fault_list.is_clean().then_some(Self { name: name?, links, joints })
     }

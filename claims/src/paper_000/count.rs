@@ -1,4 +1,4 @@
-//! The paper's first wish: a criterion for the number of control points, held against fixed numbers.
+//! A request of the paper: a criterion for the number of control points, compared with fixed numbers.
 use super::contenders::GREEDY;
 use super::{Unit, case, ours, refused, ur5};
 use crate::claim::Claim;

@@ -40,7 +40,7 @@ const MOVED: usize = 50 + 50 * 1000;
 const QUICK: usize = 3_000;
 /// Above any method's own schedule; ISMA's takes about a million.
 const ENOUGH: usize = 2_000_000;
-/// What is told from the least value: below it is rounding.
+/// What is distinguished from the least value: below it is rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// Runs of one method on one function.

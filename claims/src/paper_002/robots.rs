@@ -49,7 +49,7 @@ fn together() -> Option<PlanarScene> {
         let along = 14.0 * f64::from(i);
         let away = [goal[0] - start[0], goal[1] - start[1]];
         let length = away[0].hypot(away[1]);
-        // Goals beside each other, so that nobody waits for the place of another.
+        // Goals beside each other, so that no robot waits for the place of another.
         [
             [start[0] - along * away[0] / length, start[1] - along * away[1] / length],
             [goal[0] + along, goal[1]],

@@ -89,8 +89,8 @@ impl Processes {
                 Ok(())
             }
             Err(failure) => {
-                // Its failure is told already; how it ends after that is no failure of the demo's end.
-                let _told = process.end();
+                // Its failure was reported; how it ends after that does not matter.
+                let _ended = process.end();
                 Err(failure)
             }
         }

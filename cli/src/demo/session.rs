@@ -116,7 +116,7 @@ impl<'a> Session<'a> {
     }
 
     /// A computer that is busy with other things may leave the arm paused. Then the demo does what an operator would, and
-    /// says so. A pause by command is somebody else's wish.
+    /// says so. A pause by command is somebody else's request.
     fn resume_after_stall(&self, report: &Report, phase: Phase) -> Result<(), Failure> {
         let stalled = report.pause().is_some_and(|pause| pause.reason == PauseReason::Stall);
         let mut resumed_at = self.resumed_at_stall.borrow_mut();
@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
             .with_tracking_error(moved))
     }
 
-    /// A failure while the arm is in a fault is told with the fault: it is the cause.
+    /// A failure while the arm is in a fault is reported with the fault: it is the cause.
     pub(crate) fn with_fault(&self, why: Failure) -> Failure {
         if let Err(unreachable) = self.look() {
             note(format_args!("  {unreachable}"));

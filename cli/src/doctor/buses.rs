@@ -11,7 +11,7 @@ const CAN_TYPE: i64 = 280;
 const UP: i64 = 1;
 /// A longer queue delays setpoints that are old by then: 64 frames take 8 ms at 1 Mbit/s.
 const QUEUE_MAX: i64 = 64;
-/// What every interrupt thread gets when nobody sets it (`PREEMPT_RT`).
+/// What every interrupt thread has by default (`PREEMPT_RT`).
 const IRQ_PRIORITY_DEFAULT: i64 = 50;
 /// What stays of "irq/123-can0" in a process's name.
 const IRQ_THREAD: &str = "irq/";

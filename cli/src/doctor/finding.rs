@@ -55,7 +55,7 @@ impl Finding {
     pub(crate) fn warning(name: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { name, grade: Grade::Warning, what: what.into(), remedy: Some(remedy.into()) }
     }
-    /// It must be mended.
+    /// It must be fixed.
     pub(crate) fn problem(name: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { name, grade: Grade::Problem, what: what.into(), remedy: Some(remedy.into()) }
     }

@@ -1,4 +1,4 @@
-//! Every finding on a doctored computer: a tree of files as the kernel would show them, healthy but for one of them.
+//! Every finding on a corrupted computer: a tree of files as the kernel would show them, healthy but for one of them.
 use super::finding::{Finding, Grade};
 use super::latency::Latency;
 use super::subject::{AskController, Subject};
@@ -70,7 +70,7 @@ static SETTINGS: LazyLock<Settings> = LazyLock::new(|| {
     Settings::load(&file).unwrap()
 });
 
-/// A doctored computer; gone after the test.
+/// A corrupted computer; gone after the test.
 struct Computer {
     root: PathBuf,
     subject: Subject,
@@ -125,7 +125,7 @@ impl Computer {
         examine(&self.subject)
     }
 
-    /// Asserts the grade of one finding, words in it, a cure unless all is well, and that nothing else has changed.
+    /// Asserts the grade of one finding, words in it, a remedy unless all is well, and that nothing else has changed.
     #[track_caller]
     fn finds(&self, name: &str, grade: Grade, words: &[&str]) {
         let findings = self.findings();
@@ -166,7 +166,7 @@ fn healthy_computer_is_all_ok() {
     assert!(diagnosis.to_string().contains("not a safety function"));
 }
 
-/// One file doctored, one finding changed: path, text, and what must be found.
+/// One file corrupted, one finding changed: path, text, and what must be found.
 type Row = (&'static str, &'static str, &'static str, Grade, &'static [&'static str]);
 
 const ROWS: &[Row] = &[
@@ -416,7 +416,7 @@ fn runtime_directory_and_shared_memory_are_graded() {
     let mut computer = Computer::healthy();
     computer.subject.shm_free = Some(1 << 20);
     computer.finds("/dev/shm", Grade::Problem, &["1 MiB free", "remount"]);
-    // While somebody runs, segments are in use.
+    // While a process runs, segments are in use.
     let computer = Computer::healthy();
     computer.write("dev/shm/taustream.1000.ur5.x", "");
     computer.write("proc/600/comm", "taustream-plann\n");

@@ -25,7 +25,7 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// Joins the services of `arm`. Nobody needs to serve yet.
+    /// Joins the services of `arm`. No service is needed yet.
     pub(crate) fn join(arm: &str) -> Result<Self, Failure> {
         let wire = Wire::join(arm, "taustream", &taustream_arm::runtime::directory()?)?;
         let reports = wire.report_subscriber()?;

@@ -81,7 +81,7 @@ pub(crate) fn follow(
     }
 }
 
-/// Judges reports one after another.
+/// Evaluates reports one after another.
 struct Watch {
     trajectory_id: u64,
     seen: bool,

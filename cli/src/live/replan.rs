@@ -79,7 +79,7 @@ pub(crate) struct Wanted {
     pub(crate) planner: PlannerKind,
 }
 
-/// Asks, prints the receipt, and waits for the end of the motion if told to.
+/// Asks, prints the receipt, and waits for the end of the motion if requested.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
     let settings = arm::settings(settings)?;
     let arm = ArmName::of(&settings);

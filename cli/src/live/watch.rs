@@ -65,14 +65,14 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &WatchArgs) -> Resu
     Ok(())
 }
 
-/// What has been heard and shown so far.
+/// What was received and shown so far.
 struct Watch {
     arm: ArmName,
     sink: Sink,
     /// From one line or picture to the next, by the streamer's clock.
     period_ns: u64,
     count: u64,
-    /// Heard, and not shown yet.
+    /// Received, and not shown yet.
     due: Vec<(Report, Phase)>,
     /// The report of the last line or picture.
     last: Option<(Report, Phase)>,

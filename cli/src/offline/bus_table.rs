@@ -1,4 +1,4 @@
-//! One bus in `taustream check`: what goes over it, how full that makes it, and the ways out when it is too full.
+//! One bus in `taustream check`: what goes over it, how full that makes it, and the remedies when it is too full.
 use serde::Serialize;
 use std::fmt;
 use taustream_arm::bus_load::flow::Flow;
@@ -46,7 +46,7 @@ struct FrameLine {
     percent: f64,
 }
 
-/// One way out.
+/// One remedy.
 #[derive(Debug, Serialize)]
 struct RemedyLine {
     what: String,

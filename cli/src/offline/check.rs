@@ -24,7 +24,7 @@ pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
     }
 }
 
-/// Settings whose only fault is a bus that is too full are shown with its table and the ways out, and refused all the same.
+/// Settings whose only fault is a bus that is too full are shown with its table and the remedies, and refused all the same.
 fn check_settings(form: Form, path: &Path) -> Result<(), Failure> {
     form.print(&CheckedSettings::of(&Settings::load_overloaded(path)?))?;
     Settings::load(path)?;

@@ -178,7 +178,7 @@ impl CheckedRobot {
         for link in &self.links {
             match &link.moved_by {
                 Some(joint) => writeln!(f, "  {:<26} moves with {joint}: {}", link.name, link.shapes)?,
-                // Planning could not change whether it meets an obstacle, so it is not held against any.
+                // Planning could not change whether it meets an obstacle, so it is not compared with any.
                 None => writeln!(
                     f,
                     "  {:<26} is fixed: {} (checked against the arm, not against obstacles)",
@@ -196,7 +196,7 @@ impl CheckedRobot {
     }
 }
 
-/// Contacts that nothing will warn about: said aloud.
+/// Contacts that nothing will warn about: printed.
 fn contacts(f: &mut fmt::Formatter<'_>, title: &str, pairs: &[[String; 2]]) -> fmt::Result {
     if pairs.is_empty() {
         return Ok(());

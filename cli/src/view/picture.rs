@@ -11,7 +11,7 @@ use taustream_messages::{Phase, Report};
 /// Cells of the bar of a motion.
 const PROGRESS_CELLS: usize = 30;
 
-/// What the bars are held against.
+/// What the bars are compared with.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Scale {
     pub(super) joints: Vec<JointScale>,

@@ -350,7 +350,7 @@ fn stopping_needs_only_the_name_of_broken_settings() {
     let settings = scratch.settings(&arm);
     let text = fs::read_to_string(&settings).unwrap();
     scratch.write("settings.toml", &text.replacen("node_id = 2", "node_id = 1", 1));
-    // The fault is mentioned; what keeps the command from its work is only that nobody serves.
+    // The fault is mentioned; what keeps the command from its work is only that no process serves.
     scratch
         .run(&["stop", "--settings", "settings.toml"])
         .refused(1, &["note:", "has faults", &arm, "is not running"]);

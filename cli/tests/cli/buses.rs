@@ -1,4 +1,4 @@
-//! Buses in `taustream check`: the table, the verdict, the ways out.
+//! Buses in `taustream check`: the table, the result, the remedies.
 #![expect(clippy::expect_used, reason = "a helper of tests fails by panicking")]
 use crate::common::{Scratch, config};
 

@@ -44,7 +44,7 @@ impl Scratch {
         self.write(name, &text.replacen(from, to, 1))
     }
 
-    /// Settings of an arm that nobody else has: vcan6 under another name.
+    /// Settings of an arm with a name of its own: vcan6 under another name.
     pub(crate) fn settings(&self, arm: &str) -> PathBuf {
         self.arms.borrow_mut().push(arm.to_owned());
         let text = fs::read_to_string(config().join("settings/vcan6.toml")).expect("shipped settings");
@@ -86,7 +86,7 @@ impl Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         let _left = fs::remove_dir_all(&self.dir);
-        // iceoryx2 leaves a small file of every arm that somebody asked for.
+        // iceoryx2 leaves a small file of every arm that was requested.
         for arm in self.arms.borrow().iter() {
             let mine = format!(".{arm}.");
             for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {

@@ -78,7 +78,7 @@ fn plan_verify_sample_and_cost_work_with_a_urdf_and_refuse_another_one() {
         "n.json",
         "--json",
     ]);
-    // A train of strokes has no cost in the paper's model, and is told so.
+    // A train of strokes has no cost in the paper's model, and the message says so.
     if cost.code == Some(0) {
         assert!(cost.json()["path_length_m"].as_f64().is_some_and(|m| m > 0.01));
     } else {

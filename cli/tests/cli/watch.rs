@@ -85,7 +85,7 @@ impl Stage {
         stage
     }
 
-    /// With nobody who serves.
+    /// Without a serving process.
     fn empty(name: &str) -> Self {
         let scratch = Scratch::new();
         let runtime = scratch.dir.join("run");

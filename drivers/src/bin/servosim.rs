@@ -72,7 +72,7 @@ fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
     Ok(angles_rad)
 }
 
-/// Opens the links and serves until told to stop.
+/// Opens the links and serves until stopped.
 fn run(args: &Arguments, (settings, simulator): (Settings, LinkedSimulator)) -> anyhow::Result<()> {
     let runtime = runtime::directory()?;
     let mut links: Vec<Box<dyn CanLink>> = Vec::with_capacity(settings.buses.len());

@@ -1,7 +1,7 @@
 //! One CiA 402 node from silence to cyclic synchronous position (can-protocols section 1.5).
 //!
 //! First it only listens: a drive that is energised before this master has configured it is left as it is. Then the
-//! communication part is reset, the drive configured by SDO, and started. All times are on the driver's patient
+//! communication part is reset, the drive configured by SDO, and started. All times are on the driver's stall-free
 //! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
@@ -39,7 +39,7 @@ pub(super) enum NodeStage {
     Observe { since: Nanos, next: Nanos, fault: Option<BringUpFault> },
     /// Found energised; reading whether it is ours.
     Verify,
-    /// Found energised and ours: it holds, and waits for the wish to keep it.
+    /// Found energised and ours: it holds, and waits for the drive target to keep it.
     Held { next: Nanos },
     /// To be kept: NMT start sent, which leaves the power stage alone; waiting for the first TPDO.
     Rejoin { since: Nanos, tries: u8 },
@@ -53,7 +53,7 @@ pub(super) enum NodeStage {
     Start { since: Nanos, tries: u8 },
     /// Process data flows.
     Operational { shutdown_since: Option<Nanos> },
-    /// Lost its configuration while in use; waits for the wish to be disabled.
+    /// Lost its configuration while in use; waits for the drive target to be disabled.
     Gone(BringUpFault),
     /// A step was refused.
     Refused { code: u32, object: u32 },
@@ -68,7 +68,7 @@ pub struct Service {
     pub sdo: Option<SdoRequest>,
 }
 
-/// What a node is told in a cycle.
+/// What is sent to a node in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveSetpoint {
     /// Controlword.
@@ -218,14 +218,14 @@ impl Node {
         }
     }
 
-    /// The newest target in counts, from the start of process data until the node is looked at anew. Nobody else may
+    /// The newest target in counts, from the start of process data until the node is observed anew. Nothing else may
     /// guess one: a drive that still listens would go there.
     #[must_use]
     pub const fn commanded(&self) -> Option<i32> {
         self.commanded
     }
 
-    /// What the node is to be told in this cycle, while process data flows.
+    /// What is to be sent to the node in this cycle, while process data flows.
     ///
     /// Real time: arithmetic only.
     pub fn setpoint(&mut self, cycle: BringUpCycle, target: Target) -> Option<DriveSetpoint> {
@@ -270,7 +270,7 @@ impl Node {
         };
         self.commanded = wanted.or(self.commanded);
         if target_source == TargetSource::Command {
-            // What is kept, should the wish become to keep.
+            // What is held, should the target become `Keep`.
             self.held = self.commanded;
         }
         self.commanded.map(|target_counts| DriveSetpoint { control, target_counts })
@@ -387,7 +387,7 @@ impl Node {
         }
     }
 
-    /// Back to silence: nothing of what was heard counts any more.
+    /// Sends nothing: earlier feedback is no longer valid.
     ///
     /// Real time: no allocation.
     pub fn start_over(&mut self, now: Nanos) {
@@ -501,7 +501,7 @@ impl Node {
     fn supervise(&mut self, cycle: BringUpCycle, shutdown_since: Option<Nanos>) {
         let now = cycle.now;
         if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
-            // A silent drive may still listen: it keeps its setpoints until the wish is disabled.
+            // A drive without feedback may still receive: it keeps its setpoints until the target is `Disabled`.
             self.power.note(BringUpFault::HeartbeatLost);
             if cycle.drive_target == DriveTarget::Disabled
                 && self.power.target_source() == TargetSource::Measured

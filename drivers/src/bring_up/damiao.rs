@@ -4,7 +4,7 @@
 //! Then its registers are compared with the settings, mode and watchdog written, and both looked at once more before
 //! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
 //! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
-//! All times are on the driver's patient clock, which stands still while the master itself is stalled.
+//! All times are on the driver's stall-free clock, which stands still while the master itself is stalled.
 use crate::bring_up::damiao_fault::{DamiaoFault, differs, register_object, status_code};
 use crate::bring_up::damiao_plan::{CONFIGURE, CheckResult, Job, MotorPlan, VERIFY};
 use crate::bring_up::fault::BringUpFault;
@@ -52,7 +52,7 @@ enum MotorStage {
     On,
     /// The disable command is sent until the motor says that it is not energised.
     Disable { since: Nanos },
-    /// Let go, or not as it was left; waits for the wish to be disabled.
+    /// Without torque, or not as it was left; waits for the drive target to be disabled.
     Gone,
     /// A register does not fit.
     Refused { code: u32, object: u32 },
@@ -201,7 +201,7 @@ impl Motor {
         if self.requested == Some(Request::Refresh) {
             self.requested = None;
         }
-        // Before the ranges were read nobody knows how it scales.
+        // Its scale is unknown before the ranges were read.
         let known = !matches!(
             self.stage,
             MotorStage::Observe { .. }
@@ -345,7 +345,7 @@ impl Motor {
 
     fn ready(&mut self, now: Nanos, status: Option<u8>, rises: bool) -> Option<Request> {
         if status == Some(STATUS_ENABLED) {
-            // Somebody else has energised it.
+            // Another master has energised it.
             self.stage = MotorStage::Unowned;
             return None;
         }
@@ -413,7 +413,7 @@ impl Motor {
         }
         self.sent_rad = self.measured.position_rad;
         self.stage = MotorStage::Enable { since: now, next: now };
-        // A command without gains first: whatever the motor was told before, it is not taken up.
+        // A command without gains first: an earlier command of the motor must not take effect.
         self.command(target, 0.0)
     }
 
@@ -463,7 +463,7 @@ impl Motor {
             }
         }
         if age(now, self.measured_at) >= NO_REPLY.0 {
-            // A silent motor may still listen: it gets its commands until the wish is disabled.
+            // A motor without feedback may still receive: it gets its commands until the target is `Disabled`.
             self.fault.get_or_insert(DamiaoFault::NoReply);
         }
         let ramped = |since| ratio(age(now, since), self.plan.ramp_ns());

@@ -21,7 +21,7 @@ pub enum DamiaoFault {
     EnableTimeout = BASE | FINDING | 0x04,
     /// The command lay too far from the measured position to energise it.
     CommandFar = BASE | FINDING | 0x05,
-    /// It let go by itself.
+    /// It disabled itself.
     DroppedOut = BASE | FINDING | 0x06,
     /// It fell silent while it was in use.
     NoReply = BASE | FINDING | 0x07,

@@ -1,4 +1,4 @@
-//! Bring-up: from a silent node to a configured, and at wish energised, drive.
+//! Bring-up: from an unknown node to a configured and, on request, energised drive.
 //!
 //! State machines without I/O, advanced once a cycle by their protocol's driver.
 pub(crate) mod adopt;

@@ -1,4 +1,4 @@
-//! What a node is found to be when it is looked at, before anything is written: silent, off, ours, or somebody else's.
+//! What a node is found to be when it is looked at, before anything is written: without feedback, off, ours, or of another master.
 use crate::bring_up::adopt::Finding;
 use crate::bring_up::cia402::{DriveSetpoint, Node, NodeStage, OBSERVE_AGAIN, OBSERVE_MIN};
 use crate::bring_up::fault::BringUpFault;

@@ -187,7 +187,7 @@ impl NodePlan {
         steps.write(object::INTERPOLATION_EXPONENT, SdoBytes::from_i8(self.interpolation.1));
         steps.write_optional(object::SYNC_PERIOD_US, SdoBytes::from_u32(self.period_us));
         match self.reaction {
-            // A drive that cannot be told to hold would let a joint fall that may not: it is refused.
+            // A drive that cannot be configured to hold would drop a joint that may not fall: it is refused.
             Reaction::Hold => {
                 steps.write(object::QUICK_STOP_OPTION, SdoBytes::from_i16(QUICK_STOP_THEN_HOLD));
             }

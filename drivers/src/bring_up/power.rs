@@ -1,8 +1,8 @@
 //! Energising and de-energising one operational drive: which controlword is right for which statusword.
 //!
-//! Everything follows from the newest statusword and the wish; the enable command is sent only to a drive whose own
-//! last word was "switched on" or "operation enabled". Enabling begins only on the change of the wish from disabled
-//! to enabled: a drive that drops out by itself is never energised again by a wish that merely stays.
+//! Everything follows from the newest statusword and the drive target; the enable command is sent only to a drive whose own
+//! last word was "switched on" or "operation enabled". Enabling begins only on the change of the target from disabled
+//! to enabled: a drive that drops out by itself is never energised again by an unchanged target.
 use crate::bring_up::fault::BringUpFault;
 use crate::codec::cia402_words::{
     CONTROL_ENABLE, CONTROL_FAULT_RESET, CONTROL_OFF, CONTROL_QUICK_STOP, CONTROL_SHUTDOWN,
@@ -12,7 +12,7 @@ use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// Cycles for which 0 is sent before the rising edge of fault reset, so that a latched RPDO has surely passed.
 const RESET_LOW_CYCLES: u8 = 3;
-/// Answers in a row without "follows the target" that make a trouble.
+/// Answers in a row without "follows the target" that make a fault.
 const NOT_FOLLOWING_MAX: u8 = 3;
 
 /// What the drive last said, and when it may be trusted.
@@ -140,17 +140,17 @@ impl Power {
         }
     }
 
-    /// Keeps up with the wish while the drive is not operational, so that an old change does not energise it later.
+    /// Follows the target while the drive is not operational, so that an old change does not energise it later.
     pub fn watch(&mut self, drive_target: DriveTarget) {
         self.last_target = drive_target;
     }
 
-    /// Takes a trouble found elsewhere (heartbeat); the first one stays.
+    /// Takes a fault found elsewhere (heartbeat); the first one stays.
     pub fn note(&mut self, fault: BringUpFault) {
         self.fault.get_or_insert(fault);
     }
 
-    /// Forgets the trouble and, when the drive is in fault, starts the reset sequence.
+    /// Forgets the fault and, when the drive is in fault, starts the reset sequence.
     pub fn clear(&mut self, status: u16) {
         self.fault = None;
         self.not_following = 0;
@@ -210,7 +210,7 @@ impl Power {
             Phase::Enabling { .. } | Phase::TakingOver { .. } => DriveState::Enabling,
             Phase::On => DriveState::Enabled,
             Phase::Disabling { .. } => DriveState::Disabling,
-            // A quick stop that holds is energised, though nobody asked for it.
+            // A quick stop that holds is energised, without a request.
             Phase::Off if step == Some(DriveStep::QuickStopActive) => DriveState::Fault,
             Phase::Off if step == Some(DriveStep::OperationEnabled) => DriveState::Disabling,
             Phase::Off => DriveState::Disabled,
@@ -340,7 +340,7 @@ impl Power {
         if matches!(self.reset, Reset::High { .. }) {
             CONTROL_FAULT_RESET
         } else if step == Some(DriveStep::QuickStopActive) && drive_target == DriveTarget::Enabled {
-            // It may be holding a load: keep it in quick stop until the wish says otherwise.
+            // It may be holding a load: keep it in quick stop until the target changes.
             CONTROL_QUICK_STOP
         } else {
             CONTROL_OFF

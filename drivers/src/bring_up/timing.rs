@@ -14,11 +14,11 @@ pub struct Timeouts {
 /// What the master knows in a cycle, beside the drive itself.
 #[derive(Clone, Copy, Debug)]
 pub struct BringUpCycle {
-    /// Patient clock.
+    /// Time without our own stalls.
     pub now: Nanos,
-    /// The wish.
+    /// The drive target.
     pub drive_target: DriveTarget,
-    /// Another master was heard a short while ago.
+    /// A frame of another master was received recently.
     pub other_master: bool,
 }
 
@@ -44,7 +44,7 @@ impl StepTimer {
         let step = Nanos(u64::from(period_us) * 1_000 * STEP_PERIODS);
         Self { step, now: Nanos(0), ticked: None, other_master: None }
     }
-    /// One cycle at `time`, with this wish.
+    /// One cycle at `time`, with this drive target.
     pub fn tick(&mut self, time: Nanos, drive_target: DriveTarget) -> BringUpCycle {
         let passed = self.ticked.map_or(0, |then| time.0.saturating_sub(then.0));
         self.now = Nanos(self.now.0.saturating_add(passed.min(self.step.0)));

@@ -111,7 +111,7 @@ impl Cia402Driver {
     /// A driver for the CiA 402 servos of `settings.buses[bus]`; it may have none.
     ///
     /// # Errors
-    /// When the settings cannot be told to CANopen drives.
+    /// When the settings cannot be configured in CANopen drives.
     pub fn new(settings: &Settings, bus: usize) -> Result<Self, Cia402Error> {
         let buses = settings.buses.len();
         let Some(traffic) = settings.buses.get(bus).map(|bus| bus.traffic) else {
@@ -143,7 +143,7 @@ impl Cia402Driver {
             heartbeat_at: None,
             syncs: false,
         };
-        // Bounded where settings are read; a drive that was told 240 would be silent for as many cycles.
+        // Bounded where settings are read; a drive configured with 240 would not answer for as many cycles.
         let feedback_every = u8::try_from(traffic.feedback_every).unwrap_or(u8::MAX).clamp(1, 240);
         let nodes: Vec<u8> = mine().map(|(servo, _)| servo.node_id).collect();
         for (at, (servo, scale)) in mine().enumerate() {
@@ -203,7 +203,7 @@ impl Cia402Driver {
                 Group::Pair([first, second]) => {
                     let Ok([first, second]) = self.drives.get_disjoint_mut([first, second]) else { continue };
                     let repeats = send_schedule.repeats_control(number);
-                    // Its target comes with the other's: a drive must not be energised before both can be told.
+                    // Its target comes with the other's: a drive must not be energised before both can be commanded.
                     let together = first.node.commanded().is_some() && second.node.commanded().is_some();
                     let mut news = false;
                     for drive in [&mut *first, &mut *second] {
@@ -387,7 +387,7 @@ impl ServoDriver for Cia402Driver {
 }
 
 /// The frame that two drives share, when it is due and one of them works. The other's part repeats what that
-/// drive was last told; while nobody knows that, nothing is sent, for a drive that listens would go wherever it says.
+/// drive was last sent; while that is unknown, nothing is sent, because a receiving drive would follow it.
 fn push_shared(first: &mut Drive, second: &mut Drive, due: bool, out: &mut FrameBatch) {
     let works = [&*first, &*second].map(|drive| drive.control.is_some());
     let joints = [(works[0], first.joint), (works[1], second.joint)];
@@ -416,7 +416,7 @@ impl Drive {
         }
     }
 
-    /// The controlword of a drive whose target comes in a shared frame. True when the drive is told anything new: then
+    /// The controlword of a drive whose target comes in a shared frame. True when the drive gets anything new: then
     /// the target goes with it, so that a drive is never energised with an old one.
     fn push_control(
         &mut self,

@@ -74,7 +74,7 @@ impl JointMapping {
     }
 }
 
-/// One motor: the joint that it moves, where it is heard, and its newest feedback.
+/// One motor: the joint that it moves, its receiving identifier, and its newest feedback.
 #[derive(Clone, Debug)]
 struct MotorJoint {
     joint: usize,
@@ -98,7 +98,7 @@ impl DamiaoDriver {
     /// A driver for the Damiao servos of `settings.buses[bus]`; it may have none.
     ///
     /// # Errors
-    /// When the settings cannot be told to Damiao motors.
+    /// When the settings cannot be configured in Damiao motors.
     pub fn new(settings: &Settings, bus: usize) -> Result<Self, DamiaoError> {
         let Some(kind) = settings.buses.get(bus).map(|bus| bus.kind) else {
             return Err(DamiaoError::NoSuchBus { bus, buses: settings.buses.len() });

@@ -265,7 +265,7 @@ impl Request {
 pub const STATUS_DISABLED: u8 = 0x0;
 /// Status nibble of a motor that is energised.
 pub const STATUS_ENABLED: u8 = 0x1;
-/// Status nibble of a motor that has let go because no command came.
+/// Status nibble of a motor that has disabled itself because no command came.
 pub const STATUS_LOST_COMMUNICATION: u8 = 0xD;
 
 /// What the nibble says.

@@ -18,7 +18,7 @@ pub enum Group {
     Pair([usize; 2]),
 }
 
-/// Identifier of a frame that two drives share: that of the first one's second RPDO, which nobody else uses.
+/// Identifier of a frame that two drives share: that of the first one's second RPDO, which nothing else uses.
 #[must_use]
 pub const fn shared_cob_id(first_node: u8) -> CanId {
     cob(COB_RPDO1 + COB_PDO_STEP, first_node)

@@ -80,7 +80,7 @@ struct Packet {
 }
 
 /// Replaces the batch by what has arrived, oldest first. Packets that are no frames by their size are left out, and
-/// so are this socket's own. The end of a stream socket is [`LinkFault::Gone`], told at once if no frame came
+/// so are this socket's own. The end of a stream socket is [`LinkFault::Gone`], reported at once if no frame came
 /// before it, else by the next call.
 ///
 /// Real time: one system call, never waits.

@@ -16,7 +16,7 @@ const CONTROLLER: u32 = 0x004;
 const PROTOCOL: u32 = 0x008;
 /// `CAN_ERR_TRX`: transceiver, in data byte 4.
 const TRANSCEIVER: u32 = 0x010;
-/// `CAN_ERR_ACK`: nobody acknowledged.
+/// `CAN_ERR_ACK`: no node acknowledged.
 const NO_ACK: u32 = 0x020;
 /// `CAN_ERR_BUSOFF`.
 const BUS_OFF: u32 = 0x040;
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(ErrorFrame::of(&CanFrame::classic(CanId::standard(0x040), &[0; 8])), None);
     }
 
-    /// Goal: whatever somebody injects, there is a sentence and a cure; nothing panics and nothing is cut wrong.
+    /// Goal: any injected frame has a message and a remedy; nothing panics and nothing is cut wrong.
     #[test]
     fn error_frame_of_any_bits_has_words() {
         let mut state = 0x9E37_79B9_7F4A_7C15_u64;

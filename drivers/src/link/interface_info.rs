@@ -1,6 +1,6 @@
 //! What the kernel says of an interface, asked by netlink before a link is opened.
 //!
-//! The kind matters: a bus declared virtual has no bit rate, so nobody has checked its load; behind an adapter that
+//! The kind matters: a bus declared virtual has no bit rate, so its load was not checked; behind an adapter that
 //! looks virtual (slcan has no parent device either) there would be real drives. Only the kernel's own word counts.
 use super::open::OpenError;
 use neli::consts::nl::NlmF;

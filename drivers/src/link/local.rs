@@ -169,7 +169,7 @@ impl LocalServos {
             .lock("servos")?
             .map_err(|holder| OpenError::ServosPresent { interface: meeting.interface.clone(), holder })?;
         let path = meeting.socket();
-        // Under the lock nobody listens there: what is left was left by servos that were killed.
+        // Under the lock no process listens there: what is left was left by servos that were killed.
         match std::fs::remove_file(&path) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(OpenError::File { path, doing: "remove the stale", source });

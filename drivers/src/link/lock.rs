@@ -15,7 +15,7 @@ use std::path::Path;
 /// The right to be master of a SocketCAN interface, held until dropped.
 #[derive(Debug)]
 pub(super) struct InterfaceLock {
-    // The bound name is the lock; nobody is ever accepted.
+    // The bound name is the lock; no connection is ever accepted.
     _name: UnixListener,
 }
 

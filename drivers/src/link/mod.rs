@@ -21,7 +21,7 @@ pub use open::{Holder, LinkChoice, LinkRole, OpenError, open};
 /// Why a link did not take, or give, frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LinkFault {
-    /// ENOBUFS or EAGAIN: nobody takes frames from the queue.
+    /// ENOBUFS or EAGAIN: no frame leaves the queue.
     #[error("transmit queue full; are the drives powered and is the bus terminated?")]
     QueueFull,
     /// ENETDOWN: the interface is down.

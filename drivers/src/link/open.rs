@@ -186,7 +186,7 @@ pub enum OpenError {
         /// Who.
         holder: Holder,
     },
-    /// Nobody owns the local link's meeting point.
+    /// No process owns the local link's meeting point.
     #[error(
         "nothing serves the local link {interface} ({path}); start the simulated servos first: taustream-servosim"
     )]

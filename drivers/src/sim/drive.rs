@@ -54,7 +54,7 @@ pub struct DriveParameters {
     /// Time without setpoints after which the watchdog reacts while energised; 0 is never.
     pub watchdog_ms: u16,
     /// How it reacts: `Hold` says so (EMCY 0x8250, warning bit) and holds the last setpoint, following again when
-    /// setpoints return; `Ramp` is the fault reaction 0x605E, as shipped a ramp and then no torque; `Limp` lets go.
+    /// setpoints return; `Ramp` is the fault reaction 0x605E, as shipped a ramp and then no torque; `Limp` removes the torque.
     pub reaction: Reaction,
     /// Time from power-up, or a reset, to the boot-up message.
     pub boot_s: f64,

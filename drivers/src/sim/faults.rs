@@ -6,14 +6,14 @@ use std::fmt;
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
-    /// The drive's connector is off: it neither sends nor hears.
+    /// The drive's connector is off: it neither sends nor receives.
     Silence,
     /// What it sends comes this much later.
     Delay {
         /// How much.
         by_s: f64,
     },
-    /// Each of its frames, sent or heard, is lost with this probability.
+    /// Each of its frames, sent or received, is lost with this probability.
     Drop {
         /// 0 to 1.
         probability: f64,

@@ -152,7 +152,7 @@ fn communication(node: u8, all: &mut Vec<Spec>) {
         Spec::ro(0x1016, 0, Kind::U8, i64::from(CONSUMERS)),
         Spec::rw(0x1017, 0, Kind::U16, 0),
         Spec::ro(0x1018, 0, Kind::U8, 4),
-        Spec::ro(0x1018, 1, Kind::U32, 0), // No vendor has this number: nobody mistakes it for a real drive.
+        Spec::ro(0x1018, 1, Kind::U32, 0), // No vendor has this number: it cannot be mistaken for a real drive.
         Spec::ro(0x1018, 2, Kind::U32, 0x0000_5451),
         Spec::ro(0x1018, 3, Kind::U32, 0x0001_0000),
         Spec::ro(0x1018, 4, Kind::U32, id),

@@ -137,7 +137,7 @@ impl SdoServer {
         size: Option<u32>,
         objects: &mut impl Objects,
     ) -> SdoResponse {
-        // An object that is not there is refused at once; all else is judged by the whole value.
+        // An object that is not there is refused at once; all else is checked by the whole value.
         if let Err(code @ (error_text::ABORT_NO_OBJECT | error_text::ABORT_NO_SUBINDEX)) =
             objects.read(address)
         {

@@ -47,7 +47,7 @@ struct Port {
 /// Counts of a whole run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Served {
-    /// Frames heard.
+    /// Frames received.
     pub received: u64,
     /// Frames sent.
     pub sent: u64,
@@ -265,7 +265,7 @@ impl Server {
 }
 
 impl Port {
-    /// Sends what there is; frames that are not taken are lost, as on a bus that nobody listens to.
+    /// Sends what there is; frames that are not taken are lost, as on a bus without receivers.
     fn send(&mut self, frames: &[CanFrame]) -> u64 {
         let mut count = 0;
         for chunk in frames.chunks(BATCH_MAX) {
@@ -345,7 +345,7 @@ impl CommandSource for StandardInput {
     }
 }
 
-/// A line for whoever listens; nobody listening is no reason to stop.
+/// A line for readers; without readers it is dropped.
 fn say(line: &str) {
     let mut stdout = std::io::stdout().lock();
     let _nobody_listens = writeln!(stdout, "{line}").and_then(|()| stdout.flush());

@@ -1,6 +1,6 @@
 //! The `[simulator]` section of a settings file: what the simulated drives and their mechanics are made of.
 //!
-//! Every key has a default, because nothing here moves metal. A key for joints takes one value for all of them or one
+//! Every key has a default, because nothing here moves an arm. A key for joints takes one value for all of them or one
 //! a joint, base to tip. Every fault of the section is reported at once.
 use super::controller::LoopParameters;
 use super::drive::DriveParameters;
@@ -66,7 +66,7 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
 /// A few cycles of a six-joint arm: enough for a burst, and an overload shows within a tenth of a second.
 const QUEUE_FRAMES: u32 = 64;
 
-/// Every key, for unknown ones to be found, and for their neighbours to be told.
+/// Every key, for unknown ones to be found, and for the nearest known key to be named.
 const KEYS: [&str; 31] = [
     "bus_queue_frames",
     "dummy_mapping",

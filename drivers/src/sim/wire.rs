@@ -17,7 +17,7 @@ use taustream_arm::bus_load::frame::BitRates;
 const MAILBOX_FRAMES: usize = 2;
 /// Drives' frames that wait on a bus, over all mailboxes: more than any arm's drives have between them.
 const MAILBOXES_MAX: usize = 256;
-/// The load is also told for the fullest such stretch of time.
+/// The load is also given for the fullest such stretch of time.
 const WINDOW_NS: u64 = 100_000_000;
 
 /// Who sends a frame.
@@ -169,7 +169,7 @@ impl Wire {
         }
     }
 
-    /// The next frame whose end comes by `until`; call again until there is none. Whoever hears it may offer its answer
+    /// The next frame whose end comes by `until`; call again until there is none. Its receivers may offer its answer
     /// at the time of its end before the next call.
     pub fn next_by(&mut self, until: Nanos) -> Option<Delivered> {
         self.begin(until);
@@ -188,7 +188,7 @@ impl Wire {
         passing.or_else(|| (!self.master.is_empty() || !self.drives.is_empty()).then_some(self.free_at))
     }
 
-    /// Arbitration, when the wire is free by `until` and somebody waits.
+    /// Arbitration, when the wire is free by `until` and a frame waits.
     fn begin(&mut self, until: Nanos) {
         if self.passing.is_some() {
             return;

@@ -81,7 +81,7 @@ fn bring_up_configures_the_declared_reaction() {
     );
 }
 
-/// A joint that must hold is not left to a drive that cannot be told to; one that may fall is.
+/// A joint that must hold is refused on a drive that cannot hold; one that may fall is accepted.
 #[test]
 fn bring_up_of_a_drive_without_quick_stop_option_is_refused_where_it_must_hold() {
     let mut settings = settings(2);
@@ -296,13 +296,13 @@ fn observing_finds_an_energised_drive_and_leaves_it_untouched() {
         let words = explain_refusal(bench.status(0).error_code, bench.status(0).refused_object);
         assert!(words.starts_with("object 0x") && words.contains("torque-off"), "{words}");
 
-        // The same wish that the others follow does not reach it.
+        // The target that the others follow does not reach it.
         bench.hold();
         bench.drive_target = DriveTarget::Enabled;
         bench.steps(200);
         assert!(only_read(&bench), "only read");
 
-        // The emergency does, at once and by SDO, because nobody knows its process data.
+        // The emergency does, at once and by SDO, because its process data is unknown.
         bench.drive_target = DriveTarget::TorqueOff;
         bench.step();
         assert!(

@@ -1,4 +1,4 @@
-//! Counts and angles: the one formula that turns setpoints into what a drive is told.
+//! Counts and angles: the one formula that turns setpoints into what a drive is sent.
 use super::SeededRng;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, rad_from_counts};

@@ -185,7 +185,7 @@ fn drop_out_of_a_drive_shows_and_is_never_energised_again_by_the_unchanged_targe
         for _ in 0..300 {
             bench.step();
             let control = bench.rpdo(0).unwrap().0;
-            // A quick stop that holds a load is kept; everything else is let go.
+            // A quick stop that holds a load is kept; everything else is de-energised.
             let allowed = if status == QUICK_STOP { 0x0002 } else { 0x0000 };
             assert_eq!(control, allowed, "statusword {status:#06x}");
         }
@@ -284,7 +284,7 @@ fn heartbeat_lost_is_a_fault_yet_the_drive_is_still_commanded() {
         counts_from_rad(&CountScale::of(&bench.settings.servos[0]).unwrap(), bench.commands[0].position_rad);
     assert_eq!(bench.rpdo(0), Some((0x000F, wanted)));
 
-    // Disabled by wish: voltage off is sent, then the node is absent, and it is taken again when it returns.
+    // Disabled on request: voltage off is sent, then the node is absent, and it is taken again when it returns.
     bench.drive_target = DriveTarget::Disabled;
     bench.steps(6_000);
     assert_eq!(bench.status(0).state, DriveState::Absent);

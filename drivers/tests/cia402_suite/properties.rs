@@ -3,7 +3,7 @@ use super::{Bench, ENABLED, FAULT, FOLLOWS, QUICK_STOP, READY, SWITCH_ON_DISABLE
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad};
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
-/// What one setpoint is judged by.
+/// What one setpoint is checked by.
 #[derive(Clone, Copy)]
 struct Setpoint {
     drive_target: DriveTarget,

@@ -93,7 +93,7 @@ fn motor_that_scales_otherwise_is_refused_with_register_and_value() {
         arm.steps(600);
         assert_eq!(arm.status(1).state, DriveState::Disabled, "its neighbours come up");
         assert!(arm.status(2).position_rad.is_nan(), "nobody knows what it says");
-        // A wish to enable does not move a refused motor.
+        // A target of enabled does not move a refused motor.
         arm.drive_target = DriveTarget::Enabled;
         arm.steps(500);
         assert_eq!((arm.status(2).state, arm.nibble(2)), (DriveState::Refused, 0));
@@ -187,7 +187,7 @@ fn motors_on_an_fd_bus_are_spoken_to_in_fd_frames_with_bit_rate_switch() {
     assert_eq!(arm.sent.len(), 6);
     let fd8 = |frame: &CanFrame| frame.is_fd() && frame.data().len() == 8;
     assert!(arm.sent.iter().all(fd8) && arm.arriving.iter().all(fd8), "both ways");
-    // A classic motor does not hear them.
+    // A classic motor does not receive them.
     let mut other_format = Arm::with(settings, |setup| motor_of(setup).wire = Wire::Classic);
     other_format.steps(500);
     assert_eq!(other_format.states(), [DriveState::Absent; 6]);

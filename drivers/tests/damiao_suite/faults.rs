@@ -142,7 +142,7 @@ fn bus_that_starts_over_looks_again_before_it_says_anything() {
     assert_eq!(arm.states(), [DriveState::Absent; JOINTS]);
     arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::EnergisedUnowned);
-    // Nobody commands them now: their own watchdogs let go, and that is told before anything is cleared.
+    // They get no commands now: their own watchdogs disable them, which is reported before anything is cleared.
     arm.until(DriveState::Fault);
     arm.clear_faults();
     arm.enable();

@@ -119,7 +119,7 @@ fn frames_are_those_of_an_independent_library() {
     assert!(most && kinds.len() == 12, "{kinds:?}");
 }
 
-/// Every kind of line, doctored by one digit of its frame, is noticed.
+/// Every kind of line, corrupted by one digit of its frame, is noticed.
 #[test]
 fn frame_that_differs_by_one_digit_is_noticed() {
     let mut tried = std::collections::BTreeSet::new();

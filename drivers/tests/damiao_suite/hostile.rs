@@ -1,4 +1,4 @@
-//! Frames that nobody should send: nothing panics, nothing moves, nothing is believed that is not the motor's.
+//! Frames that should never be sent: nothing panics, nothing moves, nothing is believed that is not the motor's.
 use super::{Arm, JOINTS, edited};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use taustream_drivers::codec::damiao_frames::{Reply, Request, Special, Wire};
@@ -50,7 +50,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Not one frame of a stranger energises a motor that the wish keeps off.
+    /// Not one frame of another master energises a motor that the target keeps off.
     #[test]
     fn master_energises_nothing_whatever_it_receives(received in proptest::collection::vec(frames(), 1..400)) {
         let mut arm = Arm::new();
@@ -92,7 +92,7 @@ proptest! {
     }
 }
 
-/// Feedback of a motor that nobody asked for, with every status: it is watched, and nothing is switched on for it.
+/// Feedback of a motor without a request, with every status: it is watched, and nothing is switched on for it.
 #[test]
 fn forged_feedback_never_makes_the_master_energise() {
     for status in 0..16_u8 {

@@ -77,7 +77,7 @@ impl Arm {
         }
     }
 
-    /// The same without brakes: what lets go falls.
+    /// The same without brakes: a joint without torque falls.
     pub(crate) fn without_brakes(settings: Settings) -> Self {
         Self::with(settings, |setup| setup.parameters.plant_mut().brake = false)
     }
@@ -132,7 +132,7 @@ impl Arm {
         panic!("joint {joint} is not {state:?} but {:?}: {}", self.status(joint).state, self.why(joint));
     }
 
-    /// What an operator would be told of a servo.
+    /// What an operator reads about a servo.
     pub(crate) fn why(&self, joint: usize) -> String {
         let status = self.status(joint);
         taustream_drivers::bring_up::explain_refusal(status.error_code, status.refused_object)

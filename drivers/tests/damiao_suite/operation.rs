@@ -45,7 +45,7 @@ fn gains_rise_from_nothing_in_proportion_over_the_ramp() {
     assert_eq!(arm.states(), [DriveState::Enabled; JOINTS]);
 }
 
-/// A limp joint is caught where it is, whatever the motor was told by somebody before us.
+/// A limp joint is caught where it is, whatever an earlier master commanded.
 #[test]
 fn old_command_with_full_gains_is_not_taken_up_when_the_motor_is_energised() {
     let mut arm = Arm::new();
@@ -189,7 +189,7 @@ fn disabling_removes_torque_and_torque_off_does_so_in_the_same_cycle_from_every_
         }
         arm.steps(5);
         assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0), "{cycles} cycles after enable");
-        // The wish that comes back does not energise anything by itself.
+        // The returning target does not energise anything by itself.
         arm.drive_target = DriveTarget::Enabled;
         arm.steps(300);
         assert!((0..JOINTS).all(|joint| arm.nibble(joint) == 0), "{cycles} cycles after enable");

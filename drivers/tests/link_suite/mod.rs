@@ -116,7 +116,7 @@ pub(crate) fn largest_batch_takes_one_call_each_way(bench: &dyn Bench) {
     assert_eq!(receive_all(servos.as_mut(), sent.count), &flood[..sent.count]);
 }
 
-/// Goal: an end hears nothing when nothing was sent, and never itself.
+/// Goal: an end receives nothing when nothing was sent, and never its own frames.
 pub(crate) fn silence_and_own_frames_are_not_received(bench: &dyn Bench) {
     let (mut master, mut servos) = pair(bench);
     let mut batch = FrameBatch::new();
@@ -132,7 +132,7 @@ pub(crate) fn silence_and_own_frames_are_not_received(bench: &dyn Bench) {
     assert!(batch.frames().is_empty(), "the servos heard themselves: {:?}", batch.frames());
 }
 
-/// Goal: when nobody takes frames, sending says so, at once and with a true count; afterwards it works again.
+/// Goal: when the queue is full, sending reports it, at once and with a true count; afterwards it works again.
 pub(crate) fn full_queue_is_reported_and_passes(bench: &dyn Bench) {
     let (mut master, mut servos) = pair(bench);
     bench.block();
@@ -161,7 +161,7 @@ pub(crate) fn full_queue_is_reported_and_passes(bench: &dyn Bench) {
     assert_eq!(receive_all(servos.as_mut(), 1), [numbered(9)]);
 }
 
-/// Goal: a bus that has vanished is told by both calls, stays told, and comes back by `reopen` alone.
+/// Goal: a bus that has vanished is reported by both calls, stays reported, and comes back by `reopen` alone.
 pub(crate) fn lost_bus_is_gone_until_reopened(bench: &dyn Bench) {
     let (mut master, servos) = pair(bench);
     bench.lose(servos);

@@ -62,7 +62,7 @@ fn assert_still(arm: &Arm, rest: &[(f64, f64); 6], when: &str) {
 }
 
 /// Goal: whatever the drives have done meanwhile (gone on holding, held by their watchdog, stopped quickly), a new
-/// master finds them by reading, keeps them without a jump, and moves them only when it is wished.
+/// master finds them by reading, keeps them without a jump, and moves them only on request.
 #[test]
 fn drives_that_hold_are_adopted_by_reading_and_kept_without_a_jump() {
     for (ms, state) in [
@@ -121,7 +121,7 @@ fn drives_that_hold_are_adopted_by_reading_and_kept_without_a_jump() {
     }
 }
 
-/// Goal: torque that nobody kept is given up in order, from either hold, when the operator says so.
+/// Goal: torque that is not kept is removed in order, from either hold, when the operator says so.
 #[test]
 fn adopted_drives_are_de_energised_on_request() {
     for ms in [40, 3_000] {
@@ -155,7 +155,7 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
             arm.cycle(DriveTarget::Disabled);
             assert!(only_reads(&arm.sent), "{object}: {:?}", arm.sent);
         }
-        // Nor does a wish to keep, or to enable, touch it.
+        // Nor does a target of `Keep` or `Enabled` change it.
         for drive_target in [DriveTarget::Keep, DriveTarget::Enabled, DriveTarget::Disabled] {
             for _ in 0..200 {
                 arm.cycle(drive_target);
@@ -181,7 +181,7 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
     }
 }
 
-/// Goal: a wish that turns from keeping back to keeping while drives are being taken over leaves them holding.
+/// Goal: a target that returns to `Keep` while drives are being adopted leaves them holding.
 #[test]
 fn taking_over_that_is_called_off_leaves_the_drives_holding() {
     let mut arm = orphaned(Reaction::Hold, 3_000);

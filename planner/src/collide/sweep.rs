@@ -69,7 +69,7 @@ impl SweepRules {
     /// For the final proof.
     pub const PROOF: Self =
         Self { extra_m: 0.0, resolution_m: 1e-6, checks_max: 400_000, bracket_m: 1e-3, first_contact: true };
-    /// For the way out of the margin, which begins at its edge: as fine as the proof.
+    /// For the exit path from the margin, which begins at its edge: as fine as the proof.
     pub const MARGIN_EXIT: Self = Self {
         extra_m: 0.0,
         resolution_m: 1e-6,
@@ -219,7 +219,7 @@ impl State<'_> {
         bound_m > keep_m && bound_m >= self.found.sampled_m - self.rules.bracket_m
     }
 
-    /// Goes on in the halves, the earlier one first: the first contact in time is what users are told.
+    /// Goes on in the halves, the earlier one first: the first contact in time is reported.
     fn descend(
         &mut self,
         [from, middle, to]: [f64; 3],

@@ -1,7 +1,7 @@
 //! Motions that were made elsewhere become strokes: tables of positions, and the papers' other profiles.
 //!
 //! A motion is smoothed by a kernel ([`taustream_motion::smoothing`]), slowed down by one factor where that does not keep the
-//! motion limits, held against the original along its whole length, and then verified like every other motion. A Tau-J*
+//! motion limits, compared with the original along its whole length, and then verified like every other motion. A Tau-J*
 //! whose 1/k is a whole number is written down as it is.
 mod deviation;
 mod fit;

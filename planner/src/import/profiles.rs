@@ -33,7 +33,7 @@ pub enum ViaProfile {
 /// Why there is no such profile.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProfileError {
-    /// A name that nobody has.
+    /// A name that is not in use.
     #[error("there is no profile named \"{name}\"; there are {}", ViaProfile::NAMES.join(", "))]
     Unknown {
         /// The name that was asked for.

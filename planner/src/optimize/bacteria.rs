@@ -7,7 +7,7 @@
 //!
 //! Source: Passino, "Biomimicry of Bacterial Foraging", IEEE Control Systems Magazine 22(3), 2002, and
 //! Wang et al. (2022), algorithm 1, eq. 3.1 to 3.4. Read as: swarming per bacterium over all bacteria (eq. 3.3 sums over the index
-//! that it also judges); round(survivors * decay) of at least one, refilled in their order; points are clamped to
+//! that it also evaluates); round(survivors * decay) of at least one, refilled in their order; points are clamped to
 //! the bounds; the cost is calculated again after every step of a swim (the algorithm's line 14 does not say so).
 //! Bacteria move one after another, each in the field of the others where they are by then, so that this is the one
 //! family that cannot be evaluated as a batch.
@@ -109,7 +109,7 @@ impl Parameters {
 /// Who cannot be dispersed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exempt {
-    /// Nobody (BFOA).
+    /// None (BFOA).
     Nobody,
     /// The first of the list sorted by health (IBFOA as printed), which need not be the best one now.
     Healthiest,
@@ -125,7 +125,7 @@ pub(super) trait Heading {
     fn born(&self, at: &Agent) -> Self::Memory;
     /// A unit vector, or nothing but zeros.
     fn turn(&self, bacterium: &mut Bacterium<Self::Memory>, session: &mut Session) -> Vec<f64>;
-    /// Told after every step.
+    /// Called after every step.
     fn moved(&self, _bacterium: &mut Bacterium<Self::Memory>) {}
     /// Where it drifts after a step of chemotaxis of all; `None` when it stays.
     fn drift(&self, _bacterium: &mut Bacterium<Self::Memory>, _session: &mut Session) -> Option<Vec<f64>> {

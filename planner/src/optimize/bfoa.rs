@@ -15,7 +15,7 @@ use super::{Optimizer, Reading, Setup};
 pub struct Bfoa {
     /// Its numbers.
     pub parameters: Parameters,
-    /// Who is exempt from dispersal; Passino exempts nobody.
+    /// Who is exempt from dispersal; Passino exempts none.
     pub exempt: Exempt,
     /// True when a step that worsens is taken back.
     pub greedy: bool,

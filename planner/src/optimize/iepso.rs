@@ -99,7 +99,7 @@ impl Iepso {
     fn replace(&self, session: &mut Session, swarm: &mut [Particle]) -> Result<(), End> {
         let mut by_cost: Vec<usize> = (0..swarm.len()).collect();
         by_cost.sort_by(|a, b| swarm[*b].at.cost.total_cmp(&swarm[*a].at.cost));
-        // Somebody stays, however small the swarm is.
+        // At least one stays, however small the swarm is.
         by_cost.truncate(self.replaced.min(swarm.len() - 1));
         let points = by_cost.iter().map(|_| session.random_point()).collect();
         for (i, at) in by_cost.into_iter().zip(session.weigh(points)?) {

@@ -108,7 +108,7 @@ pub const METHODS: &[Method] = &[
     method!("iwo", "invasive weeds (Mehrabian and Lucas 2006)", Iwo::set_up),
 ];
 
-/// A name that nobody has.
+/// A name that is not in use.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no optimiser named \"{name}\"; there are {}", names())]
 pub struct Unknown {

@@ -1,6 +1,6 @@
 //! Uniform random sampling: what every method has to beat.
 //!
-//! Not registered: nobody plans with it on purpose. Claims about methods are held against it.
+//! Not registered: not for planning. Claims about methods are compared with it.
 //!
 //! Random numbers: a population, and another.
 use super::Optimizer;

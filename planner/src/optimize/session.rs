@@ -17,7 +17,7 @@ pub struct Run<'a> {
     pub guesses: &'a [Vec<f64>],
     /// Asked before every batch of evaluations; true ends the run.
     pub is_over: &'a dyn Fn() -> bool,
-    /// Told after every iteration.
+    /// Called after every iteration.
     pub watch: &'a mut dyn FnMut(&Progress),
 }
 

@@ -110,7 +110,7 @@ impl Ssa {
 
     fn produce(&self, session: &mut Session, x: &[f64], alarm: f64, rank: f64) -> Vec<f64> {
         if alarm < self.safety {
-            // In (0, 1]: nobody divides by nothing.
+            // In (0, 1]: no division by zero.
             let alpha = 1.0 - session.rng.unit();
             let shrink = (-rank / (alpha * self.schedule.iterations as f64)).exp();
             x.iter().map(|x| x * shrink).collect()

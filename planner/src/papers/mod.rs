@@ -1,7 +1,7 @@
 //! What the five papers (docs/papers.md) optimise: their benchmark functions, arms, objectives and scenes.
 //!
 //! The methods are in [`crate::optimize`]; here are the problems they are tried on, and the papers' own ways of using
-//! them. Nothing here moves an arm: motions for metal come from [`crate::plan()`].
+//! them. Nothing here moves an arm: motions for a real arm come from [`crate::plan()`].
 pub mod benchmarks;
 pub mod control_point_count;
 pub mod control_points;

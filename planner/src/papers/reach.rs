@@ -18,7 +18,7 @@ pub struct Reward {
     pub threshold_m: f64,
     /// Where the inner reward begins, s.
     pub inner_m: f64,
-    /// The largest error that is told from larger ones, `e_max`.
+    /// The largest error that is distinguished from larger ones, `e_max`.
     pub error_max_m: f64,
     /// Highest punishment, K.
     pub punishment: f64,

@@ -13,7 +13,7 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Evaluations a try: the paper's population for fifty generations. From there polishing is quicker.
 pub(super) const EVALUATIONS: usize = 2_000;
-/// Share of the reach below which the tip is near: farther away nobody asks what the arm touches.
+/// Share of the reach below which the tip is near: farther away contacts are not evaluated.
 const NEAR: f64 = 0.1;
 /// What touching costs: between the punishments of 0.1 and of 0.3 of the reach, and far above any way's time.
 const TOLL: [f64; 2] = [100.0, 200.0];

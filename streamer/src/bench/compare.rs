@@ -1,7 +1,7 @@
 //! Several arms side by side in one run: what one settings file's cycle costs beside another's.
 //!
 //! Each round gives every arm a slice, so that all meet the same machine. An arm's links are opened for its slice and
-//! closed behind it: two arms may name the same interface, and no socket of one hears the frames of the other.
+//! closed behind it: two arms may name the same interface, and no socket of one receives the frames of the other.
 use super::{
     Bench, BenchError, BenchOptions, Quantiles, Times, WARM_UP, on_the_real_time_thread, quantiles, ratio,
 };

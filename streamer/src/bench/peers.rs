@@ -1,4 +1,4 @@
-//! The far ends of the bench's links: somebody must take what a local link carries, or its queue fills up.
+//! The far ends of the bench's links: a receiver must take what a local link carries, or its queue fills up.
 #![expect(clippy::disallowed_methods, reason = "the far end is not the real-time thread and may sleep")]
 use super::{BenchError, BenchOptions};
 use std::path::PathBuf;
@@ -82,7 +82,7 @@ impl Peers {
         {
             tracing::warn!("the far end of the bench's link has panicked");
         }
-        // Nothing but the bench's own sockets lies there; a leftover harms nobody.
+        // Nothing but the bench's own sockets lies there; a leftover is harmless.
         let _ = std::fs::remove_dir_all(&self.runtime);
     }
 }

@@ -26,7 +26,7 @@ pub struct WakeUps {
     pub period_us: u32,
     /// Ran at real-time priority with locked memory.
     pub realtime: bool,
-    /// Rights that were missing, with their cures.
+    /// Rights that were missing, with their remedies.
     pub missing: Vec<String>,
     /// How late.
     pub lateness: Quantiles,

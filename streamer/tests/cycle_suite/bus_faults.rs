@@ -6,10 +6,10 @@ use taustream_messages::{BusFault, Command, FaultReason, Phase};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::names::Names;
 
-/// Plants a trouble in a moving arm.
+/// Plants a fault in a moving arm.
 type Plant = fn(&mut CycleHarness);
 
-/// What plants each trouble.
+/// What plants each fault.
 const BUS_FAULTS: [(BusFault, Plant); 7] = [
     (BusFault::QueueFull, |harness| harness.script(|w| w.link_fault = Some(LinkFault::QueueFull))),
     (BusFault::System, |harness| harness.script(|w| w.link_fault = Some(LinkFault::Os(22)))),
@@ -20,7 +20,7 @@ const BUS_FAULTS: [(BusFault, Plant); 7] = [
     (BusFault::Restarted, |harness| harness.script(|w| w.error_frame = Some(0x100))),
 ];
 
-/// Takes the trouble away, as whoever mends the bus does.
+/// Removes the fault, as a repair of the bus does.
 fn fix(harness: &CycleHarness) {
     harness.script(|w| (w.link_fault, w.error_frame, w.confirms) = (None, None, true));
 }
@@ -79,7 +79,7 @@ fn bus_fault_of_any_kind_stops_sending_until_the_bus_is_restarted_on_command() {
     }
 }
 
-/// Goal: a bus that is not mended is not cleared; the asker hears why from the link, and may ask again.
+/// Goal: a bus that is not fixed is not cleared; the answer has the reason, and the command may be repeated.
 #[test]
 fn bus_fault_whose_link_cannot_be_reopened_stays_and_can_be_asked_again() {
     let mut harness = CycleHarness::new();
@@ -132,7 +132,7 @@ fn bus_lost_while_disabled_is_a_fault_and_a_full_queue_is_not() {
     assert_eq!(harness.cause(), None);
 }
 
-/// Goal: torque off is the one wish that is tried on a failed bus, and does not bring setpoints back.
+/// Goal: torque off is the one target that is sent on a failed bus, and does not bring setpoints back.
 #[test]
 fn torque_off_is_tried_on_a_failed_bus() {
     let mut harness = CycleHarness::new();
@@ -249,7 +249,7 @@ fn drive_found_energised_after_a_bus_fault_is_reported_and_left_alone() {
 }
 
 /// Goal: whoever floods the bus with error frames, the same or ever new ones, does not flood the log; and what does not
-/// concern the course (overflow, warnings, a missing acknowledge) stops nobody.
+/// concern the course (overflow, warnings, a missing acknowledge) stops nothing.
 #[test]
 fn flood_of_error_frames_is_logged_a_few_times_a_second_and_stops_nothing() {
     let mut harness = CycleHarness::new();

@@ -139,8 +139,8 @@ fn unowned_drive_is_named_with_what_differs_and_what_to_do() {
     assert_eq!(harness.ask(Command::ClearFault).why, AnswerReason::Unowned { joint: 1 });
     assert!(matches!(harness.ask(Command::Enable).why, AnswerReason::ClearFirst));
     harness.run(50);
-    assert_eq!(drive_target(&harness), Some(DriveTarget::Disabled), "only an operator lets go");
-    // Whoever used it has ended and let go: the others, which hold, are adopted beside it.
+    assert_eq!(drive_target(&harness), Some(DriveTarget::Disabled), "only an operator de-energises");
+    // Whoever used it has ended without torque: the others, which hold, are adopted beside it.
     harness.script(|w| w.forced[1] = Some(DriveState::Disabled));
     harness.run(1);
     harness.accept(Command::ClearFault);

@@ -1,4 +1,4 @@
-//! Runs the scenarios of Damiao motors on a real vcan0 and judges their recordings. Meant to run inside the test machine.
+//! Runs the scenarios of Damiao motors on a real vcan0 and checks their recordings. Meant to run inside the test machine.
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};

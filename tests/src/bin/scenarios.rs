@@ -1,4 +1,4 @@
-//! Runs every scenario on a real vcan0 and judges every recording. Meant to run inside the test machine.
+//! Runs every scenario on a real vcan0 and checks every recording. Meant to run inside the test machine.
 use anyhow::{Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
@@ -102,7 +102,7 @@ fn is_off_by_a_stall(settings: &Settings, log: &Path) -> bool {
     in_turns && cycle_log::read(log).is_ok_and(|log| log.iter().any(stands_still))
 }
 
-/// Judges every bus of a recording.
+/// Checks every bus of a recording.
 fn check_all(settings: &Settings, recording: &str, log: &Path, losses: Losses) -> Result<CheckResult> {
     let log = cycle_log::read(log)?;
     let mut check_result = CheckResult::default();

@@ -43,7 +43,7 @@ pub fn make_ready() -> Result<Vec<String>> {
     let since = Instant::now();
     let (mut done, mut last) = (Vec::new(), String::new());
     while since.elapsed() < TIMEOUT {
-        // A streamer that is just being restarted answers nobody.
+        // A streamer that is just being restarted answers no request.
         let Ok(report) = status() else { continue };
         let command = match phase(&report) {
             "holding" => return Ok(done),
@@ -76,7 +76,7 @@ pub fn send_to(goal_rad: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// Waits until the arm holds at a pose. Where the host has stalled the machine the arm is paused, and resumed, aloud.
+/// Waits until the arm holds at a pose. Where the host has stalled the machine the arm is paused, and resumed with a message.
 ///
 /// # Errors
 /// When it does not get there, or faults.

@@ -73,7 +73,7 @@ fn perform(name: &str, check: impl Fn() -> Result<String>) -> bool {
     outcome.is_ok()
 }
 
-/// Checks that have to fail on units that were doctored.
+/// Checks that have to fail on units that were corrupted.
 const DOCTOR: [Check; 3] = [
     ("without a watchdog a stalled cycle is noticed as such", || {
         corrupted("taustream-streamer@arm1.service", "[Service]\nWatchdogSec=0\n")?;

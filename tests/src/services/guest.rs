@@ -4,7 +4,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// How long anything may take before it is called stuck. Generous: it bounds a hang, it judges no speed.
+/// How long anything may take before it is called stuck. Generous: it bounds a hang, it checks no speed.
 pub const TIMEOUT: Duration = Duration::from_secs(30);
 const LOOK: Duration = Duration::from_millis(50);
 

@@ -1,7 +1,7 @@
 //! The installed services under a real systemd: what is installed for the test, and what is tried in the guest.
 //!
 //! [`files`] makes a controller of the installed tree: settings, buses, enabled units. [`checks`] runs in the guest as
-//! root, after boot, and judges from outside: by systemctl, journalctl, /proc, and the command line as other users.
+//! root, after boot, and checks from outside: by systemctl, journalctl, /proc, and the command line as other users.
 pub mod arm;
 pub mod checks;
 pub mod files;
@@ -19,7 +19,7 @@ pub const STREAMER: &str = "taustream-streamer@arm1.service";
 pub const PLANNER: &str = "taustream-planner@arm1.service";
 /// Its servos.
 pub const SERVOSIM: &str = "taustream-servosim@arm1.service";
-/// Somebody who may command the arm.
+/// A user who may command the arm.
 pub const OPERATOR: &str = "olga";
-/// Somebody who may not.
+/// A user who may not.
 pub const STRANGER: &str = "stan";

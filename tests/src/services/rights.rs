@@ -84,7 +84,7 @@ pub fn operator() -> Result<String> {
     Ok(format!("{how:?}, replan and run"))
 }
 
-/// A stranger is told what to do, and comes no further.
+/// Another user gets the remedy, and no access.
 ///
 /// # Errors
 /// When the arm listens.

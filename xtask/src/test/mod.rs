@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
     ensure!(!chosen.is_empty(), "no step is called so; `cargo xtask test --list` shows them");
     let since = Instant::now();
     let place = Place::find()?;
-    // All of them before anything runs: nobody waits for a test to be told of the next package.
+    // All packages are named before anything runs.
     let needed: Vec<&str> = chosen.iter().flat_map(|step| step.packages.iter().copied()).collect();
     packages::ensure(&needed)?;
     if chosen.iter().any(|step| step.programs) {

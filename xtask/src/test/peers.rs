@@ -23,7 +23,7 @@ fn published_problems(root: &Path) -> PathBuf {
     env::var_os("TAUSTREAM_MBM_DIR").map_or_else(|| root.join("../shared/mbm"), PathBuf::from)
 }
 
-/// Somebody else's forward kinematics, in pinned versions, against ours.
+/// Independent forward kinematics, in pinned versions, against ours.
 fn kinematics(place: &Place) -> Result<Outcome> {
     let problems = published_problems(&place.root);
     let python = place.python("venv-kinematics", "kinematics-requirements.txt", &["--no-deps"])?;
@@ -49,7 +49,7 @@ fn walks(place: &Place) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// The optimisers against somebody else's library.
+/// The optimisers against an independent library.
 fn optimisers(place: &Place) -> Result<Outcome> {
     let python = place.python("venv-optimisers", "mealpy-requirements.txt", &[])?;
     let mut command = Command::new(python);

@@ -49,7 +49,7 @@ fn links(place: &Place) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Somebody else's CANopen master drives the simulated drives.
+/// An independent CANopen master drives the simulated drives.
 fn canopen_master(place: &Place) -> Result<Outcome> {
     let python = place.python("venv", "requirements.txt", &[])?;
     let mut command = place.in_machine("peers", &python)?;
@@ -59,7 +59,7 @@ fn canopen_master(place: &Place) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Somebody else's CANopen devices are brought up and moved by our own programs.
+/// Independent CANopen devices are brought up and moved by our own programs.
 fn canopen_devices(place: &Place) -> Result<Outcome> {
     let python = place.python("venv", "requirements.txt", &[])?;
     let mut command = place.in_machine("peers", &python)?;
@@ -69,7 +69,7 @@ fn canopen_devices(place: &Place) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Somebody else's master of Damiao motors drives the simulated ones.
+/// An independent master of Damiao motors drives the simulated ones.
 fn damiao_master(place: &Place) -> Result<Outcome> {
     let python = place.python("venv", "requirements.txt", &[])?;
     let mut command = place.in_machine("peers", &python)?;
@@ -91,12 +91,12 @@ fn scenarios(place: &Place, program: &str, further: &[&str]) -> Result<Outcome> 
     Ok(Outcome::Passed)
 }
 
-/// The cycle beside bare loops, for the record: figures of a shared machine are printed, not judged.
+/// The cycle beside bare loops, for the record: figures of a shared machine are printed, not checked.
 fn figures(place: &Place) -> Result<Outcome> {
     let figures: [(&str, &[&str]); 2] = [
-        ("figures of the cycle on a real vcan0 (not judged)", &["cycle", "--seconds", "8"]),
+        ("values of the cycle on a real vcan0 (not checked)", &["cycle", "--seconds", "8"]),
         (
-            "figures of two buses beside one on a real vcan (not judged)",
+            "values of two buses beside one on a real vcan (not checked)",
             &["compare", "vcan6", "dual-bus", "one-bus", "--seconds", "6"],
         ),
     ];
