@@ -1,4 +1,4 @@
-//! One collision shape as a core and a radius, and where it stands.
+//! One collision shape as a core and a radius, and its pose.
 use crate::closed_form::{segment_to_box_m, segment_to_segment_m};
 use crate::scene::Shape;
 use parry3d_f64::math::{Pose, Rot3, Vector};
@@ -44,7 +44,7 @@ pub struct Body {
     parry: Arc<dyn ParryShape>,
 }
 
-/// Where a body stands.
+/// The pose of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Posed {
     /// Of the core's axes.
@@ -110,7 +110,7 @@ impl Body {
         Self { core: Core::Segment(a, b), radius_m, local, centre: Vector::ZERO, bound_m, parry }
     }
 
-    /// Where the body stands when its frame does.
+    /// The pose of the body for a pose of its frame.
     #[must_use]
     pub fn placed(&self, frame: &Pose) -> Posed {
         let pose = *frame * self.local;

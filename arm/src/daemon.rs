@@ -24,7 +24,7 @@ const FEEDINGS: u32 = 4;
 pub fn start_log() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     let registry = tracing_subscriber::registry().with(filter);
-    // A second call changes nothing: the first log goes on.
+    // A second call changes nothing: the first log continues.
     let _first_goes_on = if let Some(journal) = journal() {
         registry.with(journal).try_init()
     } else {

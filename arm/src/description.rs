@@ -38,7 +38,7 @@ pub(crate) struct Description {
     pub(crate) payload: Option<Weight>,
     /// Gravity in the base's frame.
     pub(crate) gravity_m_s2: [f64; 3],
-    /// What the owner should know about the joints' limits, in words.
+    /// What the owner should know about the joints' limits, as text.
     pub(crate) notices: Vec<String>,
 }
 

@@ -17,7 +17,7 @@ pub(crate) const TEXT_BYTES_MAX: u64 = 1 << 20;
 /// Longest piece of a hostile file that is repeated in a fault, in characters.
 const SHOWN_CHARS_MAX: usize = 60;
 
-/// A value and where it stands.
+/// A value and its pose.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub(crate) value: Value,
@@ -287,7 +287,7 @@ impl<'de> Visitor<'de> for NodeSeed<'_> {
         let mut seen = std::collections::BTreeSet::new();
         while let Some(key) = source.next_key::<String>()? {
             self.trail.keys.borrow_mut().push(format!(".{}", key_shown(&key)));
-            // Reading goes on: a later syntax fault matters more.
+            // Reading continues: a later syntax fault matters more.
             if !seen.insert(key.clone()) {
                 let path = self.trail.keys.borrow().concat();
                 self.trail.twice.borrow_mut().get_or_insert(path.trim_start_matches('.').to_owned());

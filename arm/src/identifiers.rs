@@ -1,13 +1,13 @@
-//! Which CAN identifiers the servos of a bus send and listen under.
+//! The CAN identifiers with which the servos of a bus send and receive.
 //!
-//! Two servos that send under one identifier destroy each other's frames, and one that listens where another sends takes
+//! Two servos that send under one identifier destroy each other's frames, and one that receives what another sends takes
 //! feedback for commands. Neither shows on a desk with one motor, so it is refused in the settings.
 //!
 //! Source: CiA 301 (predefined connection set); Damiao's manual (commands at `ESC_ID` plus 0x100 for each mode, feedback
 //! at `MST_ID`, registers at 0x7FF).
 use crate::protocol::Protocol;
 
-/// Where a CANopen node sends and listens, each plus its node id.
+/// Identifiers with which a CANopen node sends and receives, each plus its node id.
 const CANOPEN_NODE: [(u16, &str); 12] = [
     (0x080, "the emergency message"),
     (0x180, "TPDO 1"),
@@ -24,7 +24,7 @@ const CANOPEN_NODE: [(u16, &str); 12] = [
 ];
 /// What all CANopen nodes of a bus share.
 const CANOPEN_BUS: [(u16, &str); 3] = [(0x000, "NMT"), (0x080, "SYNC"), (0x77F, "the master's heartbeat")];
-/// Where a Damiao motor listens, each plus `ESC_ID`: it answers in its present mode, but receives all of them.
+/// Identifiers that a Damiao motor receives, each plus `ESC_ID`: it answers in its present mode, but receives all of them.
 const DAMIAO_MOTOR: [(u16, &str); 4] = [
     (0x000, "MIT commands"),
     (0x100, "POS_VEL commands"),

@@ -1,7 +1,7 @@
-//! The last pose of an arm on disk: what tells the turn of a feedback that repeats itself, after everything was off.
+//! The last pose of an arm on disk: it resolves the multi-turn offset of a feedback that wraps, after everything was off.
 //!
 //! The file is hostile until checked: it is one line of JSON and one line with the SHA-256 of the first, so that a cut or
-//! edited file is known as one. It speaks of each joint's servo by a digest of its binding, because a turn that was true for
+//! edited file is known as one. It speaks of each joint's servo by a digest of its binding, because an offset that was true for
 //! another sign, gear, zero or drive means nothing.
 use crate::Servo;
 use crate::settings::Settings;
@@ -25,7 +25,7 @@ pub struct LastJoint {
     pub name: String,
     /// [`binding_digest`] of its servo.
     pub binding: String,
-    /// Its turn was known.
+    /// It was referenced.
     pub referenced: bool,
     /// It rested, and nothing could have moved it since but hands.
     pub at_rest: bool,
@@ -58,7 +58,7 @@ pub struct LastPoseError {
     pub missing: bool,
 }
 
-/// What a turn depends on besides the reading: SHA-256 over everything that says how a servo's feedback becomes the joint's
+/// What an offset depends on besides the reading: SHA-256 over everything that says how a servo's feedback becomes the joint's
 /// angle. The robot digest leaves it out (ADR 2).
 #[must_use]
 pub fn binding_digest(settings: &Settings, servo: &Servo) -> String {

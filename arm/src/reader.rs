@@ -1,7 +1,7 @@
 //! Walks a tree of values and adds every fault to a list, so that a file can be fixed at once.
 //!
 //! A [`Table`] hands out its keys one by one; a key that is not requested is unknown. A getter returns `None` after
-//! noting the fault, and the caller goes on to the next key: a description is only built when the book is empty.
+//! noting the fault, and the caller continues to the next key: a description is only built when the list is empty.
 use crate::document::{Entry, Node, Value, key_shown};
 use crate::{Fault, Faults};
 use std::cell::RefCell;

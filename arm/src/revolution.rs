@@ -1,12 +1,12 @@
-//! Which turn a reading belongs to, when the feedback repeats itself.
+//! The multi-turn offset of a reading, when the feedback wraps.
 //!
-//! A feedback that wraps states an angle but for whole periods. A wrong turn looks valid and sends the joint the wrong way
-//! round, so a turn is only taken where nothing else can be meant, with a margin; else an operator has to say it.
+//! A feedback that wraps leaves whole periods open. A wrong offset looks valid and moves the joint the wrong way
+//! round, so an offset is only used where it is the only possible one, with a margin; else the operator has to set it.
 use crate::Servo;
 use crate::trust::Feedback;
 
-/// Largest part of a period by which a remembered or stated angle may miss the turn that it chooses. Half would be the
-/// point where two turns are equally near; the rest is margin for what moved meanwhile, and for eyes.
+/// Largest part of a period by which a recorded or stated angle may differ from the angle that it selects. Half would be the
+/// point where two angles are equally near; the rest is margin for motion meanwhile, and for measurement by eye.
 pub const PERIOD_SHARE_MAX: f64 = 0.4;
 
 /// What is to be added to `reading_rad`, a whole number of periods, to come nearest to `near_rad`.
@@ -17,12 +17,12 @@ pub fn nearest_offset_rad(reading_rad: f64, period_rad: f64, near_rad: f64) -> f
     ((near_rad - reading_rad) / period_rad).round() * period_rad
 }
 
-/// The turn when the joint's range leaves only one: its range, with the margin on both sides, must fit in one period.
+/// The offset when the joint's range allows only one: its range, with the margin on both sides, must fit in one period.
 ///
 /// Real time: arithmetic only.
 ///
 /// # Errors
-/// When several turns could be meant, or none.
+/// When several offsets are possible, or none.
 pub fn only_offset_rad(reading_rad: f64, period_rad: f64, range_rad: [f64; 2]) -> Result<f64, OffsetError> {
     let [low_rad, high_rad] = range_rad;
     if high_rad - low_rad > 2.0 * PERIOD_SHARE_MAX * period_rad {
@@ -34,7 +34,7 @@ pub fn only_offset_rad(reading_rad: f64, period_rad: f64, range_rad: [f64; 2]) -
     if inside { Ok(offset_rad) } else { Err(OffsetError::None) }
 }
 
-/// Why there is not one turn.
+/// Why there is not one offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OffsetError {
     /// None puts the joint inside its range.

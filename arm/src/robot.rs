@@ -27,7 +27,7 @@ pub struct LinkShape {
     pub link: usize,
     /// Index into [`Chain::frames`]: 0 is the base, which stands still; frame i moves with joint i.
     pub frame: usize,
-    /// Where the shape stands in that frame.
+    /// Pose of the shape in that frame.
     pub pose: Pose,
     /// The shape.
     pub shape: Shape,
@@ -46,7 +46,7 @@ pub struct Robot {
     pub chain: Chain,
     /// Names of the links: "base", "link1", ... with rows, where link i has frame i; those of the URDF otherwise.
     pub links: Vec<String>,
-    /// Collision shapes. Where they stand in a pose: `chain.frames(pose)[shape.frame] * shape.pose`.
+    /// Collision shapes. Their poses: `chain.frames(pose)[shape.frame] * shape.pose`.
     pub shapes: Vec<LinkShape>,
     /// Masses of the links that state one, and of the payload.
     pub masses: Vec<LinkMass>,
@@ -56,7 +56,7 @@ pub struct Robot {
     pub bare_links: Vec<String>,
     /// The URDF's link whose frame is the base, and the one whose frame is the tip; none for rows.
     pub ends: Option<[String; 2]>,
-    /// What was left out of a URDF or deserves a look, in words.
+    /// What was left out of a URDF or deserves a look, as text.
     pub notices: Vec<String>,
     /// Link pairs (lower index first) that may touch because the robot file says so.
     pub allowed_by_file: Vec<(usize, usize)>,

@@ -59,7 +59,7 @@ pub enum Shape {
 pub struct Obstacle {
     /// Its name, for messages.
     pub name: String,
-    /// Where it stands in the base frame.
+    /// Pose in the base frame.
     pub pose: Pose,
     /// Its shape.
     pub shape: Shape,

@@ -48,7 +48,7 @@ impl BusKind {
 pub struct Traffic {
     /// Each servo gets a setpoint in every so many cycles, and interpolates over as many.
     pub setpoint_every: u32,
-    /// The servos take turns within [`Self::setpoint_every`], so that each cycle carries its share of the setpoints.
+    /// The servos are staggered within [`Self::setpoint_every`], so that each cycle carries its share of the setpoints.
     pub stagger: bool,
     /// Servos answer every so many SYNCs.
     pub feedback_every: u32,
@@ -236,7 +236,7 @@ impl Settings {
         let settings = Self::read(&fault_list, document::parse_toml(file, text)?, text);
         fault_list.close(settings)
     }
-    /// Cycles in a row that a bus may lose. Where the others go on, the drives of the lost one must not be commanded to catch
+    /// Cycles in a row that a bus may lose. Where the others continue, the drives of the lost one must not be commanded to catch
     /// up beyond what they bridge: it has failed before.
     #[must_use]
     pub fn lost_cycles_max(&self) -> u32 {

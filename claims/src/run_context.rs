@@ -89,7 +89,7 @@ impl<'a> RunContext<'a> {
         self.effort.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(run as u64)
     }
 
-    /// Says what is going on.
+    /// Prints progress.
     pub fn say(&self, text: &str) {
         (self.say)(text);
     }

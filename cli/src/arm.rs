@@ -26,7 +26,7 @@ pub(crate) struct ArmName {
 }
 
 impl ArmName {
-    /// A joint in words, by its zero-based index.
+    /// A joint as text, by its zero-based index.
     pub(crate) fn joint(&self, joint: usize) -> String {
         self.names().joint(joint)
     }

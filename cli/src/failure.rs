@@ -1,6 +1,6 @@
 //! Why a command did not do its work, and what the process says and returns then.
 //!
-//! Exit codes (design: command-line contract): 1 refused or failed, 2 bad usage or bad file; 130 after Ctrl-C,
+//! Exit codes: 1 refused or failed, 2 bad usage or bad file; 130 after Ctrl-C,
 //! as shells have it. The reason goes to stderr, as one sentence or, with `--json`, as one JSON object.
 use serde_json::{Value, json};
 use std::io;

@@ -2,7 +2,7 @@
 //!
 //! Shared memory belongs to the services' user alone, so a command of another user has to run as that user. The packaged
 //! sudo rule permits one thing, `taustream handed-over` without any further argument: the words of the command travel on
-//! its standard input, where they are parsed anew and only commands to running services are taken. So a member of the
+//! its standard input, where they are parsed again and only commands to running services are taken. So a member of the
 //! group can neither read nor write a file as the services' user: a trajectory file is read by the caller, and settings
 //! are named, not pathed.
 use crate::args::{Action, Cli};

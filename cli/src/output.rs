@@ -34,7 +34,7 @@ impl Form {
             .map_err(|e| Failure::writing("standard output", e))
     }
 
-    /// Says what is going on, on stderr, where it is not disturbing other output; silent for programs.
+    /// Prints progress on stderr where it does not disturb other output; silent for programs.
     pub(crate) fn progress(self, text: impl Display) {
         if self == Self::Text {
             note(text);

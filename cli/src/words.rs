@@ -1,4 +1,4 @@
-//! Reports and receipts in words, with the names of the joints.
+//! Reports and receipts as text, with the names of the joints.
 use crate::arm::ArmName;
 use taustream_messages::{Outcome, Pause, PauseReason, Rejection, Report};
 
@@ -13,7 +13,7 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
     arm.names().fault(&cause)
 }
 
-/// Why the arm is paused, and how it goes on; `None` for an arm that is not.
+/// Why the arm is paused, and how it continues; `None` for an arm that is not.
 pub(crate) fn pause_sentence(report: &Report) -> Option<String> {
     let Pause { reason, gap_s } = report.pause()?;
     Some(match reason {

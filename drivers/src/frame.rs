@@ -194,7 +194,7 @@ impl FrameBatch {
             more: false,
         }
     }
-    /// Forgets all frames.
+    /// Clears all frames.
     pub fn clear(&mut self) {
         (self.count, self.more) = (0, false);
     }

@@ -40,7 +40,7 @@ pub enum DriveTarget {
     Disabled,
     /// Energised, following the commands.
     Enabled,
-    /// What holds goes on holding, what is off stays off: nothing is energised, de-energised or moved. Drives that were
+    /// What holds continues to hold, what is off stays off: nothing is energised, de-energised or moved. Drives that were
     /// found holding ([`DriveState::Adopted`]) are taken into the cycle.
     Keep,
     /// De-energised at once, whatever the state: the emergency target.
@@ -176,7 +176,7 @@ pub trait ServoDriver: Send {
     /// Real time: no allocation.
     fn clear_faults(&mut self);
 
-    /// Forgets everything that is known of the drives, as at start: nothing is changed before they were looked at
+    /// Clears everything that is known of the drives, as at start: nothing is changed before they were looked at
     /// again. For a bus that comes back after it was lost: drives may have been restarted, replaced or moved.
     ///
     /// Real time: no allocation.

@@ -9,7 +9,7 @@ pub const BUSES_MAX: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
 pub struct BusReport {
-    /// Frames handed over.
+    /// Frames passed to the link.
     pub frames_sent: u64,
     /// Frames refused.
     pub frames_lost: u64,
@@ -23,7 +23,7 @@ pub struct BusReport {
     pub bus_fault: u32,
     /// 1 while nothing is sent on it, from its failure to `clear-fault`.
     pub silent: u32,
-    /// Frames handed over and not yet seen on the wire.
+    /// Frames passed to the link and not yet seen on the wire.
     pub in_flight: u32,
     /// Class bits of the newest error frame (linux/can/error.h); 0 for none.
     pub error_class: u32,

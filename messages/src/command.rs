@@ -24,9 +24,9 @@ pub enum Command {
         /// The override in percent.
         percent: f64,
     },
-    /// Forget a fault whose cause is gone.
+    /// Clear a fault after its cause is fixed.
     ClearFault,
-    /// The operator says where a joint stands; only while nothing is energised.
+    /// The operator sets the angle of a joint; only while nothing is energised.
     Reference {
         /// Zero-based joint.
         joint: u32,
@@ -130,7 +130,7 @@ impl TryFrom<&CommandRequest> for Command {
 }
 
 impl CommandReply {
-    /// Taken over; `text` says what happens now.
+    /// Accepted; `text` says what happens now.
     #[must_use]
     pub fn accepted(phase: Phase, text: &str) -> Self {
         Self::new(true, phase, text)
@@ -149,7 +149,7 @@ impl CommandReply {
             text: Text::new(text),
         }
     }
-    /// True when the command was taken over. An answer of another layout counts as refused.
+    /// True when the command was accepted. An answer of another layout counts as refused.
     #[must_use]
     pub fn is_accepted(&self) -> bool {
         self.layout_version == LAYOUT_VERSION && self.accepted == 1

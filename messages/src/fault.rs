@@ -55,7 +55,7 @@ impl FaultReason {
         Self::ConfigurationRefused,
         Self::DriveWarning,
     ];
-    /// The code that stands in messages; 0 stands for none.
+    /// The code in messages; 0 means none.
     #[must_use]
     pub fn code(self) -> u32 {
         self as u32
@@ -130,7 +130,7 @@ impl BusFault {
         Self::SetpointsLost,
         Self::OtherMaster,
     ];
-    /// The code that stands in messages; 0 stands for none.
+    /// The code in messages; 0 means none.
     #[must_use]
     pub fn code(self) -> u32 {
         self as u32
@@ -140,7 +140,7 @@ impl BusFault {
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|t| t.code() == code)
     }
-    /// What it is, in words.
+    /// What it is, as text.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {

@@ -14,7 +14,7 @@ impl PauseReason {
     /// Every reason.
     pub const ALL: [Self; 2] = [Self::Operator, Self::Stall];
 
-    /// The code that stands in messages; 0 is none.
+    /// The code in messages; 0 means none.
     #[must_use]
     pub fn code(self) -> u32 {
         self as u32

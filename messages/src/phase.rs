@@ -16,7 +16,7 @@ pub enum Phase {
     Moving = 5,
     /// sigma is on its way to 0; the trajectory is kept.
     Pausing = 6,
-    /// At rest on the path; `resume` goes on.
+    /// At rest on the path; `resume` continues.
     Paused = 7,
     /// sigma is on its way to 0; then the trajectory is dropped and the arm holds.
     Stopping = 8,
@@ -50,7 +50,7 @@ impl Phase {
         Self::Disabling,
     ];
 
-    /// The code that stands in messages.
+    /// The code in messages.
     #[must_use]
     pub fn code(self) -> u32 {
         self as u32

@@ -3,7 +3,7 @@ use crate::{LAYOUT_VERSION, Receipt, Text};
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
-/// When a new plan takes over from a motion that runs.
+/// When a new plan replaces a running motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
     /// Cut the running motion. From rest: at once.
@@ -32,7 +32,7 @@ pub struct CheckedPlanRequest {
     pub joints: usize,
     /// Where to go.
     pub goal_rad: JointArray,
-    /// When to take over.
+    /// When to replace it.
     pub when: When,
     /// How long planning may take.
     pub deadline_ms: u32,

@@ -1,6 +1,6 @@
 //! Whether the multi-turn offset of a joint is known, and its source.
 
-/// What is known of a joint's turn. Only a joint whose turn is known may be energised.
+/// What is known of the multi-turn offset of a joint. Only a referenced joint may be energised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum ReferenceState {
@@ -9,19 +9,19 @@ pub enum ReferenceState {
     NoFeedback = 0,
     /// The feedback tells every angle of the joint.
     Encoder = 1,
-    /// The turn nearest the last pose on disk.
+    /// The offset that comes nearest to the last pose on disk.
     Record = 2,
     /// Its drive was never without power since this arm was last known.
     Adoption = 3,
-    /// The operator said where it stands.
+    /// Set by the operator.
     Operator = 4,
-    /// The feedback repeats itself, and there is no last pose to tell the turn.
+    /// The feedback wraps, and there is no last pose to resolve the offset.
     NoRecord = 5,
     /// The last pose was written while the arm moved.
     RecordMoving = 6,
-    /// The last pose is too far from every turn of the reading.
+    /// The last pose is too far from every angle that the reading allows.
     RecordFar = 7,
-    /// No turn of the reading lies inside the joint's range.
+    /// No angle that the reading allows lies inside the joint's range.
     OutOfRange = 8,
     /// The feedback knows nothing after power-up.
     Incremental = 9,
@@ -42,7 +42,7 @@ impl ReferenceState {
         Self::Incremental,
     ];
 
-    /// The code that stands in messages.
+    /// The code in messages.
     #[must_use]
     pub fn code(self) -> u32 {
         self as u32

@@ -91,7 +91,7 @@ fn no_running_process_is_reported_with_the_remedy() {
     assert!(sentence.contains("start taustream-streamer first"), "{sentence}");
 }
 
-/// Goal: a 25th reader gets the reason, and the 24 before it go on.
+/// Goal: a 25th reader gets the reason, and the 24 before it continue.
 #[test]
 fn readers_of_reports_beyond_the_maximum_are_refused_with_the_number_and_the_remedy() {
     let arm = Arm::new("crowd");

@@ -1,6 +1,6 @@
 //! The two limit sets of a joint, and the proof that a trajectory stays inside one.
 //!
-//! `motion` limits are what plans use; `stop` limits are what the mechanics bear. Their difference is the
+//! `motion` limits are what plans use; `stop` limits are what the mechanics withstand. Their difference is the
 //! room in which pauses and stops slow the arm down along its path (docs/adr).
 use crate::{JointArray, MAX_JOINTS, Trajectory};
 
@@ -22,7 +22,7 @@ pub struct JointLimits {
     pub position_rad: [f64; 2],
     /// What plans use.
     pub motion: LimitSet,
-    /// What the mechanics bear; same velocity, higher acceleration and jerk.
+    /// What the mechanics withstand; same velocity, higher acceleration and jerk.
     pub stop: LimitSet,
 }
 

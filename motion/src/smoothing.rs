@@ -81,7 +81,7 @@ pub fn smooth(
         let mut delta_rad = to_rad;
         delta_rad.iter_mut().zip(&from_rad).for_each(|(to, from)| *to -= from);
         from_rad = to_rad;
-        // A NaN is no zero: it goes on to be refused.
+        // A NaN is no zero: it is refused later.
         if delta_rad.iter().all(|delta| *delta == 0.0) {
             continue;
         }

@@ -1,9 +1,9 @@
-//! The words of `taustream-planner`. They stand in the library so that the manual page is made of them.
+//! The arguments of `taustream-planner`, in the library because the manual page is made from them.
 use clap::Parser;
 
 /// Plans motions for one arm: answers `taustream replan` and hands verified motions to the streamer.
 ///
-/// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted goes on to its end.
+/// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted continues to its end.
 #[derive(Debug, Parser)]
 #[command(
     name = "taustream-planner",

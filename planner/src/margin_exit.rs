@@ -1,7 +1,7 @@
 //! The exit path from the margin, for an arm that stands nearer to something than it should.
 //!
 //! After a stop or a sag an arm may touch nothing and yet stand inside the margin, or so close to its edge that no
-//! motion of the search's wary steps begins there. Then a short straight exit path is found first; planning goes on
+//! motion of the search's wary steps begins there. Then a short straight exit path is found first; planning continues
 //! from its end with the full margin. Only until the arm has left are the distances those that the start has.
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};

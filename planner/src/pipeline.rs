@@ -98,7 +98,7 @@ pub struct Pipeline<'a> {
     evaluator: &'a Evaluator<'a>,
     stage_budgets: StageBudgets,
     limits: [JointLimits; MAX_JOINTS],
-    /// What was done, in words.
+    /// What was done, as text.
     tried: Vec<String>,
     best: Option<Best>,
     /// Why the latest motion was not proven.

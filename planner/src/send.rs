@@ -1,7 +1,7 @@
 //! Hands a trajectory to the streamer and waits for its receipt.
 //!
 //! The generation comes from the streamer's newest report, never from memory: a planner that was killed and started
-//! again goes on where the streamer is. Reports are waited for, not taken from the queue, so that one which a dead
+//! again continues where the streamer is. Reports are waited for, not taken from the queue, so that one which a dead
 //! streamer left behind is never believed.
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};

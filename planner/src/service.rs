@@ -178,7 +178,7 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Plans on a thread of its own: whatever goes wrong there, the service goes on.
+    /// Plans on a thread of its own: whatever goes wrong there, the service continues.
     fn plan(
         &self,
         start_rad: JointArray,

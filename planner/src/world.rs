@@ -257,7 +257,7 @@ impl<'a> World<'a> {
         (distance_m <= pair.required_m).then(|| self.contact_of(&pair, distance_m))
     }
 
-    /// A contact in words.
+    /// A contact as text.
     #[must_use]
     pub fn contact_of(&self, pair: &Pair, distance_m: f64) -> Contact {
         Contact { between: self.names(pair), distance_m, required_m: pair.required_m }

@@ -187,7 +187,7 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
         let PlanOutcome::Planned { trajectory_id, duration_s, strokes, .. } = outcome else { panic!() };
         assert!((1..1 << 53).contains(&trajectory_id) && duration_s > 0.0 && strokes > 0);
 
-        // A second one goes on from the report's generation; and a saved motion is sent by the same way.
+        // A second one continues from the report's generation; and a saved motion is sent by the same way.
         receipt_of(&ask(arm, &request(When::AtOnce, "straight", pose(THERE)), || ()));
         let wire = join(arm, "cli");
         let still = taustream_planner::timing::stand_still(6, &pose(AWAY)).expect("a pose");

@@ -1,4 +1,4 @@
-//! Why a command was taken over or refused: as plain values on the real-time thread, as sentences off it.
+//! Why a command was accepted or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
 use taustream_drivers::DriveState;
 use taustream_messages::{Phase, ReferenceState};
@@ -8,7 +8,7 @@ use taustream_messages::{Phase, ReferenceState};
 pub struct CommandAnswer {
     /// The question's number.
     pub sequence: u64,
-    /// Taken over?
+    /// Accepted?
     pub accepted: bool,
     /// The phase after it.
     pub phase: Phase,

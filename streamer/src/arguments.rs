@@ -1,4 +1,4 @@
-//! The words of `taustream-streamer`. They stand in the library so that the manual page is made of them.
+//! The arguments of `taustream-streamer`, in the library because the manual page is made from them.
 use clap::Parser;
 use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;

@@ -42,7 +42,7 @@ pub use wake::{Bin, WakeUps, wake_ups};
 
 /// Cycles at the start of each slice that do not count: caches fill, and a slice begins at a new grid.
 const WARM_UP: u64 = 20;
-/// Slices in which stages are timed, streamer and bare in turns.
+/// Slices in which stages are timed, streamer and bare alternately.
 const STAGE_SLICES: u64 = 4;
 /// Cycles within which the arm must be ready.
 const READY_MAX: u64 = 2_000;
@@ -54,11 +54,11 @@ pub struct BenchOptions {
     pub settings: Settings,
     /// How long all slices take together, s.
     pub seconds: f64,
-    /// How many slices, bare and streamer in turns.
+    /// How many slices, bare and streamer alternately.
     pub slices: u32,
     /// The link of the cycle; [`None`]: a link that drops everything, without system calls.
     pub link: Option<LinkChoice>,
-    /// Go on without real-time rights.
+    /// Continue without real-time rights.
     pub allow_non_realtime: bool,
 }
 

@@ -85,7 +85,7 @@ impl Buses {
         self.0.iter_mut().flat_map(|bus| &mut bus.link).map(|link| &mut **link as &mut dyn CanLink)
     }
 
-    /// Writes every bus's frames. On a failed bus nothing is said but torque off.
+    /// Writes every bus's frames. On a failed bus only torque off is sent.
     ///
     /// Real time: no allocation.
     pub fn encode(&mut self, now: Nanos, drive_target: DriveTarget, commands: &[JointCommand; MAX_JOINTS]) {
@@ -119,7 +119,7 @@ impl Buses {
             (found.requested, found.sent) = (count(frames.len()), count(taken.len()));
             found.fault = sent.fault.filter(|_| !complete);
             (found.syncs, found.frames) = (bus.syncs, bus.frames);
-            // Known before the commanded pose is: a bus that is silent has carried nothing.
+            // Known before the commanded pose is: nothing was sent on a failed bus.
             found.failed = bus.health.failed();
             cycle_state.due = cycle_state.due.union(bus.outgoing.setpoints_in(frames.len()));
             cycle_state.taken = cycle_state.taken.union(bus.outgoing.setpoints_in(taken.len()));
@@ -170,7 +170,7 @@ impl Buses {
         }
     }
 
-    /// Asks all drives to forget their faults, over the next cycles.
+    /// Resets the faults of all drives, over the next cycles.
     ///
     /// Real time: no allocation.
     pub fn clear_faults(&mut self) {
@@ -192,7 +192,7 @@ impl Buses {
         links
     }
 
-    /// Takes links back. When they are `recovered`, their buses begin anew: drives are looked at before anything is said.
+    /// Takes links back. When they are `recovered`, their buses begin again: the state of the drives is read before anything is sent.
     ///
     /// Real time: moves pointers, frees nothing.
     pub fn reclaim(&mut self, links: Links, recovered: bool) {

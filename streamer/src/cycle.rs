@@ -21,7 +21,7 @@ use taustream_drivers::{CanLink, DriveTarget};
 pub enum Stage {
     /// A trajectory and commands were taken.
     Subscribe,
-    /// The trajectory was taken over or refused.
+    /// The trajectory was accepted or refused.
     Splice,
     /// The setpoint was computed.
     Sample,
@@ -29,7 +29,7 @@ pub enum Stage {
     Guard,
     /// Frames were written.
     Encode,
-    /// Frames were handed over.
+    /// Frames were passed to the links.
     Send,
     /// Frames were taken and read.
     Receive,

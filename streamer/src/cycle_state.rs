@@ -117,7 +117,7 @@ pub struct BusState {
     pub passive: bool,
     /// Cycles in a row in which not everything was taken.
     pub consecutive_lost: u32,
-    /// Frames handed over and not yet seen on the wire.
+    /// Frames passed to the link and not yet seen on the wire.
     pub in_flight: u32,
     /// Frames handed over whose echo was lost in this computer, since the link was opened.
     pub echoes_missing: u64,
@@ -135,9 +135,9 @@ pub struct BusState {
     pub newest_error: ErrorFrame,
     /// Error frames since start.
     pub error_frames: u64,
-    /// SYNCs handed over since start.
+    /// SYNCs passed to the link since start.
     pub syncs: u64,
-    /// Frames handed over so far.
+    /// Frames passed to the link so far.
     pub frames: u64,
 }
 
@@ -197,7 +197,7 @@ pub struct CycleState {
     pub scale: Scale,
     /// Time since the last setpoint that left.
     pub gap_s: f64,
-    /// That time is beyond what the drives bridge: the trajectory stands still.
+    /// That time is beyond what the drives bridge: trajectory time does not advance.
     pub frozen: bool,
     /// The setpoint is the trajectory's end.
     pub end_reached: bool,
@@ -267,7 +267,7 @@ impl CycleState {
         self.buses.iter().enumerate().find_map(|(bus, found)| Some((bus, found.failed?)))
     }
 
-    /// True when at least one frame left, or none was wanted because nothing has to be said. A failed bus is silent
+    /// True when at least one frame left, or none was wanted because nothing has to be said. A failed bus sends nothing
     /// because nothing can be.
     #[must_use]
     pub fn setpoints_sent(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Whether a bus still carries setpoints: lost cycles, frames that are not acknowledged, error frames, a lost interface.
 //!
-//! A bus that has failed is *silent* from then on: no setpoint leaves on it until `clear-fault` has started it over. Its
+//! After a bus fault no setpoint is sent on that bus until `clear-fault` has started it over. Its
 //! drives have stopped where their own watchdogs left them while the other buses went on along the path, so the first
 //! setpoint after an outage would be a step, and whatever still waits in a queue is old. Only torque off is still tried.
 use crate::cycle_state::BusState;

@@ -35,7 +35,7 @@ impl Names {
         }
     }
 
-    /// A joint in words, by its zero-based index: "joint 3 `elbow`".
+    /// A joint as text, by its zero-based index: "joint 3 `elbow`".
     #[must_use]
     pub fn joint(&self, joint: usize) -> String {
         match self.joints.get(joint) {
@@ -44,7 +44,7 @@ impl Names {
         }
     }
 
-    /// A bus in words, by its zero-based index: "bus `arm` (vcan0)".
+    /// A bus as text, by its zero-based index: "bus `arm` (vcan0)".
     #[must_use]
     pub fn bus(&self, bus: usize) -> String {
         match self.buses.get(bus) {

@@ -110,8 +110,8 @@ impl Supervisor {
         }
     }
 
-    /// The pose to energise at: where each joint stands, or what its drive holds from before. Only if every joint answers,
-    /// is referenced, rests, and stands inside its range.
+    /// The pose to energise at: the angle of each joint, or what its drive holds. Only if every joint answers,
+    /// is referenced, at rest, and inside its range.
     fn trusted_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(cycle_state) {
@@ -155,7 +155,7 @@ impl Supervisor {
         match self.phase {
             Phase::Fault if self.holds => {
                 (self.holds, self.adopted) = (false, false);
-                // Nothing is said on a failed bus: its drives are where their own watchdogs have left them.
+                // Nothing is sent on a failed bus: its drives have stopped by their own watchdogs.
                 match cycle_state.failed_bus() {
                     Some((bus, _)) if self.energised_in_reach(cycle_state).is_none() => {
                         Err(AnswerReason::Unreachable { bus })
@@ -296,7 +296,7 @@ impl Supervisor {
         if let Some((joint, _)) = foreign {
             return Err(AnswerReason::Unowned { joint });
         }
-        // Drives that hold from before go on holding; they are adopted once all drives are known.
+        // Drives that hold from before continue to hold; they are adopted once all drives are known.
         if let Some((joint, state)) = self.energised(cycle_state)
             && state != DriveState::Adopted
         {
@@ -312,7 +312,7 @@ impl Supervisor {
         Ok(AnswerReason::ClearedOff)
     }
 
-    /// A fault is forgotten while drives hold only if every one of them does, and nothing is left to complain about.
+    /// A fault is cleared while drives hold only if every one of them does, and no other fault remains.
     fn may_hold_on(&self, cycle_state: &CycleState) -> Result<(), AnswerReason> {
         for (joint, servo) in self.servos(cycle_state) {
             let kept = self.adopted && matches!(servo.state, DriveState::Adopted | DriveState::Disabled);
@@ -336,7 +336,7 @@ impl Supervisor {
         Ok(())
     }
 
-    /// The operator's word about where a joint stands: taken only while nothing is energised and the arm rests.
+    /// The angle of a joint set by the operator: accepted only while nothing is energised and the arm is at rest.
     fn reference(
         &mut self,
         joint: u32,

@@ -1,7 +1,7 @@
 //! The one table of phases: what may follow what, and on which event.
 //!
 //! The table knows nothing of drives, times or reasons; `supervise` decides which event has happened. An event
-//! that a phase does not list changes nothing. docs: the resumption table is this table in words.
+//! that a phase does not list changes nothing. docs: the resumption table describes this table.
 use taustream_messages::Phase;
 
 /// What can happen to the arm.
@@ -15,7 +15,7 @@ pub enum Event {
     HoldAdopted,
     /// The operator asked for energised drives.
     EnableRequested,
-    /// The operator asked for adopted drives to be taken over.
+    /// The operator requested the adoption of drives that hold.
     AdoptRequested,
     /// Every drive is energised and follows.
     DrivesEnabled,
@@ -25,13 +25,13 @@ pub enum Event {
     EndReached,
     /// The operator asked for a pause.
     PauseRequested,
-    /// The operator asked to go on.
+    /// The operator requested to resume.
     ResumeRequested,
     /// The operator asked to stop.
     StopRequested,
     /// sigma has come to 0, or the brake to its end.
     AtRest,
-    /// The loop stalled for too long to go on by itself.
+    /// The loop stalled for too long to continue by itself.
     StalledLong,
     /// Something that is answered by a fast stop on the path.
     StopFault,

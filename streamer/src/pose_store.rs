@@ -1,6 +1,6 @@
 //! Keeps the last pose on disk, on a thread of its own: a slow disk delays neither the cycle nor a `stop`.
 //!
-//! A record tells the turn of a joint after everything was off only if nothing but hands could have moved the joint since:
+//! A record resolves the multi-turn offset of a joint after everything was off only if nothing but hands could have moved the joint since:
 //! it rested, and was off or may lose its torque without moving. Everything else is written too, and says so.
 use crate::referencing::{LastPoses, Recorded};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ const SPACING_S: f64 = 1.0;
 /// A pose that differs by less needs no writing.
 const SAME_RAD: f64 = 1e-4;
 
-/// What is known of the joints of an arm, from its file. What is wrong with the file is said, and nothing of it believed.
+/// What is known of the joints of an arm, from its file. Faults of the file are logged, and none of it is used.
 #[must_use]
 pub fn restore_poses(settings: &Settings, directory: &Path) -> LastPoses {
     let mut memory: LastPoses = [None; MAX_JOINTS];
@@ -51,7 +51,7 @@ pub fn restore_poses(settings: &Settings, directory: &Path) -> LastPoses {
     memory
 }
 
-/// One joint as it stands in every record.
+/// One joint in a record.
 #[derive(Debug)]
 struct Named {
     joint: usize,
@@ -195,7 +195,7 @@ fn is_under_way(phase: Phase) -> bool {
     }
 }
 
-/// Whether two records differ in more than where the joints stand.
+/// Whether two records differ in more than the poses.
 fn says_else(before: &LastPose, now: &LastPose) -> bool {
     before.joints.len() != now.joints.len()
         || before.joints.iter().zip(&now.joints).any(|(a, b)| {

@@ -1,4 +1,4 @@
-//! On which turn each joint stands: what is added to a drive's angle to get the joint's.
+//! The multi-turn offset of each joint: what is added to the angle of a drive to get that of the joint.
 //!
 //! A drive whose feedback repeats itself, or counts from where it was switched on, tells an angle but for an offset.
 //! The offset is resolved at the first feedback of the drive, is valid while feedback comes, and is dropped without it. It is added to
@@ -12,7 +12,7 @@ use taustream_drivers::{DriveState, JointCommand};
 use taustream_messages::ReferenceState;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
-/// What was last known of a joint's turn.
+/// What was last known of a joint's multi-turn offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recorded {
     /// Where it stood.
@@ -23,7 +23,7 @@ pub struct Recorded {
     pub at_rest: bool,
 }
 
-/// The last pose of every joint whose turn was known.
+/// The last pose of every referenced joint.
 pub type LastPoses = [Option<Recorded>; MAX_JOINTS];
 
 /// What a reading means.
@@ -33,7 +33,7 @@ pub struct Resolved {
     pub offset_rad: f64,
     /// Whether it is known, and its source.
     pub reference_state: ReferenceState,
-    /// Where it is not known for being too far: by how much the nearest turn misses the last pose.
+    /// Where it is not known for being too far: the distance of the nearest possible angle from the last pose.
     pub by_rad: f64,
 }
 
@@ -110,7 +110,7 @@ impl Rule {
     }
 }
 
-/// One joint's turn.
+/// The referencing of one joint.
 #[derive(Clone, Copy, Debug)]
 struct JointReferencing {
     rule: Rule,
@@ -119,7 +119,7 @@ struct JointReferencing {
     present: bool,
 }
 
-/// The turns of all joints.
+/// The referencing of all joints.
 #[derive(Clone, Debug)]
 pub struct Referencing {
     entries: Vec<Option<JointReferencing>>,
@@ -150,7 +150,7 @@ impl Referencing {
         }
     }
 
-    /// Turns what the drives answered into joint angles; finds and forgets turns as drives come and go.
+    /// Converts the feedback of the drives into joint angles; resolves and drops offsets as drives come and go.
     ///
     /// Real time: arithmetic only.
     pub fn read(&mut self, cycle_state: &mut CycleState) {
@@ -162,7 +162,7 @@ impl Referencing {
                     let adopted = servo.state == DriveState::Adopted;
                     entry.resolved = entry.rule.resolve(servo.position_rad, entry.recorded, adopted);
                 }
-                // It may come back from a power cut: only what was seen at rest tells its turn then.
+                // It may come back from a power cut: only a pose recorded at rest resolves its offset then.
                 (true, false) => {
                     entry.resolved =
                         Resolved { offset_rad: 0.0, reference_state: ReferenceState::NoFeedback, by_rad: 0.0 }
@@ -207,12 +207,12 @@ impl Referencing {
         std::array::from_fn(|joint| self.resolved(joint).offset_rad)
     }
 
-    /// Takes the operator's word that a joint measured at `position_rad` stands at `at_rad`. Gives back where it then is.
+    /// Sets a joint that measures `position_rad` to `at_rad`, by command of the operator. Returns its angle.
     ///
     /// Real time: arithmetic only.
     ///
     /// # Errors
-    /// Why the word cannot be right, or is not needed.
+    /// Why the angle cannot be right, or no reference is needed.
     pub fn set_reference(
         &mut self,
         joint: usize,

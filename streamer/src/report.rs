@@ -52,7 +52,7 @@ pub enum Note {
         /// Error frames of this bus since the note before this one, this one included.
         count: u64,
     },
-    /// A bus failed, and is silent from now on.
+    /// A bus failed, and nothing more is sent on it.
     BusFailed {
         /// Index of the bus.
         bus: usize,
@@ -262,7 +262,7 @@ impl Reporter {
         }
     }
 
-    /// The trajectory begins to stand still because the loop was late; a failed bus is reported as such.
+    /// Trajectory time stops because the loop was late; a failed bus is reported as such.
     fn stalls_now(&self, cycle_state: &CycleState) -> bool {
         cycle_state.frozen && !self.frozen_before && cycle_state.failed_bus().is_none()
     }

@@ -65,7 +65,7 @@ pub fn now() -> Nanos {
 
 /// Sleeps until an instant of `CLOCK_MONOTONIC`; returns at once when it has passed.
 ///
-/// Real time: one call; a signal only makes it begin anew.
+/// Real time: one call; a signal only makes it begin again.
 pub fn sleep_until(deadline: Nanos) {
     let part = |value: u64| i64::try_from(value).unwrap_or(i64::MAX);
     let time = libc::timespec {

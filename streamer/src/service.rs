@@ -187,7 +187,7 @@ impl Service {
         }
     }
 
-    /// Starts the links of failed buses over. What stands in the way is the answer to the `clear-fault` that asked.
+    /// Restarts the links of failed buses. The reason of a failure is the answer to the `clear-fault` that asked.
     fn restore_buses(&mut self) {
         let Some(mut handover) = self.command_queue.failed_links() else { return };
         let mut obstacles = Vec::new();

@@ -1,4 +1,4 @@
-//! The supervisor: turns one cycle's facts into events, and events into the next phase by the table of `phases`.
+//! The supervisor: converts the state of one cycle into events, and events into the next phase by the table of `phases`.
 //!
 //! It is the only owner of the phase. What it decides steers the next cycle: the target of the drives, how the
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
@@ -34,7 +34,7 @@ pub struct Actions {
     pub drop_trajectory: bool,
     /// This pose becomes the commanded one.
     pub pose_rad: Option<JointArray>,
-    /// Drives are asked to forget their faults.
+    /// The faults of the drives are being reset.
     pub clear_faults: bool,
     /// Failed buses are restarted, as this command asked.
     pub restore_buses: Option<u64>,
@@ -66,7 +66,7 @@ pub struct Supervisor {
     pub(crate) speed: f64,
     /// The speed was set since the start.
     pub(crate) speed_chosen: bool,
-    /// A stall froze the motion; it goes on when the drives rest.
+    /// A stall froze the motion; it continues when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
     /// How long no setpoint left before it, s.
     stall_gap_s: f64,
@@ -116,7 +116,7 @@ impl Supervisor {
         }
     }
 
-    /// The turns of the joints.
+    /// The referencing of the joints.
     #[must_use]
     pub fn referencing(&self) -> &Referencing {
         &self.referencing
@@ -298,7 +298,7 @@ impl Supervisor {
         }
     }
 
-    /// Gaps beyond what the drives bridge (design section 4).
+    /// Gaps beyond what the drives bridge.
     fn evaluate_stall(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         let energised = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep)
             && self.phase != Phase::Fault;
@@ -331,7 +331,7 @@ impl Supervisor {
         }
     }
 
-    /// Failed buses are back, or not: the `clear-fault` that asked for it goes on, or was refused in the service
+    /// Failed buses are back, or not: the `clear-fault` that asked for it continues, or was refused in the service
     /// thread's own words.
     fn evaluate_restored(
         &mut self,

@@ -230,7 +230,7 @@ impl Track {
         }
     }
 
-    /// Forgets the trajectory and holds the last pose that left. Returns the box.
+    /// Clears the trajectory and holds the last pose that left. Returns the box.
     ///
     /// Real time: nothing is freed.
     pub fn drop_trajectory(&mut self) -> Option<Boxed> {

@@ -1,6 +1,6 @@
 //! Supervision of what the drives answer: state, age of feedback, jumps, tracking error, rest.
 //!
-//! A setpoint of cycle N is sent behind SYNC N, taken over at SYNC N+1 and interpolated up to SYNC N+2; the position
+//! A setpoint of cycle N is sent behind SYNC N, applied at SYNC N+1 and interpolated up to SYNC N+2; the position
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
 //! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
 //! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
@@ -70,7 +70,7 @@ pub struct Watch {
     slot: usize,
     /// When the last cycle woke.
     wake_time: Option<Nanos>,
-    /// Time in which the loop ran. Drives answer SYNC: while none leaves, their silence is no fault of theirs.
+    /// Time in which the loop ran. Drives answer SYNC: while none is sent, missing feedback is no fault of theirs.
     attended_s: f64,
 }
 
@@ -134,7 +134,7 @@ impl Watch {
         }
     }
 
-    /// Begins anew at a pose that has become the commanded one.
+    /// Begins again at a pose that has become the commanded one.
     ///
     /// Real time: copies.
     pub fn restart(&mut self, pose_rad: &JointArray) {
@@ -263,7 +263,7 @@ impl Watch {
     }
 
     /// The fastest joint and its speed over the last cycles, rad/s. `None` while one of the joints has given feedback for too
-    /// short a time to tell: after bring-up, and again after its drive was configured anew.
+    /// short a time to tell: after bring-up, and again after its drive was configured again.
     ///
     /// Real time: no allocation.
     #[must_use]
@@ -329,7 +329,7 @@ fn drive_cause(cycle_state: &CycleState, joint: usize, enabling: bool) -> Option
     let warning = cause(FaultReason::DriveWarning, servo.status_word);
     match servo.state {
         DriveState::Fault => Some(fault),
-        // On its way to being taken over, until it says why not.
+        // Being adopted, until it fails.
         DriveState::Adopted if enabling => (servo.error_code != 0).then_some(fault),
         // A warning is the drive's last word before it drops out: the arm stops while it still can.
         DriveState::Enabled => servo.warning.then_some(warning),

@@ -99,7 +99,7 @@ fn lose_a_bus_and_restore_it(arm: &mut Arm) {
     arm.command_queue.return_links(handover);
     arm.run(1);
     assert!(arm.command_queue.answer().unwrap().accepted);
-    // The drives' own watchdogs have left faults, which are reported once they were looked at anew.
+    // The drives' own watchdogs have left faults, which are reported once they were looked at again.
     arm.run(1_000);
     if arm.phase() == Phase::Fault {
         arm.ask(Command::ClearFault);

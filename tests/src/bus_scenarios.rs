@@ -196,7 +196,7 @@ fn second_down(bench: &mut TestBench, goals: &Goals) -> Result<()> {
 /// An interface that hands frames back when they were on the wire, as real ones do, and a wire that takes its time.
 fn unacknowledged(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     enable(bench)?;
-    // The interface has to be made anew for this, which is a fault of its own.
+    // The interface has to be made again for this, which is a fault of its own.
     bench.run("modprobe", "-r vcan")?;
     bench.await_phase(Phase::Fault)?;
     bench.run("modprobe", "vcan echo=1")?;

@@ -267,7 +267,7 @@ impl Machine {
         if let Some(cpu) = self.cpu {
             command.args(["taskset", "-c", &cpu.to_string()]);
         }
-        // `nice` goes on without where it is not permitted.
+        // `nice` continues without where it is not permitted.
         command.args(["nice", "-n", &self.nice.to_string()]);
         if let Some(priority) = self.realtime {
             if may_have_priority(priority) {

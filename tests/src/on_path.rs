@@ -247,7 +247,7 @@ mod tests {
             check(&cycles).expect_err("a difference");
         }
         let doctors: [Doctor; 2] = [
-            // A joint that stays where it is while the others go on has not stalled.
+            // A joint that stays where it is while the others continue has not stalled.
             |cycles| cycles[201].position_rad[0] = cycles[199].position_rad[0],
             // An arm that stands stands where it was last sent.
             |cycles| cycles[110].position_rad[0] += 1e-9,

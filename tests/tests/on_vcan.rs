@@ -128,7 +128,7 @@ fn socketcan_does_not_allocate() {
     link_suite::hot_path_does_not_allocate(&Vcan::new("alloc"));
 }
 
-/// Goal: while the interface is down both calls say so each time; up again, the same link goes on by itself.
+/// Goal: while the interface is down both calls say so each time; up again, the same link continues by itself.
 #[test]
 fn socketcan_interface_down_is_reported_and_up_again_goes_on() {
     let vcan = Vcan::new("down");
@@ -166,7 +166,7 @@ fn socketcan_stale_error_after_link_up_is_no_fault() {
 }
 
 /// Interfaces that hand a frame back when it was on the wire, as controllers do: vcan with `echo=1`. Every vcan of the
-/// machine is made anew for it, and again at the end.
+/// machine is made again for it, and again at the end.
 struct EchoingVcan(Vcan);
 
 impl EchoingVcan {

@@ -168,7 +168,7 @@ fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// A file is written beside its place and moved there: a program that runs goes on with its old file, and no process meets
+/// A file is written beside its place and moved there: a program that runs continues with its old file, and no process meets
 /// half a rule.
 fn place(item: &Item, to: &Path) -> Result<()> {
     if let Some(folder) = to.parent() {

@@ -4,9 +4,9 @@ use super::{BusLoad, WARNED_PERCENT, cia402_bus, flow};
 use crate::protocol::Protocol;
 use crate::settings::{Bus, BusKind, Settings, Traffic};
 
-/// Data rate that CAN FD is reckoned with.
+/// Data rate that CAN FD is computed with.
 const FD_DATA_BIT_S: u32 = 5_000_000;
-/// Nominal rate that CAN FD is reckoned with.
+/// Nominal rate that CAN FD is computed with.
 const FD_BIT_S: u32 = 1_000_000;
 
 /// One remedy.

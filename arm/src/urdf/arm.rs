@@ -66,7 +66,7 @@ pub(crate) struct UrdfArm {
     pub(crate) parts: Vec<SolidPart>,
     /// Pairs that may touch by the SRDF, lower index first, in rising order.
     pub(crate) allowed: Vec<(usize, usize)>,
-    /// What was left out, in words.
+    /// What was left out, as text.
     pub(crate) notices: Vec<String>,
 }
 
@@ -154,7 +154,7 @@ impl UrdfArm {
         }
         joints
     }
-    /// Where each link stands: the frame that it is rigid with, and its pose there.
+    /// The pose of each link: the frame that it is rigid with, and its pose there.
     pub(crate) fn placed(&self) -> Vec<(usize, Pose)> {
         let mut placed = vec![(0, Pose::identity()); self.model.links.len()];
         for &link in &self.tree.order {

@@ -7,7 +7,7 @@ use crate::scene::Shape;
 use crate::text::counted;
 use std::collections::BTreeSet;
 
-/// Where something stands in the frame before it.
+/// A pose in the frame before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Origin {
     pub(crate) xyz_m: [f64; 3],

@@ -48,7 +48,7 @@ fn ordered(a: usize, b: usize) -> Option<(usize, usize)> {
     (a != b).then_some((a.min(b), a.max(b)))
 }
 
-/// A link that does not exist is a misspelt one: the pair that was meant would go on being refused, or worse.
+/// A link that does not exist is a misspelt one: the pair that was meant would still be refused, or worse.
 fn link_of(element: &Element<'_, '_, '_>, attribute: &str, model: &Model) -> Option<usize> {
     let name = element.name(attribute)?;
     let link = model.link(&name);

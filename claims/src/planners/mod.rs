@@ -21,7 +21,7 @@ use crate::table::Table;
 /// What a contest came to.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Standings {
-    /// What was left out of the sets, in words.
+    /// What was left out of the sets, as text.
     pub notes: Vec<String>,
     /// The tables.
     pub tables: Vec<Table>,

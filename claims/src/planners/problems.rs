@@ -60,7 +60,7 @@ pub struct ProblemSet {
     pub problems: Vec<Problem>,
     /// Pairs of clear poses that were left out because the straight line between them is free.
     pub free_lines: usize,
-    /// What else was left out, in words; empty when nothing was.
+    /// What else was left out, as text; empty when nothing was.
     pub left_out: String,
 }
 

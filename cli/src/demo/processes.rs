@@ -110,7 +110,7 @@ impl Processes {
 }
 
 impl Drop for Processes {
-    /// After an early return: nothing of ours goes on running.
+    /// After an early return: nothing of ours continues running.
     fn drop(&mut self) {
         if let Err(failure) = self.end() {
             note(format_args!("taustream: {failure}"));

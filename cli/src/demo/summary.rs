@@ -51,9 +51,9 @@ pub(crate) struct Summary {
     executed_s: f64,
     clearance_m: f64,
     tracking_error_rad_max: f64,
-    /// Faults that were recovered from, in words.
+    /// Faults that were recovered from, as text.
     faults: Vec<String>,
-    /// Pauses by stalls of the computer that were ended by a resume, in words.
+    /// Pauses by stalls of the computer that were ended by a resume, as text.
     pauses: Vec<String>,
     frames_sent: u64,
     frames_lost: u64,

@@ -32,7 +32,7 @@ impl Subject {
     }
 
     /// The process whose rights count: a running streamer, else this one, which asks for the user. Its directory in
-    /// /proc, and who it is in words.
+    /// /proc, and who it is as text.
     pub(crate) fn process(&self) -> (String, String) {
         let streamer =
             self.processes().find(|(_, name)| STREAMER.starts_with(name) && name.len() >= COMM_MAX);

@@ -1,4 +1,4 @@
-//! `taustream status`: one report of the streamer, in words or as JSON.
+//! `taustream status`: one report of the streamer, as text or as JSON.
 use super::client::Client;
 use crate::arm::ArmName;
 use crate::failure::Failure;

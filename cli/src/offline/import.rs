@@ -78,7 +78,7 @@ impl fmt::Display for Summary {
     }
 }
 
-/// What is imported, in words, and what is worth saying about it.
+/// What is imported, as text, and what is worth saying about it.
 struct Source {
     words: String,
     notes: Vec<String>,

@@ -105,7 +105,7 @@ impl fmt::Display for PeakTable<'_> {
     }
 }
 
-/// Clearance in words; infinite when nothing can collide.
+/// Clearance as text; infinite when nothing can collide.
 pub(crate) fn clearance_words(clearance_m: f64, at_s: f64, between: (&str, &str)) -> String {
     if clearance_m.is_finite() {
         format!("{clearance_m:.4} m at t = {at_s:.3} s, between {} and {}", between.0, between.1)

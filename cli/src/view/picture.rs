@@ -181,7 +181,7 @@ fn timing(r: &Report) -> [Line; 2] {
     [cycles, lateness]
 }
 
-/// A report in one line of a log, faults in words.
+/// A report in one line of a log, faults as text.
 pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
     let pose: Vec<String> = r.measured_rad.iter().take(r.joints()).map(|q| format!("{q:+.3}")).collect();
     let fault = if r.fault_reason == 0 {

@@ -46,7 +46,7 @@ impl Adoption {
         Self { steps: plan.verification(), at: 0, sources, source: 0, held: None, not_before: Nanos(0) }
     }
 
-    /// Begins anew with a drive in this state; `false` for a state in which nothing is held.
+    /// Begins again with a drive in this state; `false` for a state in which nothing is held.
     ///
     /// Real time: no allocation.
     pub(crate) fn begin(&mut self, state: Option<DriveStep>) -> bool {

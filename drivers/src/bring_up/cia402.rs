@@ -1,8 +1,8 @@
-//! One CiA 402 node from silence to cyclic synchronous position (can-protocols section 1.5).
+//! One CiA 402 node from silence to cyclic synchronous position.
 //!
-//! First it only listens: a drive that is energised before this master has configured it is left as it is. Then the
+//! First it only receives: a drive that is energised before this master has configured it is left as it is. Then the
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's stall-free
-//! clock, which stands still while the master itself is stalled, so that our own lateness is no fault of a drive.
+//! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
@@ -32,7 +32,7 @@ const START_TRIES: u8 = 3;
 /// Heartbeats in a row that deny "operational" before it is believed: one may have been queued before the start.
 const DENIALS_MAX: u8 = 2;
 
-/// Where the bring-up stands.
+/// State of the bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NodeStage {
     /// Reading the statusword, changing nothing.
@@ -218,8 +218,8 @@ impl Node {
         }
     }
 
-    /// The newest target in counts, from the start of process data until the node is observed anew. Nothing else may
-    /// guess one: a drive that still listens would go there.
+    /// The newest target in counts, from the start of process data until the node is observed again. Nothing else may
+    /// guess one: a drive that still receives would go there.
     #[must_use]
     pub const fn commanded(&self) -> Option<i32> {
         self.commanded
@@ -373,7 +373,7 @@ impl Node {
         }
     }
 
-    /// Forgets findings, resets a drive in fault, and tries a refused drive again from the start.
+    /// Clears findings, resets a drive in fault, and tries a refused drive again from the start.
     ///
     /// Real time: no allocation.
     pub fn clear_faults(&mut self, now: Nanos) {
@@ -580,7 +580,7 @@ impl Node {
         self.stage = NodeStage::Configure { step: index + 1, since: now };
     }
 
-    /// Whether the value lets the plan go on; false asks again, or the stage has changed.
+    /// Whether the value lets the plan continue; false asks again, or the stage has changed.
     fn check_value(
         &mut self,
         now: Nanos,

@@ -4,7 +4,7 @@
 //! Then its registers are compared with the settings, mode and watchdog written, and both looked at once more before
 //! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
 //! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
-//! All times are on the driver's stall-free clock, which stands still while the master itself is stalled.
+//! All times are on the driver's stall-free clock, which does not advance while the master itself is stalled.
 use crate::bring_up::damiao_fault::{DamiaoFault, differs, register_object, status_code};
 use crate::bring_up::damiao_plan::{CONFIGURE, CheckResult, Job, MotorPlan, VERIFY};
 use crate::bring_up::fault::BringUpFault;
@@ -29,7 +29,7 @@ const SETTLE: Nanos = Nanos(100_000_000);
 /// Without feedback for so long, at one request a cycle, the motor is gone.
 const NO_REPLY: Nanos = Nanos(350_000_000);
 
-/// Where the bring-up stands.
+/// State of the bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum MotorStage {
     /// Asking for feedback, changing nothing.
@@ -215,7 +215,7 @@ impl Motor {
         known
     }
 
-    /// Forgets findings, clears an error of the motor, and tries a refused motor again from the start.
+    /// Clears findings, clears an error of the motor, and tries a refused motor again from the start.
     ///
     /// Real time: no allocation.
     pub fn clear_faults(&mut self, now: Nanos) {
@@ -234,7 +234,7 @@ impl Motor {
         }
     }
 
-    /// Forgets everything that is known of it, as at start.
+    /// Clears everything that is known of it, as at start.
     ///
     /// Real time: no allocation.
     pub fn start_over(&mut self, now: Nanos) {
@@ -374,7 +374,7 @@ impl Motor {
         Some(Request::Refresh)
     }
 
-    /// Registers and feedback take turns, so that the position stays young.
+    /// Registers and feedback alternate, so that the position stays recent.
     fn verifying(&mut self, now: Nanos, at: (usize, Nanos)) -> Option<Request> {
         let (index, since) = at;
         let Some(job) = VERIFY.get(index).copied() else {

@@ -23,7 +23,7 @@ pub enum DamiaoFault {
     CommandFar = BASE | FINDING | 0x05,
     /// It disabled itself.
     DroppedOut = BASE | FINDING | 0x06,
-    /// It fell silent while it was in use.
+    /// Its feedback stopped while it was in use.
     NoReply = BASE | FINDING | 0x07,
     /// Its registers are not as they were left.
     Restarted = BASE | FINDING | 0x08,

@@ -104,7 +104,7 @@ impl MotorPlan {
         }
     }
 
-    /// Whether an answer lets the list go on. `index` is of [`CONFIGURE`], or none in [`VERIFY`].
+    /// Whether an answer lets the list continue. `index` is of [`CONFIGURE`], or none in [`VERIFY`].
     #[must_use]
     pub fn check_value(&self, job: Job, index: Option<usize>, value: [u8; 4]) -> CheckResult {
         let register = job.register();

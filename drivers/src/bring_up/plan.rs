@@ -1,4 +1,4 @@
-//! The configuration of a CSP drive as a list of SDO steps, in the order of can-protocols section 1.5.
+//! The configuration of a CSP drive as a list of SDO steps.
 use crate::codec::canopen::{
     COB_PDO_STEP, COB_RPDO1, COB_TPDO1, MASTER_NODE, PDO_DISABLED, PDO_NO_RTR, PdoEntry,
 };
@@ -10,7 +10,7 @@ use taustream_arm::Reaction;
 
 /// Period of the heartbeats that drives send, and that this master sends.
 pub use taustream_arm::bus_load::HEARTBEAT_MS;
-/// Silence after which a node, or the master, counts as lost: three missed heartbeats and some jitter.
+/// Time without frames after which a node, or the master, counts as lost: three missed heartbeats and some jitter.
 pub const HEARTBEAT_LOST_MS: u16 = 350;
 
 /// Reaction to a lost master: torque off at once (object 0x6007).

@@ -15,7 +15,7 @@ const RESET_LOW_CYCLES: u8 = 3;
 /// Answers in a row without "follows the target" that make a fault.
 const NOT_FOLLOWING_MAX: u8 = 3;
 
-/// What the drive last said, and when it may be trusted.
+/// The last feedback of the drive, and when it may be trusted.
 #[derive(Clone, Copy, Debug)]
 pub struct Received {
     /// Newest statusword.
@@ -45,7 +45,7 @@ enum Phase {
 /// Which target goes out beside the controlword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetSource {
-    /// Where the drive stands.
+    /// State of the drive.
     Measured,
     /// What it has held since before this master.
     Held,
@@ -150,7 +150,7 @@ impl Power {
         self.fault.get_or_insert(fault);
     }
 
-    /// Forgets the fault and, when the drive is in fault, starts the reset sequence.
+    /// Clears the fault and, when the drive is in fault, starts the reset sequence.
     pub fn clear(&mut self, status: u16) {
         self.fault = None;
         self.not_following = 0;
@@ -253,7 +253,7 @@ impl Power {
             Phase::Disabling { since, rung: reached } => {
                 let at = rung(step);
                 if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
-                    // Reached, in fault, or it does not listen to the gentle way: voltage off.
+                    // Reached, in fault, or it ignores the shutdown command: voltage off.
                     self.phase = Phase::Off;
                 } else if at < reached {
                     self.phase = Phase::Disabling { since: now, rung: at };
@@ -300,7 +300,7 @@ impl Power {
         }
     }
 
-    /// Whatever fails here, the drive goes on holding as it did.
+    /// Whatever fails here, the drive continues to hold as it did.
     fn advance_taking_over(&mut self, now: Nanos, step: Option<DriveStep>, received: Received, since: Nanos) {
         if !holds(step) {
             self.drop_out(step);
@@ -350,8 +350,8 @@ impl Power {
     fn control_up(step: Option<DriveStep>, received: Received) -> u16 {
         match step {
             Some(DriveStep::SwitchOnDisabled) => CONTROL_SHUTDOWN,
-            // The step into torque needs a recent word of the drive; staying in it does not: a silent drive that
-            // still listens must be able to follow the arm to rest.
+            // The step into torque needs a recent word of the drive; staying in it does not: a drive without feedback that
+            // still receives must be able to follow the arm to rest.
             Some(DriveStep::SwitchedOn) if received.fresh => CONTROL_ENABLE,
             Some(DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn) => CONTROL_SWITCH_ON,
             Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,

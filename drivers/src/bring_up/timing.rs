@@ -7,7 +7,7 @@ use crate::servo::{DriveTarget, Nanos};
 pub struct Timeouts {
     /// Each confirmation of a step.
     pub step: Nanos,
-    /// Age up to which what a drive said is recent.
+    /// Age up to which feedback of a drive is recent.
     pub feedback: Nanos,
 }
 
@@ -22,7 +22,7 @@ pub struct BringUpCycle {
     pub other_master: bool,
 }
 
-/// Silence of other masters after which the bus counts as ours.
+/// Time without frames of other masters after which the bus counts as ours.
 const OTHER_MASTER_QUIET: Nanos = Nanos(500_000_000);
 /// A longer gap between two cycles is our own stall and does not count as waiting.
 const STEP_PERIODS: u64 = 10;

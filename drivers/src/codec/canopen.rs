@@ -75,7 +75,7 @@ pub fn decode_sync(frame: &CanFrame) -> Option<Option<u8>> {
 pub enum NmtCommand {
     /// Start: go operational.
     Start,
-    /// Stop: only NMT and heartbeat go on.
+    /// Stop: only NMT and heartbeat continue.
     Stop,
     /// Go pre-operational.
     PreOperational,

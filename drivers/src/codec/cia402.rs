@@ -128,7 +128,7 @@ impl Cia402Driver {
             step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
             feedback: nanos("feedback_age_s_max", supervision.feedback_age_s_max)?,
         };
-        // Energising must not start with a step: the command has to stand where the joint stands, by the stricter of
+        // Energising must not start with a step: the command has to equal the measured angle, by the stricter of
         // the two distances that the settings call impossible.
         let near_rad = supervision.tracking_error_rad_max.min(supervision.position_jump_rad_max);
         nanos("tracking_error_rad_max and position_jump_rad_max", near_rad)?;
@@ -184,7 +184,7 @@ impl Cia402Driver {
         self.drives.get_mut(index)
     }
 
-    /// The setpoints whose turn it is, and whatever must not wait for a turn: a new controlword, and torque off.
+    /// The setpoints that are due, and whatever must not wait: a new controlword, and torque off.
     fn push_setpoints(
         &mut self,
         cycle: BringUpCycle,

@@ -1,12 +1,12 @@
 //! Statusword, controlword and process data of a CiA 402 drive in cyclic synchronous position.
 //!
-//! Source: CiA 402-2, finite state automaton (can-protocols section 1.4).
+//! Source: CiA 402-2, finite state automaton.
 use crate::codec::canopen::{COB_RPDO1, COB_TPDO1, cob, node_of};
 use crate::frame::CanFrame;
 use std::f64::consts::TAU;
 use taustream_arm::{Cia402, Servo};
 
-/// Where the finite state automaton of a drive stands.
+/// State of the finite state automaton of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveStep {
     /// Starting up; no command acts.

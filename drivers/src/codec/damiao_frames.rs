@@ -7,7 +7,7 @@
 //! feedback with the same three bytes would be of a motor that is disabled and stands within 0.4 % of its lowest angle.
 //! Settings keep joints out of there, so such a frame is an answer, whatever was asked.
 //!
-//! Source: Damiao DM-J43xx manual and the firmware's register table (can-protocols section 2).
+//! Source: Damiao DM-J43xx manual and the firmware's register table.
 use crate::codec::mit::{MitRanges, MitState};
 use crate::frame::{CanFrame, CanId};
 use taustream_arm::DamiaoMode;

@@ -1,4 +1,4 @@
-//! Abort and emergency codes in words.
+//! Abort and emergency codes as text.
 //!
 //! Sources: CiA 301 table "SDO abort codes" and "Emergency error codes", CiA 402-2 "Error codes".
 

@@ -5,7 +5,7 @@
 //! truncates, which is a mean error of half a step in one direction: 0.19 mrad of angle in 25 rad. Zero is no code of a
 //! symmetric range: it decodes to half a step above.
 //!
-//! Source: Mini Cheetah motor driver (B. Katz, MIT, 2018), as the vendors' manuals print it (can-protocols section 0).
+//! Source: Mini Cheetah motor driver (B. Katz, MIT, 2018), as the vendors' manuals print it.
 
 /// A range of a quantity on the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]

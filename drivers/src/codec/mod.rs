@@ -1,6 +1,6 @@
 //! Servo protocols as pure functions between frames and values, and the drivers built on them.
 //!
-//! The encoders and decoders serve both ends: the master in this room, and the simulated drives. No I/O, no clock.
+//! The encoders and decoders serve both ends: the master in this crate, and the simulated drives. No I/O, no clock.
 pub mod canopen;
 pub mod cia402;
 pub mod cia402_words;

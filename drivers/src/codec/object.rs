@@ -1,7 +1,7 @@
 //! The objects of the CiA 301 and CiA 402 dictionaries that a CSP drive needs, by name.
 //!
 //! Widths and access rights are the simulator's and the bring-up's business; here stand only addresses.
-//! Source: CiA 301 section 7.5 and CiA 402-2 (can-protocols table "Objects needed for CSP").
+//! Source: CiA 301 section 7.5 and CiA 402-2.
 
 /// Where an object stands: 16-bit index and 8-bit subindex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -8,7 +8,7 @@ use crate::codec::object::Address;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
 use crate::servo::Nanos;
 
-/// How long one answer may take (can-protocols 1.2).
+/// How long one answer may take.
 pub const SDO_TIMEOUT: Nanos = Nanos(500_000_000);
 /// How often a request is sent before the client gives up.
 pub const SDO_TRIES: u8 = 3;
@@ -138,7 +138,7 @@ impl SdoClient {
         self.transfer = Some(Transfer { job, state, tries: 0, toggle: None, value: SdoValue::EMPTY });
     }
 
-    /// Forgets the open transfer.
+    /// Clears the open transfer.
     pub fn cancel(&mut self) {
         self.transfer = None;
     }

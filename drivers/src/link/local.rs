@@ -208,7 +208,7 @@ impl LocalServos {
         }
     }
 
-    /// Forgets the master that has gone, and listens for the next.
+    /// Clears the master that has gone, and listens for the next.
     fn part(&mut self) {
         self.master = None; // Closing it takes it out of `events`.
         let _is_watched_already = watch(&self.events, &self.listener);

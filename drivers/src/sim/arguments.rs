@@ -1,4 +1,4 @@
-//! The words of `taustream-servosim`. They stand in the library so that the manual page is made of them.
+//! The arguments of `taustream-servosim`, in the library because the manual page is made from them.
 use crate::link::LinkChoice;
 use clap::Parser;
 

@@ -1,7 +1,7 @@
 //! One simulated CiA 402 drive: frames and time in, frames out.
 //!
 //! No I/O and no clock: the same frames at the same times give the same answers, bit by bit. The drive knows one bus
-//! and one motor; faults of the wiring (silence, delay, loss) are the rig's.
+//! and one motor; faults of the wiring (silence, delay, loss) belong to the simulator.
 //!
 //! At a SYNC the drive first samples and sends its TPDOs, then applies the RPDOs that came since the last SYNC: a
 //! setpoint acts from the SYNC after it, and feedback shows the state before it.

@@ -87,7 +87,7 @@ pub enum FaultRequestError {
     /// A piece without an equals sign, or with an unknown key.
     #[error("{0:?} is no part of a fault: expected joint=, kind=, at_s=, after=, for_s= or value=")]
     Key(String),
-    /// A key that stands twice.
+    /// A key that appears twice.
     #[error("{0} appears twice")]
     Twice(String),
     /// A key that must be there.

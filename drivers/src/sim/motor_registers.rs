@@ -1,6 +1,6 @@
 //! The registers of a simulated Damiao motor, and what its flash keeps of them.
 //!
-//! Source: the firmware's register table (can-protocols section 2). Values of registers that nothing here acts on are
+//! Source: the firmware's register table. Values of registers that nothing here acts on are
 //! plausible ones of a DM-J4310.
 use super::motor::MotorParameters;
 use crate::codec::damiao_frames::{Register, TIMEOUT_UNITS_A_MS, is_integer};

@@ -73,7 +73,7 @@ impl Nmt {
         self.state = state;
     }
 
-    /// Goes on with a restart; true at the moment it ends.
+    /// Continues a restart; true at the moment it ends.
     pub(crate) fn boot(&mut self, now: Nanos, duration_s: f64) -> bool {
         if self.state != NmtState::BootUp {
             return false;

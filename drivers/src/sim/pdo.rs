@@ -126,7 +126,7 @@ impl Pdos {
         }
     }
 
-    /// Forgets what is latched: PDOs do not outlive the operational state.
+    /// Clears what is latched: PDOs do not outlive the operational state.
     pub(crate) fn drop_latched(&mut self) {
         for rpdo in &mut self.receive {
             rpdo.latched = None;

@@ -56,7 +56,7 @@ pub(crate) enum Slowing {
 /// What the motor control has to do after a transition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
-    /// Go on.
+    /// Continue.
     Continue,
     /// Energise and follow the setpoints from the present position.
     Energise,

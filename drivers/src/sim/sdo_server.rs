@@ -19,7 +19,7 @@ pub(crate) trait Objects {
     fn write(&mut self, address: Address, bytes: &[u8], sized: bool) -> Result<(), AbortCode>;
 }
 
-/// A read that goes on over several frames.
+/// A read that continues over several frames.
 #[derive(Clone, Debug)]
 struct Upload {
     address: Address,
@@ -32,7 +32,7 @@ struct Upload {
 /// Longest value that can be written.
 const WRITTEN_MAX: usize = 4;
 
-/// A write that goes on over several frames.
+/// A write that continues over several frames.
 #[derive(Clone, Debug)]
 struct Download {
     address: Address,
@@ -83,7 +83,7 @@ impl SdoServer {
         Some(SdoResponse::Abort(read.or(written)?, error_text::ABORT_TIMEOUT))
     }
 
-    /// Forgets the transfer in flight.
+    /// Clears the transfer in flight.
     pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }

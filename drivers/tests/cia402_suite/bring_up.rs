@@ -4,7 +4,7 @@ use taustream_arm::Reaction;
 use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
-/// Every frame that node 1 is sent from the first look to NMT start, written out from can-protocols 1.2 to 1.5.
+/// Every frame that node 1 is sent from the first look to NMT start, written out from CiA 301 and CiA 402-2.
 const BRING_UP_OF_NODE_1: &str = "
 601 40 41 60 00 00 00 00 00
 000 82 01

@@ -1,4 +1,4 @@
-//! CANopen frames against bytes written out from can-protocols 1.1 and 1.2, and decoders against anything.
+//! CANopen frames against bytes written out from CiA 301, and decoders against anything.
 use super::{SeededRng, frame, hex};
 use taustream_drivers::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState, PdoEntry, decode_sync, sync};
 use taustream_drivers::codec::cia402::{DriveStep, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo};

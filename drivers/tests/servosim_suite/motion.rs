@@ -25,7 +25,7 @@ fn drive_that_is_enabled_follows_a_motion_within_a_milliradian() {
 /// Angle and speed at one instant.
 type Sample = (u64, f64, f64);
 
-/// The first two samples between which a joint moved as no joint with this motor can, in words.
+/// The first two samples between which a joint moved as no joint with this motor can, as text.
 fn impossible(samples: &[Sample], p: &PlantParameters) -> Option<String> {
     let most_rad_s2 = (p.torque_nm_max + p.gravity_nm + p.coulomb_nm + 5.0) / p.inertia_kg_m2;
     samples.windows(2).find_map(|pair| {

@@ -53,7 +53,7 @@ pub struct SweepRules {
     pub checks_max: usize,
     /// Bracket within which the least distance is found; infinite when it is not wanted.
     pub bracket_m: f64,
-    /// True to go on to the first contact in time; false to end at any.
+    /// True to continue to the first contact in time; false to end at any.
     pub first_contact: bool,
 }
 

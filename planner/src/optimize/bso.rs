@@ -6,7 +6,7 @@
 //! Source: Wang et al. (2022) compares with it and gives neither w nor c; `c_1` = 1.2 and `c_2` = 0.5 are those of the
 //! widely copied Matlab program, w = 0.9 is ours. Korani, "Bacterial Foraging Oriented by Particle Swarm
 //! Optimization Strategy for PID Tuning", GECCO 2008. Read as: fresh random numbers for every coordinate; survivors
-//! pass velocity and own best on to their copies; who is dispersed starts anew. This is the reading that "bso" means,
+//! pass velocity and own best on to their copies; who is dispersed starts again. This is the reading that "bso" means,
 //! since the paper's own reference for BSO (Abd-Elazim and Ali 2013) has it; the other one, of Biswas et al. (2007), is
 //! [`super::bso_step`].
 //!

@@ -1,12 +1,12 @@
 //! BSO of 2007: bacteria that, after each step of chemotaxis, take a particle's step towards the best of all.
 //!
 //! Chemotaxis is BFOA's, with its random turns. Then, one bacterium after another, v = w v + c r (best - x), and x + v
-//! is where it goes on from, better or worse.
+//! is where it continues from, better or worse.
 //!
 //! Source: Biswas, Dasgupta, Das and Abraham, "Synergy of PSO and Bacterial Foraging Optimization", 2007: the best of
 //! all pulls, a bacterium's own best does not. w = 0.729 and c = 1.494 are Clerc and Kennedy's; the step is as long as
 //! the velocity says. Read as [`super::bso`] is: a random number for every coordinate, velocity starts at nothing,
-//! survivors pass it on, who is dispersed starts anew.
+//! survivors pass it on, who is dispersed starts again.
 //!
 //! Random numbers of a drift: r for each coordinate.
 use super::bacteria::{Bacterium, Colony, Exempt, Heading, Parameters, tumble};

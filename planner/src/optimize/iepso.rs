@@ -1,6 +1,6 @@
 //! IEPSO: particles that also exchange their bests, and of which the worst are replaced.
 //!
-//! To PSO's velocity comes `c_3` `r_3` (best - own best), and in every iteration the worst particles start anew.
+//! To PSO's velocity comes `c_3` `r_3` (best - own best), and in every iteration the worst particles start again.
 //!
 //! Source: Lv et al. (2019), eq. 3 to 5 and table 4. Corrected against printed: the exchange has a sign (printed:
 //! |best - own best|, which pushes every coordinate to its upper bound). In both readings: w falls from 0.9 to 0.4

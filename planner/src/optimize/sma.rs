@@ -1,7 +1,7 @@
 //! SMA: slime mould that pulses between food and itself.
 //!
 //! The population is sorted; W weighs every mould by how its cost lies between best and worst (more for the better
-//! half, less for the other). With probability z a mould starts anew. Else, coordinate by coordinate, with
+//! half, less for the other). With probability z a mould starts again. Else, coordinate by coordinate, with
 //! probability p = tanh |cost - best| it goes to best + vb (W `X_A` - `X_B`), otherwise to vc x; vb is uniform in
 //! -a..a with a = artanh(1 - t/T), vc in -b..b with b = 1 - t/T. The second move shrinks to the origin.
 //!
@@ -12,7 +12,7 @@
 //! eq. 21's 1 - t/T, b as the bound of vc (eq. 26 calls it vb), A and B drawn for each coordinate, the best ever seen
 //! as best; everybody moves, and then all are evaluated.
 //!
-//! Random numbers of a mould: whether it starts anew; its point (or one number); else for each coordinate r, and then
+//! Random numbers of a mould: whether it starts again; its point (or one number); else for each coordinate r, and then
 //! A, B, the weight's, vb's, or vc's.
 use super::problem::Refusal;
 use super::session::{Agent, End, Schedule, Session, costs, sort};
@@ -23,7 +23,7 @@ use super::{Gwo, Optimizer, Reading, Setup};
 pub struct Sma {
     /// Moulds and iterations.
     pub schedule: Schedule,
-    /// Probability of starting anew, z.
+    /// Probability of starting again, z.
     pub restart: f64,
     /// Which reading.
     pub reading: Reading,

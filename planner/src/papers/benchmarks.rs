@@ -89,7 +89,7 @@ impl Function {
     }
 }
 
-/// Beyond 500 the waves would go on and deeper; a moved function stays at its edge there and rises.
+/// Beyond 500 the waves would continue and deepen; a moved function stays at its edge there and rises.
 fn schwefel(x: f64) -> f64 {
     let inside = x.clamp(-500.0, 500.0);
     (x - inside).abs() - inside * inside.abs().sqrt().sin()

@@ -33,7 +33,7 @@ pub struct Compared {
     pub p99_ratio: f64,
 }
 
-/// Measures the cycle of `options.settings` and of the arms `beside` it in turns. `options.seconds` is the time of each.
+/// Measures the cycle of `options.settings` and of the arms `beside` it alternately. `options.seconds` is the time of each.
 ///
 /// # Errors
 /// As for [`super::cycle`].

@@ -43,7 +43,7 @@ fn first_enable_in_the_first_cycle_of_disabled_is_taken() {
     harness.run_until(Phase::Holding, 50);
 }
 
-/// A drive that restarts tells its pose anew; the step from the old one is no speed.
+/// A drive that restarts tells its pose again; the step from the old one is no speed.
 #[test]
 fn drive_that_is_configured_again_elsewhere_delays_disabled_until_its_speed_is_known() {
     let mut harness = CycleHarness::new();

@@ -74,7 +74,7 @@ pub struct World {
     confirmed: u64,
     pub drive_target: Option<DriveTarget>,
     pub clears: u32,
-    /// How often the driver was asked to observe its drives anew.
+    /// How often the driver was asked to observe its drives again.
     pub start_overs: u32,
     /// Commands that arrived while energised, newest last, with their tick.
     pub arrived: Vec<(u64, JointArray)>,

@@ -1,6 +1,6 @@
 //! Records the frames of every CAN interface, in the format of `candump -L`, and fails when one of them is missing.
 //!
-//! One raw socket, bound to no interface, goes on when an interface is deleted and made anew. Frames wait in a receive
+//! One raw socket, bound to no interface, continues when an interface is deleted and made again. Frames wait in a receive
 //! buffer that holds seconds of traffic and are taken in batches, so the recorder costs the machine few system calls. After SIGTERM
 //! it empties the socket, and asks the kernel whether a frame was ever dropped.
 #![expect(unsafe_code, reason = "raw CAN sockets, recvmmsg and time stamps have no safe wrapper")]

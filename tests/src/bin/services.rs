@@ -76,7 +76,7 @@ fn perform(what: What) -> Result<usize> {
             }
             let image = debian::image(&cache)?;
             let since = Instant::now();
-            // Made anew: files of an earlier run must not pass a check.
+            // Made again: files of an earlier run must not pass a check.
             for folder in [&output, &cache.join("controller")] {
                 let _not_there = std::fs::remove_dir_all(folder);
                 std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;

@@ -1,4 +1,4 @@
-//! Stalls one thread of a process: a debugger holds it, everything else of the process goes on.
+//! Stalls one thread of a process: a debugger holds it, everything else of the process continues.
 use anyhow::{Context, Result};
 use nix::sys::ptrace::{self, Options};
 use nix::sys::wait::{WaitPidFlag, waitpid};

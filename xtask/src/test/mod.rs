@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     /// List parts and steps with what they need, and run nothing.
     #[arg(long)]
     list: bool,
-    /// Run the steps this many times, go on after a failure, and print a table of the runs.
+    /// Run the steps this many times, continue after a failure, and print a table of the runs.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
 }

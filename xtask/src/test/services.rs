@@ -13,7 +13,7 @@ pub(super) const STEPS: &[Step] =
 fn services(place: &Place) -> Result<Outcome> {
     let folder = place.target.join("services");
     let stage = folder.join("stage");
-    // Made anew: a file that is installed no more must not be found.
+    // Made again: a file that is installed no more must not be found.
     let _not_there = std::fs::remove_dir_all(&stage);
     install::stage(&place.root, &place.programs, &stage)?;
     let mut command = Command::new(place.programs.join("services"));
