@@ -21,7 +21,7 @@ pub(crate) fn check_times(fault_list: &FaultList, cycle: &CycleSettings, supervi
         let expected = format!("at most drive_watchdog_ms = {watchdog_ms}: after it the drives have tripped");
         fault_list.add(None, "cycle.stall_resume_ms", &stall_ms.to_string(), &expected);
     }
-    // A stall of ours is to be told as such before the drives count their master as lost. Its last heartbeat may have left
+    // A stall of ours must be reported as such before the drives count their master as lost. Its last heartbeat may have left
     // a whole heartbeat's time before the stall.
     let heartbeat_ms = watchdog_ms.saturating_add(u32::from(HEARTBEAT_MS));
     if u32::from(cycle.heartbeat_lost_ms) <= heartbeat_ms {

@@ -2,7 +2,7 @@
 //!
 //! A driver serves the joints of one bus that speak one protocol. It is pure: frames in, frames out, time as an
 //! argument. Bring-up (finding, configuring, energising) is a state machine inside the driver, advanced once a
-//! cycle by `encode`; the streamer only wishes and watches.
+//! cycle by `encode`; the streamer only sets the target and reads the status.
 use crate::frame::{CanFrame, CanId, FrameBatch};
 use taustream_motion::MAX_JOINTS;
 

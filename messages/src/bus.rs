@@ -31,7 +31,7 @@ pub struct BusReport {
     pub error_data: [u8; 8],
     /// Frames that arrived and were lost because this computer did not read them in time, since the link was opened.
     pub receive_lost: u64,
-    /// Frames handed over whose echo was lost in this computer, since the link was opened.
+    /// Frames passed to the link whose echo was lost in this computer, since the link was opened.
     pub echoes_missing: u64,
 }
 

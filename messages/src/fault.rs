@@ -116,7 +116,7 @@ pub enum BusFault {
 }
 
 impl BusFault {
-    /// Every trouble.
+    /// Every fault.
     pub const ALL: [Self; 11] = [
         Self::QueueFull,
         Self::Unconfirmed,

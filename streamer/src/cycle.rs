@@ -136,7 +136,7 @@ impl Core {
         self.buses.links_mut()
     }
 
-    /// Carries out what the judgement asks of the other stages.
+    /// Carries out what the evaluation requires of the other stages.
     fn apply(&mut self, tick: Tick, actions: &Actions) {
         if let Some(order) = actions.speed {
             self.track.change_speed(order);
@@ -194,7 +194,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     core.ledger.find_stopped(&mut cycle_state);
     let requested = core.track.sample(drive_target == DriveTarget::Enabled, &core.ledger, &mut cycle_state);
     probe.ended(Stage::Sample);
-    let command = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last gate before metal.
+    let command = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last check before the bus.
     probe.ended(Stage::Guard);
 
     let drive_commands = core.supervisor.referencing().to_drives(command.joints());

@@ -119,7 +119,7 @@ pub struct BusState {
     pub consecutive_lost: u32,
     /// Frames passed to the link and not yet seen on the wire.
     pub in_flight: u32,
-    /// Frames handed over whose echo was lost in this computer, since the link was opened.
+    /// Frames passed to the link whose echo was lost in this computer, since the link was opened.
     pub echoes_missing: u64,
     /// Frames that were lost because they arrived faster than they were read, since the link was opened.
     pub overflowed: u64,

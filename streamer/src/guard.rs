@@ -150,7 +150,7 @@ impl Guard {
         })
     }
 
-    /// Forgets a brake that has ended.
+    /// Clears a brake that has ended.
     ///
     /// Real time: a store.
     pub fn release(&mut self) {
@@ -194,7 +194,7 @@ impl Guard {
 
     fn braking_command(&self, running: &Running, ledger: &Ledger, cycle_state: &mut CycleState) -> Setpoint {
         let mut setpoint = Setpoint { position_rad: ledger.position_rad(), ..Setpoint::default() };
-        // Behind a stall the drives stand still at the last command: the brake is over there.
+        // After a stall the drives are at rest at the last command: the brake has ended.
         if cycle_state.frozen {
             cycle_state.braking = Braking::Rested;
             return setpoint;

@@ -67,11 +67,11 @@ pub(crate) struct BusActivity {
 ///
 /// Their count alone does not tell a bus that nobody acknowledges from a computer that reads too slowly: frames that
 /// come back are lost where a receive queue overflows, and then the count is off for good. So frames that are
-/// overdue are held against the bus only while the interface's queue holds them, or while none comes back at all from
+/// overdue are compared with the bus only while the interface's queue holds them, or while none comes back at all from
 /// an interface that has put them on the wire itself. All others were sent, and are written off.
 #[derive(Debug)]
 struct Echoes {
-    /// Frames handed over since the link was opened.
+    /// Frames passed to the link since the link was opened.
     sent: u64,
     /// Frames that will not come back any more.
     missing: u64,
@@ -154,7 +154,7 @@ impl Echoes {
         }
     }
 
-    /// Frames handed over that may still come back.
+    /// Frames passed to the link that may still come back.
     fn in_flight(&self) -> u64 {
         let (sent, confirmed) = self.history[self.slot];
         sent.saturating_sub(confirmed).saturating_sub(self.missing)

@@ -4,7 +4,7 @@
 //! guard, supervision and the report read it. A joint whose frame was refused was not commanded, whatever became of the
 //! others: its last setpoint stays the one before, and the time since then grows.
 //!
-//! A drive bridges a gap of `tolerated_gap_periods` of its own setpoints. A joint that misses more, while others go on,
+//! A drive bridges a gap of `tolerated_gap_periods` of its own setpoints. A joint that misses more, while others continue,
 //! has *stopped*: its drive stands at the last setpoint that it got, so nothing but that is commanded until the arm is at
 //! rest (`Track`), and supervision stops the others on their path.
 use crate::cycle_state::{CycleState, LostSetpoints};

@@ -21,7 +21,7 @@ const AXIS_PERIODS_MAX: u64 = 60_000;
 pub struct RequestedSetpoint {
     /// The setpoint, its derivatives by real time.
     pub setpoint: Setpoint,
-    /// The drives stand still at this pose: earlier commands do not count.
+    /// The drives are at rest at this pose: earlier commands do not count.
     pub restart: bool,
     /// The drives follow what is commanded.
     pub live: bool,

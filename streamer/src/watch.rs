@@ -3,7 +3,7 @@
 //! A setpoint of cycle N is sent behind SYNC N, applied at SYNC N+1 and interpolated up to SYNC N+2; the position
 //! that cycle M receives was sampled at SYNC M-1. So a measured position is compared with the command of two cycles
 //! ago ([`TRANSPORT_CYCLES`]): what is left is the drive's own following error, not the bus's delay. A drive that gets
-//! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever its turn is.
+//! a setpoint every k cycles interpolates over k, and lags by k - 1 more, whenever it is due.
 use crate::cycle_state::{BUSES_MAX, BusState, Cause, CycleState, LostSetpoints};
 use taustream_arm::Settings;
 use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};

@@ -138,7 +138,7 @@ impl Motor {
         status as u32 | (stage_celsius as u32) << 8 | (winding_celsius as u32) << 16
     }
 
-    /// It let go because no command came for longer than its watchdog.
+    /// It disabled itself because no command came for longer than its watchdog.
     #[must_use]
     pub const fn lost_master(&self) -> bool {
         self.received && self.feedback.status == STATUS_LOST_COMMUNICATION

@@ -312,7 +312,7 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn decode(&mut self, now: Nanos, frame: &CanFrame) {
-        let patient = self.clock.now();
+        let step_now = self.clock.now();
         if self.is_of_a_master(frame) {
             self.clock.note_other_master(frame.id());
         } else if let Some((node, status, position)) = decode_tpdo(frame) {

@@ -264,7 +264,7 @@ fn up_command(bus: &Bus) -> String {
 }
 
 /// Opens and sets up the socket: FD frames too, error frames, never waiting. A master's own frames come back to it as
-/// confirmations that they were on the wire, if the interface hands them back itself, which is told beside the socket.
+/// confirmations that they were on the wire, if the interface hands them back itself, which is stated beside the socket.
 fn open_socket(interface: &str, role: LinkRole) -> Result<(CanFdSocket, bool), OpenError> {
     let failed = |doing| move |source| OpenError::System { interface: interface.to_owned(), doing, source };
     let socket = CanFdSocket::open(interface).map_err(failed("open"))?;

@@ -199,7 +199,7 @@ fn frames_confirmed_late_but_within_tolerance_are_no_fault() {
 }
 
 /// Goal: another master that commands the drives, in motion or while they hold, stops the arm on its path and is named by
-/// its frame; the fault comes back while it goes on.
+/// its frame; the fault comes back while it continues.
 #[test]
 fn another_master_in_operation_stops_the_arm_on_the_path_and_is_named() {
     for moving in [true, false] {

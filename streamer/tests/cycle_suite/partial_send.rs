@@ -6,7 +6,7 @@ use taustream_messages::{BusFault, FaultReason, Phase};
 type Takes = fn(u64) -> usize;
 
 /// Every drive bridges a gap of two periods. Over each gap its command moves no faster than the stop limit, and no drive is
-/// commanded to go on from where it has stopped at more than what it may do from rest.
+/// commanded to continue from where it has stopped at more than what it may do from rest.
 fn assert_drives_are_commanded_within_their_limits(harness: &CycleHarness, row: usize) {
     let world = harness.world.lock().unwrap();
     let limits = harness.settings.robot.limits();
@@ -32,10 +32,10 @@ fn assert_drives_are_commanded_within_their_limits(harness: &CycleHarness, row: 
 }
 
 /// Goal: a setpoint that the kernel did not take was not commanded. Frames are left out by a pattern; whatever the pattern,
-/// no drive sees a step that its limits do not allow, lost setpoints are told with the joint, and the others stop on the
+/// no drive sees a step that its limits do not allow, lost setpoints are reported with the joint, and the others stop on the
 /// path. The first row is the one that was found: the wrist got 907 of 2708 commands, at 2.36 times its limit, unnoticed.
 #[test]
-fn batches_taken_in_part_command_no_drive_beyond_its_limits_and_are_told() {
+fn batches_taken_in_part_command_no_drive_beyond_its_limits_and_are_reported() {
     let rows: [(Takes, &[usize]); 6] = [
         (|tick| if tick % 3 == 0 { 7 } else { 4 }, &[3, 4, 5]),
         (|tick| if tick % 3 == 0 { 7 } else { 6 }, &[5]),

@@ -11,7 +11,7 @@ fn bus_fault(cause: Option<Cause>) -> Option<BusFault> {
 /// during bring-up and 910 in motion, on interfaces with and without an echo of their own. The count is right again: the
 /// fault that is planted then is found.
 #[test]
-fn echoes_lost_in_receiving_are_written_off_and_what_comes_after_them_is_judged_as_before() {
+fn echoes_lost_in_receiving_are_not_counted_and_later_ones_are_checked_as_before() {
     for from_wire in [false, true] {
         let mut harness = CycleHarness::new();
         harness.script(|w| w.from_wire = from_wire);
@@ -30,7 +30,7 @@ fn echoes_lost_in_receiving_are_written_off_and_what_comes_after_them_is_judged_
         assert_eq!(harness.cause(), None, "from the wire: {from_wire}");
         harness.run(50);
         let report = harness.report.unwrap().buses[0];
-        // Fewer than are sent in the time that they may take are not told from those that are on their way.
+        // Fewer than are sent in the time that they may take are not distinguished from those that are on their way.
         assert!(report.in_flight <= 70, "from the wire: {from_wire}, {} in flight", report.in_flight);
         assert_eq!(
             u64::from(report.in_flight) + report.echoes_missing,
@@ -62,7 +62,7 @@ fn echoes_that_come_after_they_were_written_off_do_not_hide_a_bus_that_stops_ack
     assert_eq!(bus_fault(harness.cause()), Some(BusFault::Unconfirmed));
 }
 
-/// Goal: a queue that drains too slowly is told, though frames do come back all the while.
+/// Goal: a queue that drains too slowly is reported, though frames do come back all the while.
 #[test]
 fn frames_that_wait_in_the_interface_are_not_acknowledged_even_while_older_ones_come_back() {
     let mut harness = CycleHarness::new();

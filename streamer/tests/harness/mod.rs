@@ -187,7 +187,7 @@ impl CanLink for FakeLink {
         }
         let taken = world.takes.map_or(frames.len(), |takes| takes(world.tick).min(frames.len()));
         let mut pending = world.pending;
-        // SYNC comes first; a drive whose frame was refused goes on with the target that it has.
+        // SYNC comes first; a drive whose frame was refused continues with the target that it has.
         let reached = taken.saturating_sub(1);
         pending[reached..JOINTS].copy_from_slice(&world.pipeline[0][reached..JOINTS]);
         // De-energised drives stay where they are, whatever is commanded.
