@@ -80,7 +80,7 @@ fn hex(text: &str) -> String {
     Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The state directory: what was asked for, else `$STATE_DIRECTORY` (systemd; the first of several), else
+/// The state directory: what was requested, else `$STATE_DIRECTORY` (systemd; the first of several), else
 /// `$XDG_STATE_HOME/taustream`, else `~/.local/state/taustream`, else `/var/lib/taustream`.
 #[must_use]
 pub fn directory(requested: Option<&Path>) -> PathBuf {

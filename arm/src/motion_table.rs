@@ -242,7 +242,7 @@ fn read_row(
 mod tests {
     use super::*;
 
-    /// A source that makes its bytes as they are asked for.
+    /// A source that makes its bytes as they are requested.
     struct Endless<I>(I);
 
     impl<I: Iterator<Item = u8>> Read for Endless<I> {

@@ -125,7 +125,7 @@ const DAMIAO_KEYS: [&str; 9] = [
 const CIA402_NODE_ID: [i64; 2] = [1, 127];
 /// Feedback tells only four bits of the id.
 const DAMIAO_ID: [i64; 2] = [1, 15];
-/// 0x7FF is where registers are asked for; 0 would win over everything else on the bus.
+/// 0x7FF is where registers are requested; 0 would win over everything else on the bus.
 const FEEDBACK_ID: [i64; 2] = [1, 0x7FE];
 const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
 const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");

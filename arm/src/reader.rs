@@ -138,7 +138,7 @@ pub(crate) fn numbers_of(
     numbers.into_iter().collect()
 }
 
-/// A key that was asked for, whether it was there, and its line.
+/// A key that was requested, whether it was there, and its line.
 struct RequestedKey {
     key: &'static str,
     there: bool,

@@ -25,7 +25,7 @@ pub struct RobotJoint {
 pub struct LinkShape {
     /// Index of the link in [`Robot::links`].
     pub link: usize,
-    /// Index into [`Chain::frames`]: 0 is the base, which stands still; frame i moves with joint i.
+    /// Index into [`Chain::frames`]: 0 is the base, which is fixed; frame i moves with joint i.
     pub frame: usize,
     /// Pose of the shape in that frame.
     pub pose: Pose,

@@ -48,7 +48,7 @@ pub struct RunContext<'a> {
     effort: Effort,
     /// Called with progress messages.
     say: &'a (dyn Fn(&str) + Sync),
-    /// Asked before every batch of evaluations; true ends everything.
+    /// Called before every batch of evaluations; true ends everything.
     is_over: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -63,7 +63,7 @@ impl<'a> RunContext<'a> {
         Self { effort, say, is_over }
     }
 
-    /// True when few and short runs are asked for.
+    /// True when few and short runs are requested.
     #[must_use]
     pub fn is_quick(&self) -> bool {
         self.effort.quick

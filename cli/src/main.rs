@@ -42,7 +42,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Turns what became of a command into words and an exit code.
+/// Converts the result of a command into a message and an exit code.
 fn finish(cli: &Cli, outcome: Result<(), Failure>) -> ExitCode {
     let form = Form::of(cli);
     match outcome {
@@ -92,7 +92,7 @@ fn command(form: Form, settings: Option<&Path>, command: Command, wait_s: f64) -
     live::command::run(form, &ArmName::read(settings)?, command, wait_s)
 }
 
-/// Says why on stderr, in the form that was asked for.
+/// Prints the reason on stderr, in the form that was requested.
 fn report(form: Form, failure: &Failure) -> ExitCode {
     if !matches!(failure, Failure::BrokenPipe) {
         match form {

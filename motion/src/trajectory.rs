@@ -226,7 +226,7 @@ pub struct Cursor {
     pub first: usize,
     /// Pose after the strokes that have ended.
     pub reached_rad: JointArray,
-    /// The latest instant that was asked for; a default cursor has none, and starts at the base.
+    /// The latest instant that was requested; a default cursor has none, and starts at the base.
     last_t_s: Option<f64>,
 }
 

@@ -176,7 +176,7 @@ fn sigma_under_any_requests_stays_inside_the_bounds_of_the_header() {
 }
 
 /// The bound of the second derivative is no larger than it must be: the worst requests reach it. They are 1 where phi'''
-/// is positive, seen back from the instant that is asked for.
+/// is positive, seen back from the instant that is requested.
 #[test]
 fn sigma_under_the_worst_requests_reaches_both_bounds() {
     let c = peak_constants(RAMP_N);

@@ -1,4 +1,4 @@
-//! Which method looks for the path, by the words that users write.
+//! Which method looks for the path, by the names that users write.
 use crate::optimize::{METHODS, Method};
 
 /// Which method looks for the path.

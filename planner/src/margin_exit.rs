@@ -1,6 +1,6 @@
-//! The exit path from the margin, for an arm that stands nearer to something than it should.
+//! The exit path from the margin, for an arm that is nearer to something than the margin.
 //!
-//! After a stop or a sag an arm may touch nothing and yet stand inside the margin, or so close to its edge that no
+//! After a stop or a sag an arm may touch nothing and still be inside the margin, or so close to its edge that no
 //! motion of the search's wary steps begins there. Then a short straight exit path is found first; planning continues
 //! from its end with the full margin. Only until the arm has left are the distances those that the start has.
 use crate::budget::Budget;
@@ -14,7 +14,7 @@ use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 
 /// A start that is nearer to an obstacle counts as touching it: encoders and models are no better.
 const FLOOR_M: f64 = 1e-3;
-/// How much less than the start's own distance is asked for, so that a step away from it can be proven.
+/// How much less than the start's own distance is requested, so that a step away from it can be proven.
 const SLACK_M: f64 = 5e-4;
 /// From here on the steps of the search can be proven: twice what [`SweepRules::EDGE`] keeps and resolves.
 const CLEAR_M: f64 = 8e-4;
@@ -24,9 +24,9 @@ const LEFT_M: f64 = 5e-5;
 const RINGS_M: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
 /// Directions that are tried a ring.
 const DIRECTIONS: u32 = 48;
-/// Poses a way.
+/// Poses per exit path.
 const STEPS: u32 = 24;
-/// Instants a motion at which it is asked whether it has left.
+/// Instants a motion at which it is checked whether the margin holds again.
 const INSTANTS: u32 = 2_000;
 
 /// The world as a start inside the margin has it.
@@ -49,7 +49,7 @@ pub struct Note {
 }
 
 impl<'a> Relaxed<'a> {
-    /// Gives way to where a start stands.
+    /// Reduces the margins to the distances of a start.
     ///
     /// # Errors
     /// When the start touches something, or nearly.
@@ -160,7 +160,7 @@ fn random_target(space: &Space, start_rad: &JointArray, rng: &mut SeededRng) -> 
     target
 }
 
-/// The first clear pose of a straight way.
+/// The first clear pose of a straight line.
 fn first_clear(
     world: &World,
     from_rad: &JointArray,

@@ -1,4 +1,4 @@
-//! What makes one verified motion better than another, by the words that users write.
+//! What makes one verified motion better than another, by the names that users write.
 use crate::cost::CostModel;
 use crate::dynamics::{Dynamics, NoMasses};
 use crate::verify::Proof;
@@ -48,10 +48,10 @@ impl Objective {
     }
 }
 
-/// Samples of a motion's way.
+/// Samples of a motion's path.
 const SAMPLES: u32 = 1_000;
 
-/// Weighs verified motions.
+/// Compares verified motions.
 pub struct Evaluator<'a> {
     /// What counts.
     pub objective: Objective,
@@ -94,7 +94,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The paper's cost of a way that touches nothing: its length in space and in joints, weighed.
+    /// The paper's cost of a path without contact: its weighted length in space and in joints.
     fn distance_cost(&self, motion: &Trajectory) -> f64 {
         let [length, travel, _] = CostModel::default().weights;
         let at = |i: u32| motion.sample(motion.duration_s() * f64::from(i) / f64::from(SAMPLES)).position_rad;

@@ -22,7 +22,7 @@ pub enum RightError {
          systemd unit or `rtprio {priority}` in /etc/security/limits.conf, or start with --allow-non-realtime"
     )]
     Priority {
-        /// The priority that was asked for.
+        /// The priority that was requested.
         priority: u8,
         /// `RLIMIT_RTPRIO`.
         limit: u64,
@@ -44,7 +44,7 @@ pub enum RightError {
     /// The thread cannot be bound to the CPU.
     #[error("cannot bind the cycle to CPU {cpu} ({error}); set cycle.cpu to a CPU that this process may use")]
     Cpu {
-        /// The CPU that was asked for.
+        /// The CPU that was requested.
         cpu: usize,
         /// The kernel's answer.
         error: io::Error,
@@ -74,7 +74,7 @@ pub fn sleep_until(deadline: Nanos) {
     };
     // Signals are blocked on this thread, so the bound is never met; it is there because every loop has one.
     for _ in 0..16 {
-        // SAFETY: `time` is a valid timespec; no remainder is asked for.
+        // SAFETY: `time` is a valid timespec; no remainder is requested.
         let answer = unsafe {
             libc::clock_nanosleep(
                 libc::CLOCK_MONOTONIC,

@@ -36,7 +36,7 @@ pub(super) const GREEDY: Contender = Contender {
     name: "greedy BFOA",
     make: |parameters| Box::new(Bfoa { parameters, ..Bfoa::greedy(Setup::default()) }),
 };
-/// As many points as bacteria weigh that tumble and never swim.
+/// As many points as bacteria evaluate that tumble and never swim.
 const SAMPLING: Contender = Contender {
     name: "random sampling",
     make: |p| {

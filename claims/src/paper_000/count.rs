@@ -15,7 +15,7 @@ const QUICK_EVALUATIONS: usize = 40;
 /// Fixed numbers of control points; the paper's is 3.
 const FIXED: std::ops::RangeInclusive<usize> = 1..=6;
 
-/// What one way of choosing brought: cost and whether it collides.
+/// The result of one choice: cost and whether it collides.
 type Brought = (f64, bool);
 
 struct CountScene {

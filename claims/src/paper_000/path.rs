@@ -1,4 +1,4 @@
-//! A way by corners, and what its motion is worth.
+//! A path by corners, and the cost of its motion.
 use super::{SEGMENT_S, refused};
 use crate::run_context::Stop;
 use taustream_arm::{Robot, Scene};
@@ -13,13 +13,13 @@ const CLEARANCE_M: [f64; 2] = [1e-4, 1.0];
 /// Points of a curve.
 const POINTS: u32 = 600;
 
-/// A way: corners with straight joint lines between them, and the profile along each.
+/// A path: corners with straight joint lines between them, and the profile along each.
 pub(super) struct TipPath {
     pub(super) corners: Vec<JointArray>,
     pub(super) profile: Box<dyn Profile + Send>,
 }
 
-/// What a way is worth.
+/// The cost of a path.
 #[derive(Clone, Copy)]
 pub(super) struct PathCost {
     pub(super) cost: PaperCost,
@@ -62,7 +62,7 @@ impl TipPath {
             return Err(Stop::Refused("a way without ends".to_owned()));
         };
         let inner = self.corners.len().saturating_sub(2);
-        // A way without corners is the same one with one in its middle.
+        // A path without corners equals one with a corner in its middle.
         let halved = [std::array::from_fn(|j| 0.5 * (first[j] + last[j]))];
         let points = if inner == 0 { &halved[..] } else { &self.corners[1..=inner] };
         let model = CostModel { expansion_m, ..CostModel::default() };
@@ -112,7 +112,7 @@ impl TipPath {
     }
 }
 
-/// Way of the joint that goes farthest.
+/// Travel of the joint that moves farthest.
 fn widest_rad(a: &JointArray, b: &JointArray) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

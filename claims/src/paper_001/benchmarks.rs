@@ -31,7 +31,7 @@ const DEVIATIONS: [[f64; 6]; 5] = [
     [2.6847, 0.3899, 6.4863e-16, 340.8653, 0.3008, 2.7749e-14],
     [0.0885, 0.0006, 0.0, 1832.0243, 0.0116, 0.0],
 ];
-/// Runs, dimensions and evaluations of the paper: its population of 50, first weighed, then moved 5000 times.
+/// Runs, dimensions and evaluations of the paper: its population of 50, first evaluated, then moved 5000 times.
 const RUNS: usize = 30;
 pub(super) const DIMENSIONS: usize = 30;
 const EQUAL: usize = 50 + 50 * 5000;

@@ -1,4 +1,4 @@
-//! Every scene and every way to go: who arrives, in how many steps, with how many virtual obstacles.
+//! Every scene and every method: who arrives, in how many steps, with how many virtual obstacles.
 use super::{Method, arrived, has_arrived, ours, pictures, scenes, virtuals};
 use crate::claim::Claim;
 use crate::registry::Outcome;
@@ -14,7 +14,7 @@ const VIRTUAL_U: f64 = 9.0;
 const TIME_MOVING_S: f64 = 11.86;
 const TIME_THREE_S: f64 = 8.98;
 
-/// All journeys through one scene, way by way in the order of [`Method::ALL`].
+/// All journeys through one scene, in the order of [`Method::ALL`].
 pub(super) struct Visit {
     pub(super) scene: taustream_planner::papers::planar::PlanarScene,
     pub(super) journeys: Vec<Vec<Journey>>,

@@ -10,7 +10,7 @@ use taustream_planner::papers::planar::{Journey, Numbers, Obstacle, PlanarDrive,
 /// Runs of everything; the paper shows one of each.
 const RUNS: usize = 30;
 const QUICK: usize = 4;
-/// Steps until a journey is given up; the straight way takes about 95.
+/// Steps until a journey is given up; the straight line takes about 95.
 const STEPS_MAX: usize = 4_000;
 const STEPS_QUICK: usize = 1_500;
 

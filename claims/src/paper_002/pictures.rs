@@ -11,7 +11,7 @@ const CORNERS: u32 = 48;
 /// Radius at which a virtual obstacle is drawn (cm).
 const VIRTUAL_CM: f64 = 2.0;
 
-/// A picture with a panel for each scene: the first run of each way.
+/// A picture with a panel for each scene: the first run of each method.
 pub(super) fn figures(visits: &[Visit]) -> Vec<Figure> {
     let panels: Vec<Panel> = visits.iter().map(panel).collect();
     let title = "Paper 002: first run of each way; purple: virtual obstacles of RBF";

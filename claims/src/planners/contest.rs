@@ -7,7 +7,7 @@ use taustream_arm::Robot;
 use taustream_motion::Trajectory;
 use taustream_planner::{PlanError, PlanOptions, plan};
 
-/// Instants of a motion at which its way is measured.
+/// Instants of a motion at which its path is measured.
 const INSTANTS: u32 = 1_000;
 
 /// What is compared.
@@ -30,9 +30,9 @@ pub struct Run {
     pub planning_s: f64,
     /// How long the motion takes, s.
     pub duration_s: f64,
-    /// Way of the tip, m.
+    /// Path length of the tip, m.
     pub tip_m: f64,
-    /// Ways of all joints, rad.
+    /// Travel of all joints, rad.
     pub travel_rad: f64,
     /// Poses that planning checked.
     pub checks: usize,
@@ -122,7 +122,7 @@ impl Contest {
     }
 }
 
-/// Way of the tip (m) and of all joints (rad) of a motion.
+/// Path length of the tip (m) and travel of all joints (rad) of a motion.
 fn distances(robot: &Robot, trajectory: &Trajectory) -> [f64; 2] {
     let duration_s = trajectory.duration_s();
     let pose = |i: u32| trajectory.sample(duration_s * f64::from(i) / f64::from(INSTANTS)).position_rad;

@@ -60,7 +60,7 @@ enum Form {
     Cylinder { length: f64, radius: f64 },
 }
 
-/// Reads every file of a directory; from each at most `count` problems, taken in turns from its sets.
+/// Reads every file of a directory; from each at most `count` problems, taken alternately from its sets.
 ///
 /// # Errors
 /// Which file is at fault, and why.

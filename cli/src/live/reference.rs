@@ -1,4 +1,4 @@
-//! `taustream reference`: which joints' turns are known, and the operator's word where a joint stands.
+//! `taustream reference`: shows which joints are referenced, and sets references.
 use super::client::Client;
 use crate::args::ReferenceArgs;
 use crate::arm::{self, ArmName};
@@ -13,7 +13,7 @@ use taustream_arm::revolution::possible_rad;
 use taustream_arm::{Feedback, Servo, Settings};
 use taustream_messages::{Command, ReferenceState, Report};
 
-/// Most angles that are listed: a single turn behind a gear can mean a hundred.
+/// Most angles that are listed: a single-turn encoder behind a gear can allow a hundred.
 const ANGLES_MAX: usize = 12;
 
 /// What is known of one joint.
@@ -23,9 +23,9 @@ struct JointReference {
     referenced: bool,
     known: &'static str,
     feedback: &'static str,
-    /// Where it is shown to stand; only true when referenced.
+    /// Its shown angle; only valid when referenced.
     measured_rad: f64,
-    /// Where it may stand by its feedback, inside its range.
+    /// The angles that its feedback allows, inside its range.
     possible_rad: Vec<f64>,
     /// What was answered to the word that was given.
     answer: Option<String>,
@@ -95,7 +95,7 @@ fn joint_of(settings: &Settings, word: &str) -> Result<usize, Failure> {
     })
 }
 
-/// The angles that `--confirm` stands for: what is shown, where it can mean one angle only.
+/// The angles that `--confirm` confirms: the shown ones, where the feedback allows one angle only.
 fn confirmed(
     settings: &Settings,
     report: &Report,

@@ -94,7 +94,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
     })
 }
 
-/// A trajectory file that says which robot it was made for; offline use may leave that out, the streamer may not may not.
+/// A trajectory file that says which robot it was made for; offline use may leave that out, the streamer may not.
 fn load(args: &RunArgs, settings: &Settings) -> Result<TrajectoryFile, Failure> {
     let path = &args.trajectory;
     let file = match &args.text {

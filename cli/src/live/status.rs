@@ -26,7 +26,7 @@ struct JointStatus {
     feedback_age_s: f64,
     drive_status: u32,
     drive_error: u32,
-    /// Its turn is known; only then it may be energised.
+    /// It is referenced; only then it may be energised.
     referenced: bool,
     reference: &'static str,
 }

@@ -1,7 +1,7 @@
 //! `taustream watch`: the streamer's reports as they come, until the user has seen enough.
 //!
-//! It only listens: it takes one of the places for readers of reports, sends nothing, and ends without a trace at the
-//! arm. A streamer that has gone is said and waited for.
+//! It only receives: it takes one of the places for readers of reports, sends nothing, and ends without a trace at the
+//! arm. It reports when the streamer has ended, and waits for a new one.
 use super::client::{Client, Limit, STREAMER};
 use super::status::Status;
 use crate::args::WatchArgs;
@@ -36,7 +36,7 @@ enum Sink {
     Json,
 }
 
-/// Shows reports until the user leaves, or as long or often as was asked for.
+/// Shows reports until the user leaves, or as long or often as was requested.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &WatchArgs) -> Result<(), Failure> {
     interrupt::watch()?;
     // Limits make the bars; an arm whose settings have faults can be watched without.

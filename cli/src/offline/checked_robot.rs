@@ -21,7 +21,7 @@ struct JointLine {
 #[derive(Debug, Serialize)]
 struct LinkLine {
     name: String,
-    /// The joint that moves it; null for what stands still.
+    /// The joint that moves it; null for a fixed part.
     moved_by: Option<String>,
     /// How many of each kind: "2 spheres, 1 hull".
     shapes: String,

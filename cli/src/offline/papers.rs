@@ -20,7 +20,7 @@ impl fmt::Display for Answer {
     }
 }
 
-/// Runs the experiments, prints, and writes files where they are asked for.
+/// Runs the experiments, prints, and writes files where they are requested.
 pub(super) fn run(form: Form, args: &PapersArgs) -> Result<(), Failure> {
     interrupt::watch()?;
     if let Some(directory) = &args.output {

@@ -36,7 +36,7 @@ struct Summary {
     clearance_between: [String; 2],
     peak_use: Vec<PeakUse>,
     goal_rad: Vec<f64>,
-    /// Where the tip was to go, when a position was asked for.
+    /// Where the tip was to go, when a position was requested.
     target_m: Option<[f64; 3]>,
     /// Upper bound of how far off it ends.
     position_error_m: Option<f64>,
@@ -97,7 +97,7 @@ enum End {
     Position([f64; 3], Option<&'static Method>),
 }
 
-/// A plan, and by how much it misses the position that was asked for.
+/// A plan, and by how much it misses the position that was requested.
 struct Planned {
     plan: Plan,
     position: Option<([f64; 3], f64)>,

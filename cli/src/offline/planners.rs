@@ -30,7 +30,7 @@ impl fmt::Display for Answer {
     }
 }
 
-/// Compares, prints, and writes files where they are asked for.
+/// Compares, prints, and writes files where they are requested.
 pub(super) fn run(form: Form, args: &PlannersArgs) -> Result<(), Failure> {
     interrupt::watch()?;
     let contest = contest(form, args)?;

@@ -20,7 +20,7 @@ use taustream_arm::DamiaoMode;
 const OBSERVE_AGAIN: Nanos = Nanos(100_000_000);
 /// How long the bus is listened to before anything is written: a foreign master shows itself in this time.
 const OBSERVE_MIN: Nanos = Nanos(100_000_000);
-/// An answer that has not come by then was lost; it is asked for again.
+/// An answer that has not come by then was lost; it is requested again.
 const REQUEST_AGAIN: Nanos = Nanos(20_000_000);
 /// A special command is repeated after this, until the motor's status shows it.
 const REPEAT: Nanos = Nanos(20_000_000);

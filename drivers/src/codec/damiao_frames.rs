@@ -12,7 +12,7 @@ use crate::codec::mit::{MitRanges, MitState};
 use crate::frame::{CanFrame, CanId};
 use taustream_arm::DamiaoMode;
 
-/// Where registers are asked for.
+/// Where registers are requested.
 pub const REGISTER_ID: u16 = 0x7FF;
 /// Distance between the identifiers of one mode's commands and the next's.
 pub const MODE_STEP: u16 = 0x100;

@@ -111,7 +111,7 @@ struct Transfer {
     job: SdoJob,
     state: TransferState,
     tries: u8,
-    /// In a segmented read: the toggle of the segment that is asked for.
+    /// In a segmented read: the toggle of the segment that is requested.
     toggle: Option<bool>,
     value: SdoValue,
 }

@@ -52,7 +52,7 @@ pub enum After {
     Moving,
 }
 
-/// One fault that was asked for.
+/// One fault that was requested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultRequest {
     /// Joint, base to tip, from 0.

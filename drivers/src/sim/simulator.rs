@@ -1,4 +1,4 @@
-//! The simulated drives of an arm on their buses, with the faults that were asked for.
+//! The simulated drives of an arm on their buses, with the faults that were requested.
 //!
 //! Pure as the drives are: frames, orders and time in, frames out. Chance comes from a seed.
 use super::disturbance::Disturbance;

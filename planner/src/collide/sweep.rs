@@ -11,7 +11,7 @@ use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 pub trait Motion {
     /// The pose at a parameter.
     fn at(&self, t: f64) -> JointArray;
-    /// Upper bound of every joint's way from one parameter to a later one (rad).
+    /// Upper bound of every joint's travel from one parameter to a later one (rad).
     fn travel_rad(&self, from: f64, to: f64) -> JointArray;
 }
 
@@ -47,7 +47,7 @@ impl Motion for StraightEdge<'_> {
 pub struct SweepRules {
     /// Kept beyond what every pair must keep.
     pub extra_m: f64,
-    /// Below this way a pair that is not settled counts as blocked.
+    /// Below this travel a pair that is not settled counts as blocked.
     pub resolution_m: f64,
     /// Most poses.
     pub checks_max: usize,

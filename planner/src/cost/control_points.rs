@@ -39,7 +39,7 @@ pub struct ControlPointCost<'a> {
 }
 
 impl<'a> ControlPointCost<'a> {
-    /// The problem of going from the first to the second of two poses by way of `control_points` others.
+    /// The problem of going from the first to the second of two poses through `control_points` others.
     ///
     /// # Errors
     /// When the scene has other shapes than spheres, or a number of the model, an angle of an end or the number of
@@ -109,7 +109,7 @@ impl<'a> ControlPointCost<'a> {
             _ => 0.0,
         });
         sum.cost.path_length_m = prefiltered.length_m;
-        // Joints go one way within a segment.
+        // Joints move in one direction within a segment.
         sum.cost.joint_travel_rad = travels.sum();
         sum.cost.poses = self.phases.len() * (corners.len() - 1) + 1;
         Some(sum.finish())

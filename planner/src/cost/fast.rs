@@ -1,4 +1,4 @@
-//! The fast way to the cost: the kernel sorts out the poses that are surely free, the reference evaluates the others.
+//! The fast evaluation of the cost: the kernel sorts out the poses that are surely free, the reference evaluates the others.
 //!
 //! So penalty and collision are the reference's own, to the last bit: only the tip's path is f32. A pose that is
 //! sorted out by mistake would be a collision called free; [`super::margin`] has the proof that none is.
@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use taustream_motion::chain::Chain;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
-/// Longest way of an angle in half turns that the kernel takes.
+/// Longest travel of an angle in half turns that the kernel takes.
 const DISTANCE_MAX: f32 = 64.0;
 
 /// The constants of one problem.
@@ -107,7 +107,7 @@ impl Fast {
         segments.map(|pair| if let [from, to] = pair { self.angles(from, to) } else { None }).collect()
     }
 
-    /// Start and way of every angle that the kernel uses, in half turns.
+    /// Start and travel of every angle that the kernel uses, in half turns.
     fn angles(&self, from_rad: &JointArray, to_rad: &JointArray) -> Option<Angles> {
         let mut angles = [[0.0; 2]; MAX_JOINTS];
         let (mut start, mut travel) = (0.0, 0.0);

@@ -44,7 +44,7 @@ pub(super) struct FlatSphere {
     pub(super) away_m: f64,
     /// Radius and expansion (m).
     pub(super) limit_m: f64,
-    /// Its distance from the first link, where that one stands still and is left out (m).
+    /// Its distance from the first link, where that one is fixed and left out (m).
     pub(super) still_m: Option<f64>,
 }
 
@@ -93,7 +93,7 @@ impl Flat {
             }
         };
         let mut spheres: Vec<FlatSphere> = spheres.iter().map(sphere).collect();
-        // A first link that stands still is the same in every pose: it is left out, unless it touches.
+        // A fixed first link is the same in every pose: it is left out, unless it touches.
         let clears = |s: &FlatSphere| s.still_m.is_some_and(|d| sums || d > s.limit_m + CLEAR_M);
         let stands_still = still.is_some() && spheres.iter().all(clears);
         if !stands_still {

@@ -36,7 +36,7 @@ pub(super) struct Limit {
     pub(super) free_from: f32,
     /// The distance that the least one has then (m).
     pub(super) distance: f32,
-    /// What the links that stand still add to the sum (m).
+    /// What the fixed links add to the sum (m).
     pub(super) still_m: f32,
 }
 

@@ -56,7 +56,7 @@ impl Default for CostModel {
 pub struct PaperCost {
     /// Length of the path of the last frame's origin.
     pub path_length_m: f64,
-    /// Sum over joints of the way they go.
+    /// Sum of the joint travel.
     pub joint_travel_rad: f64,
     /// Sum over poses and spheres of max(1 - d / (radius + expansion), 0).
     pub penalty: f64,

@@ -299,7 +299,7 @@ impl<S: Simd> ArmLanes<S> {
     }
 }
 
-/// Sine and cosine of an angle at a phase of its way.
+/// Sine and cosine of an angle at a phase of its travel.
 #[inline(always)]
 fn turn<S: Simd>(lanes: Lanes<S>, [from, travel]: [f32; 2], phase: Vector<S>) -> [Vector<S>; 2] {
     lanes.sin_cos_pi(lanes.mul_add(lanes.all(travel), phase, lanes.all(from)))
@@ -313,7 +313,7 @@ fn tilted_back<S: Simd>(lanes: Lanes<S>, flat: &Flat, [x, y, z]: Vector3<S>) -> 
     [x, y, z]
 }
 
-/// A point that stands still, seen from behind the first joint.
+/// A fixed point, seen from behind the first joint.
 #[inline(always)]
 fn seen_from_first<S: Simd>(
     lanes: Lanes<S>,

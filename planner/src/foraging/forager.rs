@@ -14,7 +14,7 @@ pub struct Foraged {
     pub path: Option<Vec<JointArray>>,
     /// Steps, those included on which it stayed where it was.
     pub steps: usize,
-    /// Where it was trapped: the virtual obstacles that it set, the forgotten ones included.
+    /// Where it was trapped: the virtual obstacles that it set, the dropped ones included.
     pub virtuals: Vec<JointArray>,
     /// How often it began again at the start.
     pub restarts: usize,
@@ -58,11 +58,11 @@ struct Forager<'a> {
     numbers: &'a Numbers,
     /// `W_g`, 1/m².
     goal_width: f64,
-    /// The way from the start to here, without what was retraced: never empty.
+    /// The path from the start to here, without what was retraced: never empty.
     trace: Vec<JointArray>,
     /// The latest poses since it set out or was freed, one more than are observed.
     observed: VecDeque<JointArray>,
-    /// How many of the virtual obstacles are forgotten.
+    /// How many of the virtual obstacles are dropped.
     forgotten: usize,
     /// True when the edge from here to the goal was tried in vain.
     is_shut: bool,

@@ -1,4 +1,4 @@
-//! Foraging: a search that feels its way to the goal in joint space, and gets out of traps by virtual obstacles.
+//! Foraging: a greedy search in joint space that escapes from traps by virtual obstacles.
 //!
 //! The method of Abdi et al. (2020) for a robot in the plane ([`crate::papers::planar`]), taken to arms of any number of
 //! joints. A place is a pose; places are as far apart as [`Space::distance_m`] says, so that lengths are metres that a
@@ -6,7 +6,7 @@
 //! edge that is proven like those of the trees, so that the trace is a path. A search, unlike a robot, need not walk
 //! back: a retreat cuts the trace.
 //!
-//! It is greedy and has no map: it is quick where the way is open and wanders where it is not. Without virtual
+//! It is greedy and has no map: it is fast in free space and slow in narrow passages. Without virtual
 //! obstacles ([`Numbers::PLAIN`]) it is plain bacterial foraging, which a trap holds.
 //!
 //! Source: Abdi et al. (2020), eq. 10 to 15 and algorithm 1, read as in [`crate::papers::planar`].

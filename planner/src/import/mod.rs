@@ -25,7 +25,7 @@ use taustream_motion::spline::SplineError as CubicError;
 use taustream_motion::stroke::END_S_MAX;
 use taustream_motion::{MAX_STROKES, Stroke, Trajectory, TrajectoryError};
 
-/// How near the strokes shall come where nothing else is asked for (rad).
+/// How near the strokes shall come where nothing else is requested (rad).
 pub const TOLERANCE_RAD_DEFAULT: f64 = 0.005;
 /// A table in which a joint goes this many times its motion limit is torn, or of another arm.
 const JUMP: f64 = 10.0;
@@ -174,7 +174,7 @@ pub enum ImportError {
     TooFar {
         /// The least deviation that was found.
         least_rad: f64,
-        /// What was asked for.
+        /// What was requested.
         tolerance_rad: f64,
     },
     /// A motion for another arm.

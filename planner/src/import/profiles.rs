@@ -36,7 +36,7 @@ pub enum ProfileError {
     /// A name that is not in use.
     #[error("there is no profile named \"{name}\"; there are {}", ViaProfile::NAMES.join(", "))]
     Unknown {
-        /// The name that was asked for.
+        /// The name that was requested.
         name: String,
     },
     /// A k that is refused.

@@ -112,7 +112,7 @@ pub const METHODS: &[Method] = &[
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no optimiser named \"{name}\"; there are {}", names())]
 pub struct Unknown {
-    /// The name that was asked for.
+    /// The name that was requested.
     pub name: String,
 }
 

@@ -15,13 +15,13 @@ pub struct Run<'a> {
     /// Points of the first population; the rest is uniform random. Clamped to the bounds; one with another number
     /// of coordinates is not used.
     pub guesses: &'a [Vec<f64>],
-    /// Asked before every batch of evaluations; true ends the run.
+    /// Called before every batch of evaluations; true ends the run.
     pub is_over: &'a dyn Fn() -> bool,
     /// Called after every iteration.
     pub watch: &'a mut dyn FnMut(&Progress),
 }
 
-/// Where a run stands after an iteration.
+/// The state of a run after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Iterations done.
@@ -243,7 +243,7 @@ impl<'a> Session<'a> {
         Progress { iteration, evaluations, current: self.current, best: self.best.cost }
     }
 
-    /// What the run found, with the cost that the problem stands by.
+    /// What the run found, with the cost that the problem reports.
     pub(super) fn found(mut self, end: End) -> Solution {
         if !self.best.x.is_empty() {
             self.best.cost = self.problem.exact_cost(&self.best.x).map_or(self.best.cost, worth);

@@ -18,7 +18,7 @@ const NEAR: f64 = 0.1;
 /// What touching costs: between the punishments of 0.1 and of 0.3 of the reach, and far above any way's time.
 const TOLL: [f64; 2] = [100.0, 200.0];
 
-/// What a swarm is asked for.
+/// What a swarm is requested.
 pub(super) struct Search<'a> {
     /// What the pose must keep from.
     pub(super) world: &'a World<'a>,

@@ -22,7 +22,7 @@ use std::time::Duration;
 const BATCH: usize = 64;
 /// Pause between two looks at the socket.
 const LOOK: Duration = Duration::from_millis(5);
-/// Looks without a frame after which the socket counts as empty, once the end was asked for.
+/// Looks without a frame after which the socket counts as empty, once the end was requested.
 const EMPTY_LOOKS: u32 = 20;
 /// Looks after which a bus that does not fall silent is an error.
 const ENDING_LOOKS_MAX: u32 = 2_000;

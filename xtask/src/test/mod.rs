@@ -80,7 +80,7 @@ fn steps() -> impl Iterator<Item = &'static Step> {
     [fast::STEPS, peers::STEPS, vcan::STEPS, services::STEPS].into_iter().flatten()
 }
 
-/// Runs what was asked for; without `--repeat` the first failure ends the run.
+/// Runs what was requested; without `--repeat` the first failure ends the run.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
     let wanted = |step: &&Step| {
         let part = arguments.parts.is_empty() || arguments.parts.contains(&step.part);

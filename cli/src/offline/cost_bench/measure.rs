@@ -1,6 +1,6 @@
 //! Measures the cost function and whole runs of the paper's optimiser with it.
 //!
-//! Everything that is compared is timed in turns in one process, so that whatever else the machine does slows all of
+//! Everything that is compared is timed alternately in one process, so that whatever else the machine does slows all of
 //! it. Times are of one thread: the paper's bacteria move one after another, each by the result of the last one.
 use crate::failure::Failure;
 use serde::Serialize;

@@ -43,7 +43,7 @@ pub(super) struct Senses<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct PlanarRobot {
     pub(super) goal: Place,
-    /// The way from the start to here, without what was retraced: never empty.
+    /// The path from the start to here, without what was retraced: never empty.
     trace: Vec<Place>,
     /// Every place, a step apart.
     pub(super) path: Vec<Place>,
