@@ -1,4 +1,4 @@
-//! The rules say what the numbers say: corrupted numbers turn every verdict.
+//! The results follow the numbers: corrupted numbers change every result.
 use taustream_claims::statistics::{Moments, Summary};
 use taustream_claims::{Sample, agrees, better};
 

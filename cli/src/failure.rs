@@ -60,7 +60,7 @@ pub(crate) enum Failure {
     /// It was begun and did not come to its end.
     #[error("{0}")]
     Failed(String),
-    /// The demo did not come to its end; its last word is a verdict.
+    /// The demo did not come to its end; its last line is the result.
     #[error("{verdict}: {why}")]
     Demo {
         /// `DEMO FAILED` or `DEMO INTERRUPTED`.
@@ -88,7 +88,7 @@ impl Failure {
         Self::Unfit { path: path.to_owned(), why: why.into() }
     }
 
-    /// The demo's verdict over a failure of any kind.
+    /// The result of the demo after a failure of any kind.
     pub(crate) fn of_demo(self) -> Self {
         let verdict = if matches!(self, Self::Interrupted(_)) { "DEMO INTERRUPTED" } else { "DEMO FAILED" };
         Self::Demo { verdict, why: Box::new(self) }

@@ -96,7 +96,7 @@ fn command(form: Form, settings: Option<&Path>, command: Command, wait_s: f64) -
 fn report(form: Form, failure: &Failure) -> ExitCode {
     if !matches!(failure, Failure::BrokenPipe) {
         match form {
-            // A verdict stands at the beginning of its line.
+            // A result is at the beginning of its line.
             Form::Text if matches!(failure, Failure::Demo { .. }) => note(failure),
             Form::Text => note(format_args!("taustream: {failure}")),
             Form::Json => note(failure.to_json()),

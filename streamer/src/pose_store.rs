@@ -73,7 +73,7 @@ pub struct PoseStore {
 }
 
 impl PoseStore {
-    /// A keeper of the arm's record below `directory`.
+    /// A store of the arm's record below `directory`.
     ///
     /// # Errors
     /// When there is no thread to be had.

@@ -1,6 +1,6 @@
 //! A streamer that is killed while its drives hold, and the next one, checked by what was on the bus.
 //!
-//! The stage's recording continues over the kill; the check of setpoints does not, because a log ends with its streamer.
+//! The recording of the test bench continues over the kill; the check of setpoints does not, because a log ends with its streamer.
 use crate::candump;
 use crate::retry::Failed;
 use crate::scenarios::{Goals, set_off};

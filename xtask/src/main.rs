@@ -1,6 +1,6 @@
 //! The project's chores: `cargo xtask demo`, `install`, `uninstall`, `man` and `test`.
 //!
-//! Each task installs what it needs on a fresh Debian machine, says so before it does, and ends with a verdict.
+//! Each task installs what it needs on a fresh Debian machine, says so first, and ends with a result.
 mod demo;
 mod install;
 mod manual;

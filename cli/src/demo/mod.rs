@@ -17,7 +17,7 @@ use session::Session;
 use std::fs;
 use summary::Summary;
 
-/// Runs the demo; its end is a verdict, whatever happened.
+/// Runs the demo and prints the result.
 pub(crate) fn run(form: Form, args: &DemoArgs) -> Result<(), Failure> {
     interrupt::watch()?;
     let summary = perform(form, args).map_err(Failure::of_demo)?;

@@ -72,7 +72,7 @@ impl Diagnosis {
         }
     }
 
-    /// The verdict in a sentence.
+    /// The result as a sentence.
     fn total(&self) -> String {
         let verdict = match self.grade {
             Grade::Problem => "NOT FIT to drive an arm",

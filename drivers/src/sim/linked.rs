@@ -1,4 +1,4 @@
-//! A rig behind its buses in time: a bus with a bit rate delivers each frame when its last bit has passed, a virtual one
+//! Simulated servos behind modelled buses: a bus with a bit rate delivers each frame when its last bit has passed, a virtual one
 //! at once.
 use super::simulator::ServoSimulator;
 use super::wire::{Delivered, Sender, Wire};
@@ -16,7 +16,7 @@ pub struct LinkedSimulator {
 }
 
 impl LinkedSimulator {
-    /// Puts a rig behind its buses; the master's side of each holds `queue_max` frames.
+    /// Puts the servos behind their buses; the master's side of each holds `queue_max` frames.
     #[must_use]
     pub fn new(simulator: ServoSimulator, buses: &[Bus], queue_max: usize) -> Self {
         let wires = buses.iter().map(|bus| Wire::new(bus.kind, queue_max)).collect();

@@ -2,7 +2,7 @@
 //! motors with their registers.
 //!
 //! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`ServoSimulator`] the servos of an arm with faults on request, [`serve`] runs
-//! a rig on links. All but the last are pure: frames and time in, frames out.
+//! the simulator on links. All but the last are pure: frames and time in, frames out.
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; a bus with a bit rate knows no
 //! bit errors ([`wire`]); of the modes of operation there is only cyclic synchronous position.

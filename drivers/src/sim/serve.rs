@@ -1,7 +1,7 @@
-//! Runs a rig on links: one thread, one wait a wake-up, then one receive and one send on each bus that has work.
+//! Runs the simulator on links: one thread, one wait a wake-up, then one receive and one send on each bus that has work.
 //!
 //! System calls are what a simulator costs on a slow machine, so there are no others in a cycle but one look at the
-//! clock. Orders come as lines on the standard input; answers and faults that begin or end go to the standard output.
+//! clock. Commands come as lines on the standard input; answers and faults that begin or end go to the standard output.
 use super::faults::SimulatorCommand;
 use super::linked::LinkedSimulator;
 use crate::frame::{BATCH_MAX, CanFrame, FrameBatch};
@@ -55,7 +55,7 @@ pub struct Served {
     pub lost: u64,
 }
 
-/// Serves until `stop`. `links` are indexed as the rig's buses. Not real time, but frugal.
+/// Serves until `stop`. `links` are indexed as the simulator's buses. Not real time.
 ///
 /// # Errors
 /// When the operating system does not let it wait. Interfaces that vanish are waited for.
@@ -89,7 +89,7 @@ pub fn serve(
     Ok(server.served)
 }
 
-/// Where orders come from.
+/// The source of commands.
 pub trait CommandSource: AsFd {
     /// Reads what is there, after the descriptor polled readable; 0 at the end.
     ///
@@ -120,7 +120,7 @@ impl Server {
         Nanos(u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX))
     }
 
-    /// Sleeps until frames or orders come, or something is due. True when orders wait.
+    /// Sleeps until frames or commands come, or something is due. True when commands wait.
     fn wait(&mut self, input: Option<&dyn CommandSource>) -> Result<bool, ServeError> {
         let rest = match self.simulator.next_due() {
             Some(due) => {
@@ -195,7 +195,7 @@ impl Server {
         }
     }
 
-    /// Carries out the orders that wait; false when no more can come.
+    /// Executes the waiting commands; false when no more can come.
     fn take_commands(&mut self, input: &mut dyn CommandSource) -> bool {
         let mut bytes = [0; LINE_MAX];
         let goes_on = match input.read(&mut bytes) {
@@ -305,7 +305,7 @@ impl Port {
     }
 }
 
-/// The standard input as a source of orders.
+/// The standard input as a source of commands.
 #[derive(Debug, Default)]
 pub struct StandardInput {
     buffer: Vec<u8>,

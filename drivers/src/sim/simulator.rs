@@ -1,6 +1,6 @@
 //! The simulated drives of an arm on their buses, with the faults that were requested.
 //!
-//! Pure as the drives are: frames, orders and time in, frames out. Chance comes from a seed.
+//! Pure like the drives: frames, commands and time in, frames out. Randomness comes from a seed.
 use super::disturbance::Disturbance;
 use super::faults::{After, FaultKind, FaultRequest};
 use super::servo::SimulatedServo;
@@ -94,7 +94,7 @@ impl ServoSimulator {
         self.units.get(joint).map(|unit| &unit.drive)
     }
 
-    /// Orders a fault.
+    /// Requests a fault.
     pub fn request(&mut self, now: Nanos, request: FaultRequest) {
         self.faults.push(Pending { request, requested_at: now, began: None });
     }

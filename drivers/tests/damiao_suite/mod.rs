@@ -166,7 +166,7 @@ impl Arm {
         self.driver.clear_faults();
     }
 
-    /// Orders a fault of a joint from now on.
+    /// Requests a fault of a joint from now on.
     pub(crate) fn fault(&mut self, joint: usize, spec: &str) {
         let names = self.simulator.joints();
         let text = format!("joint={},{spec}", names[joint]);

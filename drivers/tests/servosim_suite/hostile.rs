@@ -1,4 +1,4 @@
-//! Bad frames, bad orders, bad settings.
+//! Bad frames, bad fault requests, bad settings.
 use super::bench::{Bench, NODE, enabled, parameters};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The process: usage, orders on the standard input, signals, and a master on the local link.
+//! The process: usage, commands on the standard input, signals, and a master on the local link.
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;

@@ -454,7 +454,7 @@ impl CycleHarness {
         assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
-    /// Offers a trajectory, runs one cycle, and returns the verdict.
+    /// Offers a trajectory, runs one cycle, and returns the decision.
     pub fn offer(&mut self, trajectory: Trajectory) -> Decision {
         self.generation += 1;
         let generation = self.generation;
