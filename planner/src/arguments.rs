@@ -1,7 +1,7 @@
 //! The arguments of `taustream-planner`, in the library because the manual page is made from them.
 use clap::Parser;
 
-/// Plans motions for one arm: answers `taustream replan` and hands verified motions to the streamer.
+/// Plan motions for one arm: serve `taustream replan` and send verified motions to the streamer.
 ///
 /// It never touches a bus. When it ends, or is killed, a motion that the streamer has accepted continues to its end.
 #[derive(Debug, Parser)]
@@ -16,7 +16,7 @@ pub struct Arguments {
     /// Settings of the arm's controller: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub settings: String,
-    /// Another scene than the settings name: a file, or the name of a shipped one.
+    /// Scene instead of that in the settings: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub scene: Option<String>,
 }

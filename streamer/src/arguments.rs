@@ -3,7 +3,7 @@ use clap::Parser;
 use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;
 
-/// Drives one arm: takes trajectories over shared memory, sends a setpoint to every joint a thousand times a second.
+/// Stream one arm: take trajectories from shared memory and send a setpoint to every joint 1000 times a second.
 ///
 /// This is not a safety function. A machine needs its own hard-wired emergency stop and safe torque off.
 #[derive(Debug, Parser)]
@@ -20,16 +20,16 @@ pub struct Arguments {
     /// Settings of the arm's controller: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub settings: String,
-    /// What carries frames.
+    /// CAN link.
     #[arg(long, value_enum, default_value_t)]
     pub link: LinkChoice,
-    /// Start without real-time rights. For trials: setpoints will be late.
+    /// Start without real-time rights, for trials: setpoints will be late.
     #[arg(long)]
     pub allow_non_realtime: bool,
-    /// Write every cycle to this file, one JSON object a line.
+    /// Write every cycle to this file, one JSON object per line.
     #[arg(long, value_name = "FILE")]
     pub cycle_log: Option<PathBuf>,
-    /// Where the last pose is kept; default: `$STATE_DIRECTORY`, `$XDG_STATE_HOME/taustream`, `~/.local/state/taustream`.
+    /// Directory of the last pose; default: `$STATE_DIRECTORY`, `$XDG_STATE_HOME/taustream`, `~/.local/state/taustream`.
     #[arg(long, value_name = "DIR")]
     pub state_dir: Option<PathBuf>,
 }

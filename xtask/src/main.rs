@@ -12,19 +12,19 @@ mod workspace;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Chores of the taustream workspace.
+/// Tasks of the taustream workspace.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", arg_required_else_help = true)]
 struct Arguments {
-    /// Which one.
+    /// Task.
     #[command(subcommand)]
     task: Task,
 }
 
-/// The chores.
+/// The tasks.
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Build, then move a simulated arm round obstacles and show it.
+    /// Build, then run the demo: a simulated arm moves round obstacles.
     Demo(demo::Arguments),
     /// Write manual pages and shell completions.
     Man(manual::Arguments),
