@@ -1,63 +1,18 @@
-//! What a service owes the host that runs it: log lines, readiness, and a watchdog that only progress feeds.
+//! What a service owes the host that runs it: readiness, and a watchdog that only progress feeds.
 //!
-//! systemd's side of it is two datagram protocols, `sd_notify(3)` and the journal's. Where there is no systemd, log
-//! lines go to stderr and everything else here does nothing.
+//! systemd's side of it is `sd_notify(3)`, a datagram protocol. Where there is no systemd, nothing is done here. Messages
+//! are sent by a thread of their own, because a service manager that hangs makes their sender wait.
 use sd_notify::NotifyState;
-use std::io::{IsTerminal, stderr};
-use std::os::unix::fs::MetadataExt;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Once};
 use std::time::{Duration, Instant};
-use std::{env, fs, io, thread};
-use tracing_journald::{Layer, Priority, PriorityMappings};
-use tracing_subscriber::layer::SubscriberExt;
-use tracing_subscriber::util::SubscriberInitExt;
-use tracing_subscriber::{EnvFilter, fmt};
+use std::{env, io, thread};
 
-/// Stands before the names of fields in the journal: `journalctl TAUSTREAM_GENERATION=7`.
-const FIELD_PREFIX: &str = "TAUSTREAM";
 /// The watchdog is fed this many times in its period, so that one late feeding is no death.
 const FEEDINGS: u32 = 4;
-
-/// Starts the log: to the journal where stderr leads there anyway, with a field for every value, else to stderr.
-/// `RUST_LOG` selects what is logged (default: info and above).
-pub fn start_log() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
-    let registry = tracing_subscriber::registry().with(filter);
-    // A second call changes nothing: the first log continues.
-    let _first_goes_on = if let Some(journal) = journal() {
-        registry.with(journal).try_init()
-    } else {
-        // Colours are for people: a file gets plain lines.
-        let lines = fmt::layer().with_writer(stderr).with_ansi(stderr().is_terminal()).with_target(false);
-        registry.with(lines).try_init()
-    };
-}
-
-/// The journal, if it is what stderr is connected to (systemd.exec(5), `$JOURNAL_STREAM`) and takes entries.
-fn journal() -> Option<Layer> {
-    let named = env::var("JOURNAL_STREAM").ok()?;
-    let own = fs::metadata("/proc/self/fd/2").ok()?;
-    if !is_stream(&named, own.dev(), own.ino()) {
-        return None;
-    }
-    // Journal priorities as people filter by them: -p notice hides the ordinary.
-    let mappings = PriorityMappings {
-        info: Priority::Informational,
-        debug: Priority::Debug,
-        trace: Priority::Debug,
-        ..PriorityMappings::new()
-    };
-    let layer = tracing_journald::layer().ok()?;
-    Some(layer.with_field_prefix(Some(FIELD_PREFIX.to_owned())).with_priority_mappings(mappings))
-}
-
-/// Whether `$JOURNAL_STREAM` ("device:inode") names this file. A program started by a service inherits the variable,
-/// but may have another stderr.
-fn is_stream(named: &str, device: u64, inode: u64) -> bool {
-    let Some((d, i)) = named.split_once(':') else { return false };
-    d.parse() == Ok(device) && i.parse() == Ok(inode)
-}
+/// Notices that may wait to be sent.
+const NOTICES: usize = 8;
 
 /// The service manager, as far as it supervises this process.
 #[derive(Debug)]
@@ -65,6 +20,16 @@ pub struct Manager {
     feed_every: Option<Duration>,
     fed: Option<Instant>,
     is_ready: bool,
+    /// To the thread that sends; none without a manager.
+    notices: Option<SyncSender<Notice>>,
+}
+
+/// Something that the manager should know.
+#[derive(Debug)]
+enum Notice {
+    Ready,
+    Progress,
+    Status(String),
 }
 
 impl Default for Manager {
@@ -78,30 +43,57 @@ impl Manager {
     #[must_use]
     pub fn from_environment() -> Self {
         let feed_every = sd_notify::watchdog_enabled().map(|period| period / FEEDINGS);
-        Self { feed_every, fed: None, is_ready: false }
+        let has_manager = env::var_os("NOTIFY_SOCKET").is_some_and(|path| !path.is_empty());
+        let notices = has_manager.then(start_sender).flatten();
+        Self { feed_every, fed: None, is_ready: false, notices }
     }
 
     /// Says what the process is about, in one line for `systemctl status`.
     pub fn status(&self, line: &str) {
-        notify(&[NotifyState::Status(line)]);
+        self.send(Notice::Status(line.to_owned()));
     }
 
     /// The work has got on: says the first time that the process is ready, and feeds the watchdog when it is due.
     pub fn progress(&mut self) {
         if !self.is_ready {
             self.is_ready = true;
-            notify(&[NotifyState::Ready]);
+            self.send(Notice::Ready);
         }
         let Some(every) = self.feed_every else { return };
         if self.fed.is_none_or(|fed| fed.elapsed() >= every) {
             self.fed = Some(Instant::now());
-            notify(&[NotifyState::Watchdog]);
+            self.send(Notice::Progress);
         }
     }
 
-    /// Says that the process is about to end because it was asked to.
+    /// Never waits: a notice that finds the queue full is dropped, and the next feeding takes its place.
+    fn send(&self, notice: Notice) {
+        if let Some(notices) = &self.notices {
+            let _dropped_when_full = notices.try_send(notice);
+        }
+    }
+
+    /// Says that the process is about to end because it was asked to. Waits for the manager: not for a thread that others
+    /// wait for.
     pub fn stopping() {
         notify(&[NotifyState::Stopping]);
+    }
+}
+
+fn start_sender() -> Option<SyncSender<Notice>> {
+    let (notices, queued) = sync_channel(NOTICES);
+    let work = move || send_all(&queued);
+    thread::Builder::new().name("manager".into()).stack_size(256 << 10).spawn(work).ok()?;
+    Some(notices)
+}
+
+fn send_all(queued: &Receiver<Notice>) {
+    for notice in queued {
+        match &notice {
+            Notice::Ready => notify(&[NotifyState::Ready]),
+            Notice::Progress => notify(&[NotifyState::Watchdog]),
+            Notice::Status(line) => notify(&[NotifyState::Status(line)]),
+        }
     }
 }
 
@@ -162,16 +154,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn journal_is_taken_only_when_stderr_is_the_named_stream() {
-        assert!(is_stream("8:1234", 8, 1234));
-        for other in ["8:1235", "9:1234", "8", "", ":", "8:1234:0", "x:y"] {
-            assert!(!is_stream(other, 8, 1234), "{other}");
-        }
-    }
-
-    #[test]
     fn promise_is_broken_by_time_alone_and_kept_again_after_a_restart() {
-        let silent = Manager { feed_every: None, fed: None, is_ready: false };
+        let silent = Manager { feed_every: None, fed: None, is_ready: false, notices: None };
         let promise = Promise::start(silent, Duration::from_secs(3_600)).unwrap();
         assert!(promise.is_kept());
         promise.back_within(Duration::ZERO);
@@ -183,8 +167,12 @@ mod tests {
 
     #[test]
     fn watchdog_is_fed_by_progress_and_not_more_often_than_is_due() {
-        let mut manager =
-            Manager { feed_every: Some(Duration::from_secs(3_600)), fed: None, is_ready: false };
+        let mut manager = Manager {
+            feed_every: Some(Duration::from_secs(3_600)),
+            fed: None,
+            is_ready: false,
+            notices: None,
+        };
         manager.progress();
         let first = manager.fed;
         assert!(manager.is_ready && first.is_some());

@@ -70,10 +70,19 @@ fn prepare(path: PathBuf, uid: u32) -> Result<PathBuf, RuntimeError> {
     // Not through a link: in /tmp anybody can lay one.
     match fs::symlink_metadata(&path) {
         Ok(metadata) if metadata.is_dir() && metadata.uid() == uid => Ok(path),
+        Ok(metadata) if metadata.is_dir() => {
+            let owner = metadata.uid();
+            let whose = if owner == 0 { " (root)" } else { "" };
+            let why = format!(
+                "belongs to uid {owner}{whose}, and this is uid {uid}: services there are that user's; act as that user, or set \
+                 TAUSTREAM_RUNTIME_DIR to a directory of your own"
+            );
+            Err(RuntimeError { path, why })
+        }
         Ok(metadata) => {
             let owner = metadata.uid();
             let why = format!(
-                "is no directory of uid {uid} (owner {owner}); remove it or set TAUSTREAM_RUNTIME_DIR"
+                "is no directory (it is of uid {owner}); delete it if it is yours, or set TAUSTREAM_RUNTIME_DIR to a directory"
             );
             Err(RuntimeError { path, why })
         }

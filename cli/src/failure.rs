@@ -54,6 +54,9 @@ pub(crate) enum Failure {
         /// How long we waited.
         waited_s: f64,
     },
+    /// The streamer's own socket, the second way to stop, could not be used either.
+    #[error("the streamer's own socket: {0}")]
+    Socket(String),
     /// Planner or streamer said no, or a verification found a violation. Nothing moved because of us.
     #[error("{0}")]
     Refused(String),
@@ -94,6 +97,16 @@ impl Failure {
         Self::Demo { verdict, why: Box::new(self) }
     }
 
+    /// The request did not reach anybody who answers: another way may.
+    pub(crate) fn is_of_transport(&self) -> bool {
+        matches!(self, Self::Service(_) | Self::Runtime(_) | Self::NoAnswer { .. })
+    }
+
+    /// The second way to stop has failed.
+    pub(crate) fn is_of_socket(&self) -> bool {
+        matches!(self, Self::Socket(_))
+    }
+
     /// The exit code of the process.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
@@ -103,6 +116,7 @@ impl Failure {
             | Self::Service(_)
             | Self::Runtime(_)
             | Self::NoAnswer { .. }
+            | Self::Socket(_)
             | Self::Refused(_)
             | Self::Failed(_) => 1,
             Self::Interrupted(_) => 130,
@@ -118,7 +132,7 @@ impl Failure {
             Self::Write { .. } | Self::BrokenPipe => "write",
             Self::Service(ServiceError::NotRunning { .. }) => "not-running",
             Self::Service(_) | Self::Runtime(_) => "service",
-            Self::NoAnswer { .. } => "no-answer",
+            Self::NoAnswer { .. } | Self::Socket(_) => "no-answer",
             Self::Refused(_) => "refused",
             Self::Failed(_) => "failed",
             Self::Interrupted(_) => "interrupted",

@@ -1,16 +1,16 @@
 //! Ctrl-C and termination as a question that waits ask, so that nothing is torn down half-way.
 use crate::failure::Failure;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 static CAME: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on SIGINT and SIGTERM raise a flag instead of ending the process.
+/// From now on SIGHUP (the terminal was closed), SIGINT and SIGTERM raise a flag instead of ending the process.
 pub(crate) fn watch() -> Result<(), Failure> {
     let came = CAME.get_or_init(Arc::default);
-    for signal in [SIGINT, SIGTERM] {
+    for signal in [SIGHUP, SIGINT, SIGTERM] {
         flag::register(signal, Arc::clone(came))
             .map_err(|e| Failure::Failed(format!("signals cannot be watched: {e}")))?;
     }

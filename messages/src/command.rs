@@ -1,6 +1,7 @@
 //! Commands to the streamer and its answers (request-response).
-use crate::{LAYOUT_VERSION, Phase, Text};
+use crate::{LAYOUT_VERSION, Phase, Text, clock};
 use iceoryx2::prelude::ZeroCopySend;
+use std::time::Duration;
 
 /// What an operator, or the planner, may ask of the streamer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +45,7 @@ pub struct CommandRequest {
     joint: u32,
     reserved: u32,
     value: f64,
+    valid_until_ns: u64,
 }
 
 /// The answer on the wire.
@@ -86,6 +88,20 @@ pub enum CommandError {
     },
 }
 
+impl CommandRequest {
+    /// A request that its sender gives up after `valid_for`; it is not carried out later than that.
+    #[must_use]
+    pub fn new(command: Command, valid_for: Duration) -> Self {
+        Self { valid_until_ns: clock::ns_after(valid_for), ..Self::from(command) }
+    }
+
+    /// `CLOCK_MONOTONIC` until which the sender waits, ns; `u64::MAX` when it has not said so.
+    #[must_use]
+    pub fn valid_until_ns(&self) -> u64 {
+        self.valid_until_ns
+    }
+}
+
 impl From<Command> for CommandRequest {
     fn from(command: Command) -> Self {
         let (code, joint, value) = match command {
@@ -100,7 +116,7 @@ impl From<Command> for CommandRequest {
             Command::ClearFault => (9, 0, 0.0),
             Command::Reference { joint, at_rad } => (10, joint, at_rad),
         };
-        Self { layout_version: LAYOUT_VERSION, code, joint, reserved: 0, value }
+        Self { layout_version: LAYOUT_VERSION, code, joint, reserved: 0, value, valid_until_ns: u64::MAX }
     }
 }
 
@@ -166,5 +182,5 @@ impl CommandReply {
     }
 }
 
-const _: () = assert!(size_of::<CommandRequest>() == 24);
+const _: () = assert!(size_of::<CommandRequest>() == 32);
 const _: () = assert!(size_of::<CommandReply>() == 264);

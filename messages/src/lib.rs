@@ -6,8 +6,11 @@
 #![deny(unsafe_code)]
 
 pub mod bus;
+mod clock;
 pub mod command;
 pub mod fault;
+pub mod files;
+pub mod operator;
 pub mod pause;
 pub mod phase;
 pub mod plan;

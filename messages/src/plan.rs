@@ -23,6 +23,16 @@ pub struct PlanRequest {
     seed: u64,
     goal_rad: [f64; MAX_JOINTS],
     planner: Text,
+    sender_pid: u32,
+    reserved: u32,
+}
+
+impl PlanRequest {
+    /// The process that asks, as it says itself: whether it lives is looked up, and nothing else hangs on it.
+    #[must_use]
+    pub fn sender_pid(&self) -> u32 {
+        self.sender_pid
+    }
 }
 
 /// What a checked request asks for.
@@ -86,6 +96,8 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             seed: r.seed,
             goal_rad: r.goal_rad,
             planner: Text::new(&r.planner),
+            sender_pid: std::process::id(),
+            reserved: 0,
         }
     }
 }
@@ -229,5 +241,5 @@ impl PlanReply {
     }
 }
 
-const _: () = assert!(size_of::<PlanRequest>() == 336);
+const _: () = assert!(size_of::<PlanRequest>() == 344);
 const _: () = assert!(size_of::<PlanReply>() == 48 + 312 + 248);

@@ -51,7 +51,9 @@ pub enum Rejection {
         expected: u32,
     },
     /// Not newer than what was accepted before.
-    #[error("stale generation {got}: {newest} was accepted already; read the report and plan again")]
+    #[error(
+        "stale generation {got}: {newest} is the newest one accepted, and {got} is not among the 2^63 numbers after it; read the report and plan again"
+    )]
     StaleGeneration {
         /// The generation in the message.
         got: u64,
@@ -94,6 +96,12 @@ pub enum Rejection {
         /// Trajectory time of the cut.
         at_s: f64,
     },
+    /// The streamer came to it after its sender had given up.
+    #[error("too late: the streamer came to it {late_s:.3} s after its sender had given up; send it again")]
+    TooLate {
+        /// By how much.
+        late_s: f64,
+    },
     /// The streamer had no free slot.
     #[error("busy: another trajectory is being checked; send it again")]
     Busy,
@@ -110,6 +118,7 @@ mod code {
     pub(super) const NOT_READY: u32 = 8;
     pub(super) const CUT: u32 = 9;
     pub(super) const BUSY: u32 = 10;
+    pub(super) const TOO_LATE: u32 = 11;
 }
 
 impl Receipt {
@@ -162,6 +171,7 @@ impl Receipt {
                 (self.code, self.detail) = (code::NOT_READY, phase.map_or(0, Phase::code));
             }
             Rejection::CutUnsupported { at_s } => (self.code, self.at_s) = (code::CUT, *at_s),
+            Rejection::TooLate { late_s } => (self.code, self.value) = (code::TOO_LATE, *late_s),
             Rejection::Busy => self.code = code::BUSY,
         }
     }
@@ -200,6 +210,7 @@ impl Receipt {
             code::NOT_AT_BASE => Rejection::NotAtBase { joint: self.joint, by_rad: self.value },
             code::NOT_READY => Rejection::NotReady { phase: Phase::from_code(self.detail) },
             code::CUT => Rejection::CutUnsupported { at_s: self.at_s },
+            code::TOO_LATE => Rejection::TooLate { late_s: self.value },
             code::BUSY => Rejection::Busy,
             _ => return None,
         };

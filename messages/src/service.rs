@@ -3,6 +3,7 @@
 //! Segments lie in one flat name space of the host, so the arm's name and the user's id stand in the prefix:
 //! two arms, or two users, on one host do not meet. Nothing is read from an iceoryx2 file, and segments belong
 //! to one uid only.
+use crate::files::{ArmFiles, Footprint, NODE_COUNTER, ROOT, SEGMENTS, UsersLock};
 use crate::{CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TrajectoryMessage};
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
@@ -13,7 +14,8 @@ use iceoryx2::prelude::{
 };
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Sends trajectories.
 pub type TrajectoryPublisher = Publisher<ipc::Service, TrajectoryMessage, ()>;
@@ -50,6 +52,8 @@ const RECEIPT_BUFFER: usize = 64;
 const TRAJECTORY_BUFFER: usize = 8;
 /// Most clients of a request-response service.
 const CLIENTS_MAX: usize = 24;
+/// How long a service that another process creates may take.
+const CREATION_WITHIN: Duration = Duration::from_millis(400);
 /// Longest arm name.
 const NAME_MAX: usize = 32;
 
@@ -74,6 +78,41 @@ pub enum ServiceError {
         /// Other users who serve it, as a clause; empty if none.
         others: String,
     },
+    /// Another process serves this arm in the same role.
+    #[error("arm `{arm}` has a taustream-{who} already{}; end that one first", pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
+    Served {
+        /// The arm's name.
+        arm: String,
+        /// `streamer` or `planner`.
+        who: &'static str,
+        /// Its process, as far as known.
+        pid: Option<u32>,
+    },
+    /// Another user has taken a name of this arm.
+    #[error(
+        "shared memory of arm `{arm}`: {} belongs to uid {owner}, not to uid {uid}: another user has taken the name; \
+         remove it as that user or as root: rm {}", path.display(), path.display()
+    )]
+    Foreign {
+        /// The arm's name.
+        arm: String,
+        /// The file.
+        path: PathBuf,
+        /// Its owner.
+        owner: u32,
+        /// Our user.
+        uid: u32,
+    },
+    /// Something that is no segment stands in the place of one.
+    #[error("shared memory of arm `{arm}`: {} is {kind}, where a segment belongs; remove it: rm {}", path.display(), path.display())]
+    Blocked {
+        /// The arm's name.
+        arm: String,
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+    },
     /// iceoryx2 refused.
     #[error("shared memory of arm `{arm}`: cannot {what}: {why}")]
     Refused {
@@ -92,6 +131,9 @@ pub struct Wire {
     arm: String,
     uid: u32,
     node: Node<ipc::Service>,
+    files: ArmFiles,
+    // After the node: its files go first.
+    _users: UsersLock,
 }
 
 /// True for a name that may stand in a file name.
@@ -101,15 +143,9 @@ pub fn is_arm_name(name: &str) -> bool {
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
 }
 
-fn prefix(arm: &str, uid: u32) -> String {
+pub(crate) fn prefix(arm: &str, uid: u32) -> String {
     format!("taustream.{uid}.{arm}.")
 }
-
-/// Where segments are, whatever the root path.
-const SEGMENTS: &str = "/dev/shm";
-/// End of the name of the segment in which iceoryx2 counts nodes. It stays when everybody has gone, so it says nothing
-/// about who is there.
-const NODE_COUNTER: &str = ".global_mgmt";
 
 /// The uids that have segments of an arm of this name, in rising order.
 #[must_use]
@@ -156,6 +192,9 @@ impl Wire {
         // IOX2_LOG_LEVEL brings them back for whoever looks for a fault in it.
         set_log_level_from_env_or(LogLevel::Fatal);
         let uid = rustix::process::geteuid().as_raw();
+        let files = ArmFiles::of(arm, runtime);
+        files.check_owner()?;
+        let users = files.lock_shared()?;
         let refused = |why: String| ServiceError::Refused { arm: arm.to_owned(), what: "join", why };
         let config = config(arm, uid, runtime).map_err(refused)?;
         let name = node_name.try_into().map_err(|e| refused(format!("{e:?}")))?;
@@ -166,7 +205,13 @@ impl Wire {
             .create::<ipc::Service>()
             .map_err(|e| refused(format!("{e:?}")))?;
         close_node_counter(&prefix(arm, uid));
-        Ok(Self { arm: arm.to_owned(), uid, node })
+        Ok(Self { arm: arm.to_owned(), uid, node, files, _users: users })
+    }
+
+    /// The files that this process's services stand on now; take it when every port is open.
+    #[must_use]
+    pub fn footprint(&self) -> Footprint {
+        Footprint::of(&self.files, &self.node.id().value().to_string())
     }
 
     /// The arm's name.
@@ -203,11 +248,13 @@ impl Wire {
 fn config(arm: &str, uid: u32, root: &Path) -> Result<Config, String> {
     let mut config = Config::default();
     let prefix = FileName::new(prefix(arm, uid).as_bytes()).map_err(|e| format!("prefix: {e:?}"))?;
-    let root = root.join("iceoryx2");
+    let root = root.join(ROOT);
     let root = root.to_str().ok_or("the runtime directory is not UTF-8")?;
     let root = IceoryxPath::new(root.as_bytes()).map_err(|e| format!("root: {e:?}"))?;
     config.global.prefix = prefix;
     config.global.set_root_path(&root);
+    // A service whose creator died in the middle of it is waited for that long.
+    config.global.creation_timeout = CREATION_WITHIN;
     Ok(config)
 }
 

@@ -1,6 +1,7 @@
 //! The trajectory message and the one door through which it becomes a checked trajectory.
-use crate::LAYOUT_VERSION;
+use crate::{LAYOUT_VERSION, clock};
 use iceoryx2::prelude::ZeroCopySend;
+use std::time::Duration;
 use taustream_motion::{JointArray, MAX_JOINTS, MAX_STROKES, Stroke, Trajectory, TrajectoryError};
 
 /// Hash over everything that changes what a setpoint means (SHA-256, arm/src/digest.rs).
@@ -31,8 +32,16 @@ pub struct TrajectoryMessage {
     stroke_count: u32,
     cut_trajectory_id: u64,
     cut_s: f64,
+    valid_until_ns: u64,
     base_rad: [f64; MAX_JOINTS],
     strokes: [StrokeMessage; MAX_STROKES],
+}
+
+/// Whether a generation is newer than another. Numbers wrap round: the 2^63 numbers after one are newer than it, so that
+/// no number is the last, and none locks out those that follow.
+#[must_use]
+pub fn is_newer(generation: u64, than: u64) -> bool {
+    (1..1 << 63).contains(&generation.wrapping_sub(than))
 }
 
 /// What a trajectory replaces.
@@ -129,9 +138,23 @@ impl TrajectoryMessage {
             stroke_count: count(checked.trajectory.strokes().len()),
             cut_trajectory_id,
             cut_s,
+            valid_until_ns: u64::MAX,
             base_rad: *checked.trajectory.base_rad(),
             strokes,
         })
+    }
+
+    /// The same, for a sender that gives up after `valid_for`: it is not accepted later than that.
+    #[must_use]
+    pub fn valid_for(mut self: Box<Self>, valid_for: Duration) -> Box<Self> {
+        self.valid_until_ns = clock::ns_after(valid_for);
+        self
+    }
+
+    /// `CLOCK_MONOTONIC` until which the sender waits, ns; `u64::MAX` when it has not said so.
+    #[must_use]
+    pub fn claimed_valid_until_ns(&self) -> u64 {
+        self.valid_until_ns
     }
 
     /// The id that the sender claims, for the receipt of a message that is not accepted.
@@ -236,4 +259,4 @@ fn count(what: &'static str, got: u32, most: usize) -> Result<usize, MessageErro
 }
 
 const _: () = assert!(size_of::<StrokeMessage>() == 88);
-const _: () = assert!(size_of::<TrajectoryMessage>() == 144 + 88 * MAX_STROKES);
+const _: () = assert!(size_of::<TrajectoryMessage>() == 152 + 88 * MAX_STROKES);

@@ -144,6 +144,7 @@ fn receipt_carries_every_outcome() {
         Outcome::Rejected(Rejection::NotAtBase { joint: 5, by_rad: 0.02 }),
         Outcome::Rejected(Rejection::NotReady { phase: Some(Phase::Paused) }),
         Outcome::Rejected(Rejection::CutUnsupported { at_s: 0.9 }),
+        Outcome::Rejected(Rejection::TooLate { late_s: 0.75 }),
         Outcome::Rejected(Rejection::Busy),
     ];
     for outcome in outcomes {

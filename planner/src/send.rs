@@ -18,6 +18,8 @@ use taustream_motion::Trajectory;
 const POLL: Duration = Duration::from_millis(2);
 /// A streamer that sends no report for this long is not running.
 pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
+/// Of a wait for a receipt, how much is left to the receipt's own way.
+const RECEIPT_TAKES: Duration = Duration::from_millis(300);
 /// Ids stay below 2^53, so that JSON readers with f64 numbers keep them exact.
 const ID_BITS: u32 = 53;
 
@@ -136,7 +138,7 @@ impl<'a> Outbox<'a> {
     ) -> Result<SentTrajectory, SendError> {
         let (report, _) = self.fresh_report(REPORT_WITHIN)?;
         check_robot(robot, &report)?;
-        let (trajectory_id, generation) = (random_id(), report.generation.saturating_add(1));
+        let (trajectory_id, generation) = (random_id(), report.generation.wrapping_add(1));
         let message = TrajectoryMessage::new(&CheckedTrajectory {
             trajectory_id,
             generation,
@@ -144,6 +146,8 @@ impl<'a> Outbox<'a> {
             replaces,
             trajectory: trajectory.clone(),
         });
+        // What the receipt would come too late for is not to move the arm either.
+        let message = message.valid_for(timeout.saturating_sub(RECEIPT_TAKES));
         let received = self.trajectories.send_copy(*message).map_err(|e| transport("publish it", &e))?;
         if received == 0 {
             return Err(self.wire.not_running("taustream-streamer").into());

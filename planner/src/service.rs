@@ -15,6 +15,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use taustream_arm::daemon::{Manager, Promise};
 use taustream_arm::{Robot, Scene};
+use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::{PlanServer, ServiceError, Wire};
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
@@ -23,6 +24,8 @@ use tracing::{info, warn};
 
 /// How often the service looks for requests: what a user may feel of it is well below the planning time.
 const POLL: Duration = Duration::from_millis(5);
+/// How often it looks for the files behind its services.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Deadline of a request that states none.
 const DEADLINE_DEFAULT: Duration = Duration::from_millis(2_000);
 /// Longest deadline: others wait meanwhile.
@@ -60,6 +63,24 @@ pub enum OpenError {
     Thread(String),
 }
 
+impl OpenError {
+    /// Only people can help; clearing names cannot.
+    #[must_use]
+    pub fn is_for_people(&self) -> bool {
+        match self {
+            Self::Service(e) | Self::Send(SendError::Service(e)) => matches!(
+                e,
+                ServiceError::Name { .. }
+                    | ServiceError::Served { .. }
+                    | ServiceError::Foreign { .. }
+                    | ServiceError::Blocked { .. }
+            ),
+            Self::Served { .. } | Self::Send(_) => false,
+            Self::Thread(_) => true,
+        }
+    }
+}
+
 /// The planner of one arm.
 pub struct Service<'a> {
     robot: &'a Robot,
@@ -70,6 +91,7 @@ pub struct Service<'a> {
     seen: Seen,
     waiting: Option<Waiting>,
     promise: Promise,
+    footprint: Footprint,
 }
 
 /// A proven motion that waits for the end of the one that runs.
@@ -100,19 +122,42 @@ impl<'a> Service<'a> {
         let outbox = Outbox::open(wire)?;
         let promise = Promise::start(Manager::from_environment(), TURN_WITHIN)
             .map_err(|e| OpenError::Thread(e.to_string()))?;
-        Ok(Self { robot, scene, outbox, server, stop, seen: Seen::default(), waiting: None, promise })
+        Ok(Self {
+            robot,
+            scene,
+            outbox,
+            server,
+            stop,
+            seen: Seen::default(),
+            waiting: None,
+            promise,
+            footprint: wire.footprint(),
+        })
     }
 
-    /// Serves until `stop` is set.
-    pub fn serve(&mut self) {
+    /// Serves until `stop` is set, or the files behind its services vanish.
+    pub fn serve(&mut self) -> Ending {
+        let mut looked = Instant::now();
         while !self.stop.load(Ordering::Relaxed) {
             self.promise.back_within(TURN_WITHIN);
             self.turn();
             thread::sleep(POLL);
+            if looked.elapsed() >= LOOK_EVERY {
+                looked = Instant::now();
+                if let Some(missing) = self.footprint.missing() {
+                    warn!(
+                        "{} of this running planner has vanished or was replaced (RemoveIPC=yes at logout, a cleaner of /tmp, rm -rf, \
+                         or a streamer that started over); opening its services anew",
+                        missing.display()
+                    );
+                    return Ending::NamesGone;
+                }
+            }
         }
         if let Some(waiting) = self.waiting.take() {
             reply(&waiting.request, &failed("the planner was terminated before the running motion ended"));
         }
+        Ending::Stopped
     }
 
     /// Looks at the streamer, at the motion that waits, and at one request.
@@ -165,11 +210,11 @@ impl<'a> Service<'a> {
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
         match (phase, requested.when) {
             (Phase::Holding, _) if report.energised == 1 => {
-                let plan = self.plan(report.command_rad, requested, &options)?;
+                let plan = self.plan(request, report.command_rad, (requested, &options))?;
                 Ok(Answer::Now(self.send(request, &plan)))
             }
             (Phase::Moving, When::AfterCurrent) => {
-                let plan = self.plan(report.end_rad, requested, &options)?;
+                let plan = self.plan(request, report.end_rad, (requested, &options))?;
                 info!("planned; waiting for the running motion to end");
                 Ok(Answer::Later(Box::new(plan)))
             }
@@ -178,26 +223,58 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Plans on a thread of its own: whatever goes wrong there, the service continues.
+    /// Plans on a thread of its own: whatever goes wrong there, the service goes on. Planning ends when its requester goes;
+    /// others are answered meanwhile.
     fn plan(
         &self,
+        request: &Request,
         start_rad: JointArray,
-        requested: &CheckedPlanRequest,
-        options: &PlanOptions,
+        (requested, options): (&CheckedPlanRequest, &PlanOptions),
     ) -> Result<Plan, String> {
         // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         self.promise.back_within(options.deadline + OVERRUN_MAX);
+        let cancel = AtomicBool::new(false);
         let result = thread::scope(|scope| {
             let worker = thread::Builder::new().name("plan".to_owned());
-            let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(self.stop)));
-            handle.map(thread::ScopedJoinHandle::join)
+            let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(&cancel)))?;
+            self.attend(request, options.deadline, &|| !handle.is_finished(), &cancel);
+            std::io::Result::Ok(handle.join())
         });
         match result {
             Ok(Ok(planned)) => planned.map_err(|e: PlanError| e.to_string()),
             Ok(Err(_)) => Err("the planner has a fault and gave up on this goal; see its log".to_owned()),
             Err(e) => Err(format!("the planner cannot start a thread: {e}")),
+        }
+    }
+
+    /// Waits while a motion is planned: answers other requests, and cancels it when nobody waits for it any more.
+    fn attend(&self, request: &Request, deadline: Duration, goes_on: &dyn Fn() -> bool, cancel: &AtomicBool) {
+        let since = Instant::now();
+        let requester = Requester::of(request);
+        while goes_on() {
+            if !cancel.load(Ordering::Relaxed) && !requester.waits(request) {
+                info!(
+                    "whoever asked for the motion is gone after {:.1} s; planning ends",
+                    since.elapsed().as_secs_f64()
+                );
+                cancel.store(true, Ordering::Relaxed);
+            }
+            if self.stop.load(Ordering::Relaxed) {
+                cancel.store(true, Ordering::Relaxed);
+            }
+            while let Ok(Some(other)) = self.server.receive() {
+                reply(
+                    &other,
+                    &failed(&format!(
+                        "the planner plans for another request, for {:.1} s of at most {:.1} s; ask again after it",
+                        since.elapsed().as_secs_f64(),
+                        deadline.as_secs_f64()
+                    )),
+                );
+            }
+            thread::sleep(POLL);
         }
     }
 
@@ -256,9 +333,40 @@ impl<'a> Service<'a> {
     }
 }
 
+/// Why a planner does not serve any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// It was stopped.
+    Stopped,
+    /// The files behind its services are gone: nobody finds it.
+    NamesGone,
+}
+
 enum Answer {
     Now(PlanOutcome),
     Later(Box<Plan>),
+}
+
+/// The process that waits for an answer.
+struct Requester(Option<u32>);
+
+impl Requester {
+    /// The process, if it is one that can be seen from here.
+    fn of(request: &Request) -> Self {
+        Self(Some(request.payload().sender_pid()).filter(|pid| is_alive(*pid)))
+    }
+
+    /// It has not dropped its request, and was not killed with it.
+    fn waits(&self, request: &Request) -> bool {
+        request.is_connected() && self.0.is_none_or(is_alive)
+    }
+}
+
+/// A process that exists and has not ended (proc(5): the state stands after the name in parentheses).
+fn is_alive(pid: u32) -> bool {
+    let state = |stat: String| stat.rsplit_once(')').and_then(|(_, rest)| rest.trim().chars().next());
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok();
+    stat.and_then(state).is_some_and(|state| !matches!(state, 'Z' | 'X'))
 }
 
 impl Seen {

@@ -328,3 +328,44 @@ fn service_second_planner_of_an_arm_is_refused() {
         receipt_of(&ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()));
     });
 }
+
+/// Walls that no way round the base leads past, and a goal behind them: a search that goes on until its deadline.
+fn walled() -> Scene {
+    let wall = |name: &str, y: f64| {
+        format!(
+            "[[box]]\nname = \"{name}\"\ncenter_m = [0.0, {y}, 0.5]\nsize_m = [0.06, 1.4, 4.0]\nrpy_rad = [0.0, 0.0, 0.0]\n"
+        )
+    };
+    let text = format!("margin_m = 0.01\n{}{}", wall("left", 0.86), wall("right", -0.86));
+    Scene::from_toml(std::path::Path::new("walled.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+/// Goal: nobody has to wait for a motion that nobody waits for. Method: a request with a deadline far beyond the test's patience is
+/// dropped, as Ctrl-C does, or its process is gone; the next one must be answered long before that deadline. While the first
+/// one is planned, others are told so.
+#[test]
+fn service_planning_ends_when_its_requester_goes_and_others_are_answered_meanwhile() {
+    let played = Played::new(Phase::Holding);
+    with_service_in(&walled(), "cancelled", &played, |arm, _| {
+        let wire = join(arm, "client");
+        let client = wire.plan_client().expect("port");
+        let mut behind = AWAY;
+        behind[0] -= 3.1;
+        let hard = CheckedPlanRequest { deadline_ms: 60_000, ..request(When::AtOnce, "rrt", pose(behind)) };
+        let pending = client.send_copy(PlanRequest::from(&hard)).expect("sent");
+        let busy = loop {
+            let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
+            if let PlanOutcome::Failed { reason } = outcome {
+                break reason;
+            }
+        };
+        assert!(busy.contains("another request") && busy.contains("60.0 s"), "{busy}");
+        drop(pending);
+        let since = Instant::now();
+        while let PlanOutcome::Failed { reason } = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()) {
+            assert!(reason.contains("another request"), "{reason}");
+            assert!(since.elapsed() < Duration::from_secs(40), "the planner plans on for nobody");
+            thread::sleep(Duration::from_millis(20));
+        }
+    });
+}

@@ -64,6 +64,7 @@ pub enum AnswerReason {
     Energised { joint: usize, state: DriveState },
     Wait,
     ShuttingDown,
+    TooLate { late_s: f64 },
 }
 
 impl AnswerReason {
@@ -197,6 +198,9 @@ impl AnswerReason {
                 "the drive of {} is off ({}) while others hold; support the arm, `disable`, then `clear-fault`",
                 name(joint),
                 state_word(state)
+            ),
+            Self::TooLate { late_s } => format!(
+                "the streamer stood still; it came to this command {late_s:.3} s after its sender had given up, and did not carry it out"
             ),
             Self::StillEnergised { joint } => {
                 format!("the drive of {} is still energised; wait and try again", name(joint))

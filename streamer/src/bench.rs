@@ -16,8 +16,8 @@ mod wake;
 
 use crate::buses::{Bus, Buses};
 use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
-use crate::cycle_state::PendingCommand;
 use crate::intake::{self, CommandQueue};
+use crate::report::{self, Readers};
 use crate::rt;
 use crate::tick::Schedule;
 pub use compare::{Compared, compare};
@@ -284,6 +284,7 @@ impl Times {
 struct Bench {
     core: Core,
     command_queue: CommandQueue,
+    readers: Readers,
     frames: Vec<CanFrame>,
     batch: FrameBatch,
     peers: Peers,
@@ -320,13 +321,15 @@ impl Bench {
         let buses = Buses::new(buses).map_err(|e| BenchError::System(e.to_string()))?;
         let link = buses.describe();
         let (queues, command_queue) = intake::pair();
-        let core = Core::new(settings, buses, queues, false);
+        let (reports, readers) = report::queues(false);
+        let core = Core::new(settings, buses, queues, reports);
         let batch = FrameBatch::new();
         let joints = settings.robot.joints.len();
         let (generation, ticks, skipped) = (0, 0, 0);
         let mut bench = Self {
             core,
             command_queue,
+            readers,
             frames,
             batch,
             peers,
@@ -350,9 +353,7 @@ impl Bench {
                 return Ok(());
             }
             if phase == Phase::Disabled && cycle % 100 == 50 {
-                let _ = self
-                    .command_queue
-                    .push_command(PendingCommand { sequence: cycle, command: Command::Enable });
+                let _ = self.command_queue.commands.ask(Command::Enable, Nanos(u64::MAX));
             }
             rt::sleep_until(schedule.deadline());
             self.cycle(&mut schedule, &mut NoProbe);
@@ -377,14 +378,16 @@ impl Bench {
 
     /// Offers the way back when one has ended, and empties the queues that are not read here.
     fn keep_moving(&mut self) {
-        while self.command_queue.trajectory_result().is_some() || self.command_queue.answer().is_some() {}
+        while self.command_queue.trajectories.trajectory_result().is_some()
+            || self.command_queue.commands.answer().is_some()
+        {}
         if self.core.supervisor().phase() != Phase::Holding {
             return;
         }
-        let Some(mut filled) = self.command_queue.empty_box() else { return };
+        let Some(mut filled) = self.command_queue.trajectories.empty_box() else { return };
         self.generation += 1;
         let Ok(trajectory) = to_and_fro(&self.base_rad, self.joints) else {
-            return self.command_queue.return_unused(filled);
+            return self.command_queue.trajectories.return_unused(filled);
         };
         *filled = CheckedTrajectory {
             trajectory_id: self.generation,
@@ -393,7 +396,7 @@ impl Bench {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.command_queue.offer(filled);
+        self.command_queue.trajectories.offer(filled);
     }
 
     fn streamer_slice(&mut self, period_us: u32, cycles: u64, into: &mut Times) {
@@ -451,11 +454,10 @@ impl Bench {
         Ok(clock)
     }
 
-    fn empty_queues(&self) {
-        let readers = self.core.readers();
-        while readers.timings.pop().is_some() {}
-        while readers.reports.pop().is_some() {}
-        while readers.notes.pop().is_some() {}
+    fn empty_queues(&mut self) {
+        while self.readers.timings.pop().is_ok() {}
+        while self.readers.reports.pop().is_ok() {}
+        while self.readers.notes.pop().is_ok() {}
     }
 
     fn measure(mut self, options: &BenchOptions, realtime: bool) -> Result<CycleBench, BenchError> {

@@ -5,6 +5,7 @@ use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 use taustream_arm::Robot;
+use taustream_drivers::Nanos;
 use taustream_messages::{CheckedTrajectory, Rejection, Replaces, RobotDigest, TrajectoryMessage};
 use taustream_motion::limits::{Quantity, check_motion};
 use taustream_motion::{JointLimits, MAX_JOINTS};
@@ -19,6 +20,8 @@ pub struct Checked {
     pub id: u64,
     /// The generation that the message claims.
     pub generation: u64,
+    /// Until when its sender waits.
+    pub valid_until: Nanos,
     /// The trajectory, or why it is refused.
     pub result: Result<Box<CheckedTrajectory>, Rejection>,
 }
@@ -95,8 +98,9 @@ impl Checker {
         let work = move || {
             for message in todo {
                 let (id, generation) = (message.claimed_id(), message.claimed_generation());
+                let valid_until = Nanos(message.claimed_valid_until_ns());
                 let result = rules.check(&message);
-                if done.send(Checked { id, generation, result }).is_err() {
+                if done.send(Checked { id, generation, valid_until, result }).is_err() {
                     return;
                 }
             }

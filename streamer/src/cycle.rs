@@ -9,7 +9,7 @@ use crate::guard::Guard;
 use crate::intake::{Answers, Handover, Intake};
 use crate::last_sent::Ledger;
 use crate::referencing::LastPoses;
-use crate::report::Reporter;
+use crate::report::{Reporter, Writers};
 use crate::supervise::{Actions, Supervisor};
 use crate::tick::Tick;
 use crate::track::Track;
@@ -99,7 +99,7 @@ pub struct Core {
 impl Core {
     /// Puts the stages together for the arm of `settings`.
     #[must_use]
-    pub fn new(settings: &Settings, buses: Buses, intake: Intake, recording: bool) -> Self {
+    pub fn new(settings: &Settings, buses: Buses, intake: Intake, reports: Writers) -> Self {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
         let (cycle, rules) = (&settings.cycle, &settings.supervision);
@@ -110,19 +110,13 @@ impl Core {
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
             supervisor: Supervisor::new(settings),
-            reporter: Reporter::new(settings.robot.digest, (joints, settings.buses.len()), cycle, recording),
+            reporter: Reporter::new(settings.robot.digest, (joints, settings.buses.len()), cycle, reports),
         }
     }
 
     /// Takes the last pose that is known, before the first cycle.
     pub fn restore_poses(&mut self, last_poses: &LastPoses) {
         self.supervisor.referencing_mut().restore_poses(last_poses);
-    }
-
-    /// The reading ends of the cycle's queues.
-    #[must_use]
-    pub fn readers(&self) -> crate::report::Readers {
-        self.reporter.readers()
     }
 
     /// The supervisor, to look at.

@@ -1,7 +1,7 @@
 //! What one cycle has found out: every stage writes down what happened, `supervise` alone draws conclusions.
 use crate::phases::Event;
 use crate::tick::Tick;
-use taustream_drivers::{CanId, ErrorFrame, JointSet, LinkFault, ServoStatus};
+use taustream_drivers::{CanId, ErrorFrame, JointSet, LinkFault, Nanos, ServoStatus};
 pub use taustream_messages::{BUSES_MAX, Cause};
 use taustream_messages::{BusFault, Command, Phase};
 use taustream_motion::limits::Quantity;
@@ -20,6 +20,8 @@ pub struct PendingCommand {
     pub sequence: u64,
     /// What is asked.
     pub command: Command,
+    /// Until when its sender waits; it is not carried out later, unless it stops the arm.
+    pub valid_until: Nanos,
 }
 
 /// The real-time thread's final word on a trajectory.

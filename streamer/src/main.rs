@@ -4,29 +4,28 @@ use clap::Parser;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::channel;
 use std::thread;
-use taustream_arm::daemon::{self, Manager};
+use taustream_arm::daemon::Manager;
+use taustream_arm::log::start_log;
 use taustream_arm::{Kind, Settings, find, last_pose};
 use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
-use taustream_streamer::intake::{self, CommandQueue, Shutdown, ShutdownHandle};
+use taustream_streamer::intake::{self, Shutdown, ShutdownHandle};
 use taustream_streamer::pose_store::{self, PoseStore};
-use taustream_streamer::recorder::{Candidate, Recorder};
-use taustream_streamer::report::Readers;
-use taustream_streamer::rt;
-use taustream_streamer::service::Service;
+use taustream_streamer::recorder::Recorder;
+use taustream_streamer::threads::Threads;
+use taustream_streamer::{report, rt};
 use tracing::warn;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    daemon::start_log();
+    let _log = start_log();
     let settings = match find(Kind::Settings, &arguments.settings).and_then(|file| Settings::load(&file)) {
         Ok(settings) => settings,
         Err(faults) => {
@@ -34,7 +33,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match run(&arguments, settings) {
+    match run(&arguments, &settings) {
         Ok(Next::Ended) => ExitCode::SUCCESS,
         Ok(_) => {
             tracing::error!("ended before the drives were seen to be de-energised");
@@ -47,51 +46,45 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &Arguments, settings: Settings) -> Result<Next> {
-    let buses = open_buses(&settings, arguments.link)?;
+fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
+    let runtime = taustream_arm::runtime::directory()?;
+    let buses = open_buses(settings, arguments.link, &runtime)?;
     let described = buses.describe();
     let (queues, command_queue) = intake::pair();
     let shutdown_handle = command_queue.shutdown_handle();
     let recording = arguments.cycle_log.is_some();
-    let mut core = Core::new(&settings, buses, queues, recording);
+    let (reports, mut readers) = report::queues(recording);
+    let mut core = Core::new(settings, buses, queues, reports);
     let state = last_pose::directory(arguments.state_dir.as_deref());
-    core.restore_poses(&pose_store::restore_poses(&settings, &state));
+    core.restore_poses(&pose_store::restore_poses(settings, &state));
     let pose_store =
-        PoseStore::start(&settings, state).context("cannot start the thread that stores the last pose")?;
-    let readers = core.readers();
+        PoseStore::start(settings, state).context("cannot start the thread that stores the last pose")?;
 
     lock_memory(arguments.allow_non_realtime)?;
     let (candidates, logged) = channel();
-    let recorder = match &arguments.cycle_log {
+    let recorder = match arguments.cycle_log.as_ref().zip(readers.records.take()) {
         None => None,
-        Some(path) => {
-            let started = Recorder::start(path, &settings, Arc::clone(&readers.records), logged);
+        Some((path, records)) => {
+            let started = Recorder::start(path, settings, records, logged);
             Some(started.with_context(|| format!("cycle log {}", path.display()))?)
         }
     };
-    let settings = Arc::new(settings);
-    let stop = Arc::new(AtomicBool::new(false));
     let candidates = recording.then_some(candidates);
-    let service =
-        start_service(&settings, (command_queue, readers), candidates, pose_store, Arc::clone(&stop))?;
+    let threads = Threads::start(settings, &runtime, (command_queue, readers), (pose_store, candidates))?;
     forward_signals(shutdown_handle)?;
 
-    let outcome = run_real_time(core, &settings, arguments.allow_non_realtime, &described);
-    stop.store(true, Ordering::Release);
-    if service.join().is_err() {
-        tracing::error!("the service thread has panicked");
-    }
+    let outcome = run_real_time(core, settings, arguments.allow_non_realtime, &described);
+    threads.finish();
     if let Some(Err(e)) = recorder.map(Recorder::finish) {
         tracing::error!("cycle log: {e}");
     }
     outcome
 }
 
-fn open_buses(settings: &Settings, choice: LinkChoice) -> Result<Buses> {
-    let runtime = taustream_arm::runtime::directory()?;
+fn open_buses(settings: &Settings, choice: LinkChoice, runtime: &Path) -> Result<Buses> {
     let mut buses = Vec::new();
     for (index, bus) in settings.buses.iter().enumerate() {
-        let link = link::open(bus, choice, LinkRole::Master, &runtime)?;
+        let link = link::open(bus, choice, LinkRole::Master, runtime)?;
         let driver = drivers::of_bus(settings, index)?;
         buses.push(Bus::new(link, Box::new(driver), settings));
     }
@@ -109,35 +102,12 @@ fn lock_memory(allowed_without: bool) -> Result<()> {
     }
 }
 
-fn start_service(
-    settings: &Arc<Settings>,
-    (command_queue, readers): (CommandQueue, Readers),
-    candidates: Option<Sender<Candidate>>,
-    pose_store: PoseStore,
-    stop: Arc<AtomicBool>,
-) -> Result<thread::JoinHandle<()>> {
-    let (opened, result) = channel();
-    let settings = Arc::clone(settings);
-    let work = move || match Service::open(&settings, command_queue, readers, candidates) {
-        Ok(service) => {
-            let _ = opened.send(Ok(()));
-            service.keeping(pose_store).serve(&stop);
-        }
-        Err(e) => {
-            let _ = opened.send(Err(e));
-        }
-    };
-    let thread = thread::Builder::new().name("service".into()).stack_size(2 << 20).spawn(work)?;
-    result.recv().context("the service thread has ended")??;
-    Ok(thread)
-}
-
 fn forward_signals(shutdown_handle: ShutdownHandle) -> Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let work = move || {
         for (count, _) in signals.forever().enumerate() {
-            Manager::stopping();
             shutdown_handle.request(if count == 0 { Shutdown::Orderly } else { Shutdown::AtOnce });
+            Manager::stopping();
         }
     };
     thread::Builder::new().name("signals".into()).stack_size(256 << 10).spawn(work)?;

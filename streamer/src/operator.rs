@@ -22,6 +22,11 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) -> Option<CommandAnswer> {
+        let now = cycle_state.tick.wake_time;
+        if now > pending.valid_until && !stops_the_arm(pending.command) {
+            let (accepted, why) = (false, AnswerReason::TooLate { late_s: now.since_s(pending.valid_until) });
+            return Some(CommandAnswer { sequence: pending.sequence, accepted, phase: self.phase, why });
+        }
         if pending.command == Command::ClearFault
             && self.begin_restoring(pending.sequence, cycle_state, actions)
         {
@@ -360,5 +365,19 @@ impl Supervisor {
         }
         let at_rad = self.referencing.set_reference(joint, servo.position_rad, at_rad)?;
         Ok(AnswerReason::Referenced { joint, at_rad })
+    }
+}
+
+/// Commands that only ever slow the arm down on its path: late is better than never.
+fn stops_the_arm(command: Command) -> bool {
+    match command {
+        Command::Pause | Command::Stop | Command::FastStop => true,
+        Command::Enable
+        | Command::Disable
+        | Command::Resume
+        | Command::TorqueOff
+        | Command::Speed { .. }
+        | Command::ClearFault
+        | Command::Reference { .. } => false,
     }
 }

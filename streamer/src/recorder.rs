@@ -6,7 +6,7 @@
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
 use crate::cycle_state::Transition;
 use crate::report::{CycleRecord, Record};
-use crossbeam_queue::ArrayQueue;
+use rtrb::Consumer;
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -50,7 +50,7 @@ impl Recorder {
     pub fn start(
         path: &Path,
         settings: &Settings,
-        records: Arc<ArrayQueue<Record>>,
+        mut records: Consumer<Record>,
         candidates: Receiver<Candidate>,
     ) -> io::Result<Self> {
         let mut log = Log {
@@ -70,7 +70,7 @@ impl Recorder {
             loop {
                 // Read before the queue is emptied: what was pushed before the request is still written.
                 let last = pending.load(Ordering::Acquire);
-                log.take(&records, &candidates)?;
+                log.take(&mut records, &candidates)?;
                 if last {
                     return log.out.flush();
                 }
@@ -99,10 +99,10 @@ struct Log {
 }
 
 impl Log {
-    fn take(&mut self, records: &ArrayQueue<Record>, candidates: &Receiver<Candidate>) -> io::Result<()> {
+    fn take(&mut self, records: &mut Consumer<Record>, candidates: &Receiver<Candidate>) -> io::Result<()> {
         // Bounded by the queue's length at the start, so that a fast producer cannot keep this from its flush.
-        for _ in 0..records.len() {
-            let Some(record) = records.pop() else { break };
+        for _ in 0..records.slots() {
+            let Ok(record) = records.pop() else { break };
             // A candidate is sent before its trajectory reaches the cycle, so it is here before its record.
             for candidate in candidates.try_iter().take(CANDIDATES_MAX) {
                 if self.candidates.len() == CANDIDATES_MAX {
@@ -202,9 +202,9 @@ mod tests {
     fn log_read_back_gives_the_same_bits_in_the_same_order() {
         let path = std::env::temp_dir().join(format!("taustream-log-{}", std::process::id()));
         let settings = settings();
-        let queue = Arc::new(ArrayQueue::new(64));
+        let (mut queue, records) = rtrb::RingBuffer::new(64);
         let (sender, candidates) = channel();
-        let recorder = Recorder::start(&path, &settings, Arc::clone(&queue), candidates).unwrap();
+        let recorder = Recorder::start(&path, &settings, records, candidates).unwrap();
         let base_rad = [0.1 + 0.2, -1.57, 1.57, -1.57, 1e-17, 1.0 / 3.0, 0.0, 0.0];
         let stroke = Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad: [0.7; MAX_JOINTS] };
         let stroke = Stroke { delta_rad: [0.7, 0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 0.0], ..stroke };

@@ -7,8 +7,9 @@ use crate::cycle_state::{CycleState, TRANSITIONS_MAX, Transition, Trip};
 use crate::guard::GuardedCommand;
 use crate::supervise::{Actions, Supervisor, is_energised};
 use crate::track::Track;
-use crossbeam_queue::ArrayQueue;
+use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use taustream_drivers::ErrorFrame;
 use taustream_messages::{BusFault, LAYOUT_VERSION, Phase, Report, RobotDigest};
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -118,24 +119,73 @@ pub enum Record {
     Lost(u64),
 }
 
-/// The reading ends of the queues.
-#[derive(Clone, Debug)]
-pub struct Readers {
-    /// Reports without sequence numbers and histograms.
-    pub reports: Arc<ArrayQueue<Report>>,
-    /// One entry a cycle.
-    pub timings: Arc<ArrayQueue<Timing>>,
-    /// Events.
-    pub notes: Arc<ArrayQueue<Note>>,
-    /// The cycle log's lines; nothing is pushed unless a log is kept.
-    pub records: Arc<ArrayQueue<Record>>,
+/// What the cycle is doing, for threads that need no more than that.
+#[derive(Debug)]
+pub struct Pulse {
+    cycles: AtomicU64,
+    phase: AtomicU32,
 }
 
-/// The cycle's end: counts since start, and the queues.
+impl Pulse {
+    /// Cycles that have run.
+    #[must_use]
+    pub fn cycles(&self) -> u64 {
+        self.cycles.load(Ordering::Relaxed)
+    }
+
+    /// The phase after the last of them.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        Phase::from_code(self.phase.load(Ordering::Relaxed)).unwrap_or(Phase::Configuring)
+    }
+}
+
+/// The reading ends of the queues.
+#[derive(Debug)]
+pub struct Readers {
+    /// What the cycle is doing.
+    pub pulse: Arc<Pulse>,
+    /// Reports without sequence numbers and histograms.
+    pub reports: Consumer<Report>,
+    /// One entry a cycle.
+    pub timings: Consumer<Timing>,
+    /// Events.
+    pub notes: Consumer<Note>,
+    /// The cycle log's lines, if one is kept.
+    pub records: Option<Consumer<Record>>,
+}
+
+/// The writing ends of the queues, for the cycle.
+#[derive(Debug)]
+pub struct Writers {
+    pulse: Arc<Pulse>,
+    reports: Producer<Report>,
+    timings: Producer<Timing>,
+    notes: Producer<Note>,
+    records: Option<Producer<Record>>,
+}
+
+/// Makes both ends; with a queue of records for a cycle log if `recording`. Each queue has one writer and one reader,
+/// and neither ever waits for the other.
+#[must_use]
+pub fn queues(recording: bool) -> (Writers, Readers) {
+    let (reports, reports_in) = RingBuffer::new(REPORTS);
+    let (timings, timings_in) = RingBuffer::new(TIMINGS);
+    let (notes, notes_in) = RingBuffer::new(NOTES);
+    let (records, records_in) = recording.then(|| RingBuffer::new(RECORDS)).unzip();
+    let phase = AtomicU32::new(Phase::Configuring.code());
+    let pulse = Arc::new(Pulse { cycles: AtomicU64::new(0), phase });
+    let writers = Writers { pulse: Arc::clone(&pulse), reports, timings, notes, records };
+    (
+        writers,
+        Readers { pulse, reports: reports_in, timings: timings_in, notes: notes_in, records: records_in },
+    )
+}
+
+/// Counts since start, and the writing ends of the queues.
 #[derive(Debug)]
 pub struct Reporter {
-    queues: Readers,
-    recording: bool,
+    queues: Writers,
     every_ticks: u64,
     next_tick: u64,
     period_ns: u64,
@@ -164,13 +214,13 @@ struct Running {
 }
 
 impl Reporter {
-    /// A reporter for an arm of so many joints and buses; it fills records for a cycle log if `recording`.
+    /// A reporter for an arm of so many joints and buses.
     #[must_use]
     pub fn new(
         digest: RobotDigest,
         (joints, buses): (usize, usize),
         cycle: &taustream_arm::settings::CycleSettings,
-        recording: bool,
+        queues: Writers,
     ) -> Self {
         let period_ns = u64::from(cycle.period_us.max(1)) * 1_000;
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of a period")]
@@ -184,15 +234,8 @@ impl Reporter {
             robot_digest: digest,
             ..Report::default()
         };
-        let queues = Readers {
-            reports: Arc::new(ArrayQueue::new(REPORTS)),
-            timings: Arc::new(ArrayQueue::new(TIMINGS)),
-            notes: Arc::new(ArrayQueue::new(NOTES)),
-            records: Arc::new(ArrayQueue::new(if recording { RECORDS } else { 1 })),
-        };
         Self {
             queues,
-            recording,
             every_ticks,
             next_tick: 0,
             period_ns,
@@ -202,12 +245,6 @@ impl Reporter {
             noted: [NotedBus::default(); BUSES_MAX],
             counts,
         }
-    }
-
-    /// The reading ends.
-    #[must_use]
-    pub fn readers(&self) -> Readers {
-        self.queues.clone()
     }
 
     /// Counts this cycle and tells what is due.
@@ -231,14 +268,18 @@ impl Reporter {
         let timing =
             Timing { lateness_ns: cycle_state.tick.lateness_ns(), cycle_ns: cycle_state.tick.last_cycle_ns };
         let _ = self.queues.timings.push(timing);
+        let pulse = &self.queues.pulse;
+        pulse.phase.store(supervisor.phase().code(), Ordering::Relaxed);
+        pulse.cycles.store(self.counts.cycles, Ordering::Relaxed);
         self.write_notes(cycle_state, &actions.transitions);
-        if self.recording {
+        if self.queues.records.is_some() {
             self.write_records(cycle_state, command, track, supervision);
         }
         let changed = actions.transitions[0].is_some() || cycle_state.trajectory_result.is_some();
         if changed || cycle_state.tick.number >= self.next_tick {
             self.next_tick = cycle_state.tick.number + self.every_ticks;
-            let _ = self.queues.reports.push(self.report(cycle_state, command, track, supervisor));
+            let report = self.report(cycle_state, command, track, supervisor);
+            let _ = self.queues.reports.push(report);
         }
     }
 
@@ -346,10 +387,11 @@ impl Reporter {
     }
 
     fn record(&mut self, record: Record) {
-        if self.records_lost > 0 && self.queues.records.push(Record::Lost(self.records_lost)).is_ok() {
+        let Some(records) = &mut self.queues.records else { return };
+        if self.records_lost > 0 && records.push(Record::Lost(self.records_lost)).is_ok() {
             self.records_lost = 0;
         }
-        if self.records_lost > 0 || self.queues.records.push(record).is_err() {
+        if self.records_lost > 0 || records.push(record).is_err() {
             self.records_lost += 1;
         }
     }

@@ -9,6 +9,7 @@ use crate::intake::Boxed;
 use crate::last_sent::Ledger;
 use taustream_arm::settings::{CycleSettings, Supervision};
 use taustream_messages::Phase;
+use taustream_messages::trajectory::is_newer;
 use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
 use taustream_motion::trajectory::Cursor;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
@@ -129,7 +130,7 @@ impl Track {
     }
 
     fn decide(&self, offer: &Boxed, phase: Phase, hold_position_rad: &JointArray, tick: u64) -> Decision {
-        if offer.generation <= self.newest_generation {
+        if !is_newer(offer.generation, self.newest_generation) {
             return Decision::Stale { newest: self.newest_generation };
         }
         if phase != Phase::Holding {

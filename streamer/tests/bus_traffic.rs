@@ -10,10 +10,9 @@ mod arm;
 
 use arm::{Arm, JOINTS, shipped};
 use taustream_arm::{BusKind, Settings};
-use taustream_drivers::CanFrame;
 use taustream_drivers::sim::LinkedSimulator;
+use taustream_drivers::{CanFrame, Nanos};
 use taustream_messages::{Command, FaultReason, Phase};
-use taustream_streamer::cycle_state::PendingCommand;
 
 /// The six servos of one virtual bus, with further keys for it.
 fn six_with(keys: &str) -> Settings {
@@ -272,11 +271,9 @@ fn overloaded_bus_starves_the_heartbeats_and_never_holds() {
         assert_ne!(arm.phase(), Phase::Holding);
         if arm.phase() == Phase::Disabled && arm.tick.is_multiple_of(100) {
             // Refused, or taken and not reached: both are fine, holding is not.
-            let _ = arm
-                .command_queue
-                .push_command(PendingCommand { sequence: arm.tick, command: Command::Enable });
+            let _ = arm.command_queue.commands.ask(Command::Enable, Nanos(u64::MAX));
         }
-        let _answered = arm.command_queue.answer();
+        let _answered = arm.command_queue.commands.answer();
     }
     let seen = arm.simulator.wire(0).unwrap().counters();
     assert!(seen.longest_wait_ns > 100_000_000, "{seen:?}");

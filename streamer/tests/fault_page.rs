@@ -26,6 +26,7 @@ fn rejections() -> Vec<String> {
         Rejection::NotAtBase { joint: 0, by_rad: 0.0 },
         Rejection::NotReady { phase: Some(Phase::Paused) },
         Rejection::CutUnsupported { at_s: 0.0 },
+        Rejection::TooLate { late_s: 0.0 },
         Rejection::Busy,
     ];
     for rejection in &all {
@@ -38,6 +39,7 @@ fn rejections() -> Vec<String> {
             | Rejection::NotAtBase { .. }
             | Rejection::NotReady { .. }
             | Rejection::CutUnsupported { .. }
+            | Rejection::TooLate { .. }
             | Rejection::Busy => {}
         }
     }

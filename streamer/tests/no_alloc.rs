@@ -13,11 +13,11 @@ mod arm;
 
 use arm::{Arm, JOINTS, shipped};
 use taustream_arm::Settings;
+use taustream_drivers::Nanos;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_drivers::sim::FaultRequest;
 use taustream_messages::{Command, Phase};
 use taustream_streamer::cycle::{Probe, Stage};
-use taustream_streamer::cycle_state::PendingCommand;
 
 #[path = "../../drivers/tests/counting/mod.rs"]
 mod counting;
@@ -88,17 +88,16 @@ fn lose_a_bus_and_restore_it(arm: &mut Arm) {
     }
     let servos = link::open(&arm.settings.buses[0], LinkChoice::Local, LinkRole::Servos, &arm.runtime);
     arm.far_ends[0] = Some(servos.unwrap());
-    assert!(
-        arm.command_queue.push_command(PendingCommand { sequence: arm.tick, command: Command::ClearFault })
-    );
+    assert!(arm.command_queue.commands.ask(Command::ClearFault, Nanos(u64::MAX)).is_some());
     arm.run(1);
-    let mut handover = arm.command_queue.failed_links().expect("the failed bus's link is handed out");
+    let mut handover =
+        arm.command_queue.trajectories.failed_links().expect("the failed bus's link is handed out");
     handover.recovered = handover.links.iter_mut().flatten().all(|link| link.reopen().is_ok());
     assert!(handover.recovered, "the link cannot be reopened");
     arm.run(3);
-    arm.command_queue.return_links(handover);
+    arm.command_queue.trajectories.return_links(handover);
     arm.run(1);
-    assert!(arm.command_queue.answer().unwrap().accepted);
+    assert!(arm.command_queue.commands.answer().unwrap().accepted);
     // The drives' own watchdogs have left faults, which are reported once they were looked at again.
     arm.run(1_000);
     if arm.phase() == Phase::Fault {

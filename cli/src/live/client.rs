@@ -15,13 +15,16 @@ pub(crate) const PLANNER: &str = "taustream-planner";
 const POLL: Duration = Duration::from_millis(2);
 /// Longest wait for an answer to a command; the streamer answers within a few cycles.
 const COMMAND_S_MAX: f64 = 2.0;
+/// How long the streamer may carry a command out: shorter, so that nothing happens after we have given up.
+const COMMAND_VALID: Duration = Duration::from_millis(1_500);
 /// Longest wait for one report; the slowest settable rate is well above one a second.
 const REPORT_S_MAX: f64 = 2.0;
 
 /// Access to the services of one arm.
 pub(crate) struct Client {
-    wire: Wire,
+    // Ports go before their node.
     reports: ReportSubscriber,
+    wire: Wire,
 }
 
 impl Client {
@@ -29,7 +32,7 @@ impl Client {
     pub(crate) fn join(arm: &str) -> Result<Self, Failure> {
         let wire = Wire::join(arm, "taustream", &taustream_arm::runtime::directory()?)?;
         let reports = wire.report_subscriber()?;
-        Ok(Self { wire, reports })
+        Ok(Self { reports, wire })
     }
 
     /// The services themselves.
@@ -41,7 +44,7 @@ impl Client {
     pub(crate) fn command(&self, command: Command) -> Result<CommandReply, Failure> {
         let client = self.wire.command_client()?;
         let pending = client
-            .send_copy(CommandRequest::from(command))
+            .send_copy(CommandRequest::new(command, COMMAND_VALID))
             .map_err(|e| self.refused("send the command", &e))?;
         if pending.number_of_server_connections() == 0 {
             return Err(self.wire.not_running(STREAMER).into());

@@ -1,5 +1,6 @@
 //! enable, disable, pause, resume, speed, stop, torque-off, clear-fault: one command, then the wait for its effect.
 use super::client::{Client, Limit};
+use super::stop_way;
 use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -7,9 +8,14 @@ use crate::output::Form;
 use crate::words::fault_sentence;
 use serde::Serialize;
 use std::fmt;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
+use taustream_messages::operator::request_of;
 use taustream_messages::{Command, CommandReply, Phase};
+
+/// How long shared memory may take for an answer to a stop, before the other way is taken.
+const SHARED_MEMORY_S_MAX: f64 = 1.5;
 
 /// What became of a command.
 #[derive(Debug, Serialize)]
@@ -87,34 +93,132 @@ fn is_lost(command: Command, phase: Phase) -> bool {
 
 /// Sends a command, waits up to `wait_s` for its effect, and prints the answer.
 pub(crate) fn run(form: Form, arm: &ArmName, command: Command, wait_s: f64) -> Result<(), Failure> {
-    let client = Client::join(&arm.name)?;
-    let answer = send(&client, arm, command, wait_s)?;
+    let answer = match request_of(command) {
+        Some(request) => stop(arm, command, request, wait_s)?,
+        None => send(&Client::join(&arm.name)?, arm, command, wait_s, &mut || {})?,
+    };
     form.print(&answer)
+}
+
+/// How far a command has come by shared memory.
+enum Progress {
+    Answered,
+    Ended(Result<Answer, Failure>),
+}
+
+/// Stops by shared memory, or by the streamer's own socket where shared memory fails or is slow.
+fn stop(arm: &ArmName, command: Command, request: &'static str, wait_s: f64) -> Result<Answer, Failure> {
+    let (progress, progressed) = channel();
+    let (target, to) = (arm.clone(), progress.clone());
+    let work = move || {
+        let ended = Client::join(&target.name).and_then(|client| {
+            send(&client, &target, command, wait_s, &mut || drop(to.send(Progress::Answered)))
+        });
+        drop(progress.send(Progress::Ended(ended)));
+    };
+    thread::Builder::new()
+        .name("shared memory".into())
+        .spawn(work)
+        .map_err(|e| Failure::Failed(format!("cannot start a thread: {e}")))?;
+    let limit = Limit::after_s(SHARED_MEMORY_S_MAX);
+    let mut answered = false;
+    let why = loop {
+        match progressed.recv_timeout(Duration::from_millis(5)) {
+            Ok(Progress::Answered) => answered = true,
+            Ok(Progress::Ended(Err(failure))) if !answered && failure.is_of_transport() => {
+                break failure.to_string();
+            }
+            Ok(Progress::Ended(ended)) => return ended,
+            Err(RecvTimeoutError::Disconnected) => break "it has failed".to_owned(),
+            Err(RecvTimeoutError::Timeout) if !answered && limit.is_over() => {
+                break format!("no answer within {SHARED_MEMORY_S_MAX} s");
+            }
+            Err(RecvTimeoutError::Timeout) => interrupt::check()?,
+        }
+    };
+    stop_by_socket(arm, command, request, wait_s)
+        .map(|answer| Answer {
+            message: format!(
+                "{}; by the streamer's own socket, because shared memory failed: {why}",
+                answer.message
+            ),
+            ..answer
+        })
+        .map_err(
+            |failure| {
+                if failure.is_of_socket() { Failure::Failed(format!("{why}; {failure}")) } else { failure }
+            },
+        )
+}
+
+fn stop_by_socket(
+    arm: &ArmName,
+    command: Command,
+    request: &'static str,
+    wait_s: f64,
+) -> Result<Answer, Failure> {
+    let reply = stop_way::ask(arm, request)?;
+    let limit = Limit::after_s(wait_s);
+    let mut phase = accepted(command, &reply)?;
+    while wait_s > 0.0 && !phase.is_some_and(|p| is_reached(command, p)) {
+        if limit.is_over() {
+            return Err(too_long(command, phase, wait_s));
+        }
+        interrupt::check()?;
+        thread::sleep(Duration::from_millis(20));
+        phase = Some(stop_way::phase(arm)?);
+    }
+    Ok(answer(arm, command, phase, &reply))
 }
 
 /// Like [`run`], without printing: the demo's way to command.
 pub(crate) fn execute(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<(), Failure> {
-    send(client, arm, command, wait_s).map(drop)
+    send(client, arm, command, wait_s, &mut || {}).map(drop)
 }
 
-fn send(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Result<Answer, Failure> {
+fn send(
+    client: &Client,
+    arm: &ArmName,
+    command: Command,
+    wait_s: f64,
+    answered: &mut dyn FnMut(),
+) -> Result<Answer, Failure> {
     let reply = ask(client, command, wait_s)?;
-    let (name, mut phase) = (word(command), reply.phase());
-    if !reply.is_accepted() {
-        let at = phase.map_or("in an unknown phase", Phase::word);
-        return Err(Failure::Refused(format!("{name} refused while {at}: {}", reply.text())));
-    }
+    answered();
+    let mut phase = accepted(command, &reply)?;
     let is_done = |p| is_reached(command, p) || is_so_already(command, p);
     if wait_s > 0.0 && !phase.is_some_and(is_done) {
         phase = Some(wait_for(client, arm, command, wait_s)?);
     }
-    Ok(Answer {
+    Ok(answer(arm, command, phase, &reply))
+}
+
+/// The phase in which a command was accepted.
+fn accepted(command: Command, reply: &CommandReply) -> Result<Option<Phase>, Failure> {
+    let (name, phase) = (word(command), reply.phase());
+    if reply.is_accepted() {
+        return Ok(phase);
+    }
+    let at = phase.map_or("in an unknown phase", Phase::word);
+    Err(Failure::Refused(format!("{name} refused while {at}: {}", reply.text())))
+}
+
+fn answer(arm: &ArmName, command: Command, phase: Option<Phase>, reply: &CommandReply) -> Answer {
+    Answer {
         arm: arm.name.clone(),
-        command: name,
+        command: word(command),
         accepted: true,
         phase: phase.map(Phase::word),
         message: reply.text(),
-    })
+    }
+}
+
+fn too_long(command: Command, phase: Option<Phase>, wait_s: f64) -> Failure {
+    Failure::Failed(format!(
+        "{} was accepted, but the arm is still {} after {wait_s} s; see `taustream status`, or give it longer with --wait-s",
+        word(command),
+        phase.map_or("in an unknown phase", Phase::word)
+    ))
 }
 
 /// Asks once; an `enable` that comes while drives are still being configured is asked again until they are.
@@ -147,10 +251,7 @@ fn wait_for(client: &Client, arm: &ArmName, command: Command, wait_s: f64) -> Re
             )));
         }
         if limit.is_over() {
-            return Err(Failure::Failed(format!(
-                "{name} was accepted, but the arm is still {} after {wait_s} s; see `taustream status`, or give it longer with --wait-s",
-                phase.word()
-            )));
+            return Err(too_long(command, Some(phase), wait_s));
         }
         interrupt::check()?;
         thread::sleep(Duration::from_millis(5));

@@ -6,4 +6,5 @@ pub(crate) mod reference;
 pub(crate) mod replan;
 pub(crate) mod run;
 pub(crate) mod status;
+mod stop_way;
 pub(crate) mod watch;

@@ -7,7 +7,8 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use taustream_arm::daemon::{self, Manager};
+use taustream_arm::daemon::Manager;
+use taustream_arm::log::start_log;
 use taustream_arm::{Kind, Settings, runtime};
 use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
@@ -17,7 +18,7 @@ use taustream_drivers::sim::{FaultRequest, LinkedSimulator, ServoSimulator, prio
 use taustream_drivers::{Nanos, link};
 
 fn main() -> ExitCode {
-    daemon::start_log();
+    let _log = start_log();
     let args = Arguments::parse();
     let simulator = match prepare(&args) {
         Ok(prepared) => prepared,

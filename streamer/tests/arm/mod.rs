@@ -11,10 +11,10 @@ use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, Stroke, Trajectory};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
-use taustream_streamer::cycle_state::{Decision, PendingCommand};
+use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::intake::{self, CommandQueue};
 use taustream_streamer::names::Names;
-use taustream_streamer::report::{Readers, Record};
+use taustream_streamer::report::{self, Readers, Record};
 use taustream_streamer::tick::Tick;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -67,13 +67,14 @@ impl Arm {
             buses.push(Bus::new(near_end, Box::new(driver), &settings));
         }
         let (queues, command_queue) = intake::pair();
-        let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, true);
+        let (reports, readers) = report::queues(true);
+        let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, reports);
         let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         setups.iter_mut().for_each(|setup| setup.parameters.plant_mut().brake = true);
         let count = settings.buses.len();
         let queue_frames = queue_frames(&settings).unwrap_or_else(|faults| panic!("{faults}"));
         Self {
-            readers: core.readers(),
+            readers,
             core,
             command_queue,
             simulator: LinkedSimulator::new(
@@ -136,16 +137,16 @@ impl Arm {
             out.clear();
         }
         self.simulator.simulator.take_events();
-        while let Some(record) = self.readers.records.pop() {
+        while let Some(record) = self.readers.records.as_mut().and_then(|records| records.pop().ok()) {
             match record {
                 Record::CycleSettings(cycle) => self.hold_position_rad = cycle.position_rad,
                 Record::Transition(t) => self.visited.push(t.to),
                 Record::Accepted { .. } | Record::Lost(_) => {}
             }
         }
-        while self.readers.timings.pop().is_some() {}
-        while self.readers.reports.pop().is_some() {}
-        while self.readers.notes.pop().is_some() {}
+        while self.readers.timings.pop().is_ok() {}
+        while self.readers.reports.pop().is_ok() {}
+        while self.readers.notes.pop().is_ok() {}
     }
 
     pub(crate) fn run(&mut self, cycles: u64) {
@@ -166,9 +167,9 @@ impl Arm {
     }
 
     pub(crate) fn ask(&mut self, command: Command) {
-        assert!(self.command_queue.push_command(PendingCommand { sequence: self.tick, command }));
+        assert!(self.command_queue.commands.ask(command, Nanos(u64::MAX)).is_some());
         self.step(&mut NoProbe);
-        let answer = self.command_queue.answer().unwrap();
+        let answer = self.command_queue.commands.answer().unwrap();
         assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
@@ -185,7 +186,7 @@ impl Arm {
         let trajectory = Trajectory::new(JOINTS, self.hold_position_rad, &strokes).unwrap();
         self.generation += 1;
         let generation = self.generation;
-        let mut empty = self.command_queue.empty_box().expect("boxes go round");
+        let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
         *empty = CheckedTrajectory {
             trajectory_id: generation,
             generation,
@@ -193,9 +194,9 @@ impl Arm {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.command_queue.offer(empty);
+        self.command_queue.trajectories.offer(empty);
         self.step(&mut NoProbe);
-        let decision = self.command_queue.trajectory_result().unwrap().decision;
+        let decision = self.command_queue.trajectories.trajectory_result().unwrap().decision;
         assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
     }
 

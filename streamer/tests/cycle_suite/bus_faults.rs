@@ -97,7 +97,7 @@ fn bus_fault_whose_link_cannot_be_reopened_stays_and_can_be_asked_again() {
         harness.run(5);
         assert_eq!(harness.phase(), Phase::Fault);
         assert!(
-            harness.command_queue.answer().is_none(),
+            harness.command_queue.commands.answer().is_none(),
             "the service thread has answered in the link's words"
         );
     }

@@ -13,10 +13,10 @@ use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
-use taustream_streamer::cycle_state::{Cause, Decision, PendingCommand, TrajectoryResult};
+use taustream_streamer::cycle_state::{Cause, Decision, TrajectoryResult};
 use taustream_streamer::intake::{self, CommandQueue, Shutdown};
 use taustream_streamer::names::Names;
-use taustream_streamer::report::{CycleRecord, Note, Readers, Record};
+use taustream_streamer::report::{self, CycleRecord, Note, Readers, Record};
 use taustream_streamer::tick::Tick;
 
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -263,7 +263,6 @@ pub struct CycleHarness {
     pub report: Option<Report>,
     /// Notes of error frames.
     pub error_notes: u32,
-    sequence: u64,
     generation: u64,
     last: Next,
 }
@@ -334,9 +333,9 @@ impl CycleHarness {
         };
         let bus = Bus::new(Box::new(FakeLink(Arc::clone(&world))), Box::new(driver), &settings);
         let (queues, command_queue) = intake::pair();
+        let (reports, readers) = report::queues(true);
         let buses = Buses::new(vec![bus]).unwrap();
-        let core = Core::new(&settings, buses, queues, true);
-        let readers = core.readers();
+        let core = Core::new(&settings, buses, queues, reports);
         Self {
             core,
             command_queue,
@@ -348,7 +347,6 @@ impl CycleHarness {
             phases: Vec::new(),
             report: None,
             error_notes: 0,
-            sequence: 0,
             generation: 0,
             last: Next::Go,
         }
@@ -367,7 +365,7 @@ impl CycleHarness {
             last_cycle_ns: 1,
         };
         self.last = run_cycle(&mut self.core, tick, &mut NoProbe);
-        while let Some(record) = self.readers.records.pop() {
+        while let Some(record) = self.readers.records.as_mut().and_then(|records| records.pop().ok()) {
             match record {
                 Record::CycleSettings(cycle) => self.cycles.push(cycle),
                 Record::Transition(t) => self.phases.push((t.from, t.to)),
@@ -375,11 +373,11 @@ impl CycleHarness {
                 Record::Lost(n) => panic!("{n} records lost"),
             }
         }
-        while self.readers.timings.pop().is_some() {}
-        while let Some(report) = self.readers.reports.pop() {
+        while self.readers.timings.pop().is_ok() {}
+        while let Ok(report) = self.readers.reports.pop() {
             self.report = Some(report);
         }
-        while let Some(note) = self.readers.notes.pop() {
+        while let Ok(note) = self.readers.notes.pop() {
             self.error_notes += u32::from(matches!(note, Note::BusError { .. }));
         }
         self.last
@@ -417,35 +415,39 @@ impl CycleHarness {
 
     /// Asks, runs one cycle, and returns the answer.
     pub fn ask(&mut self, command: Command) -> CommandAnswer {
-        self.sequence += 1;
-        assert!(self.command_queue.push_command(PendingCommand { sequence: self.sequence, command }));
+        self.ask_until(command, Nanos(u64::MAX))
+    }
+
+    /// The same, for a sender that gives up at an instant.
+    pub fn ask_until(&mut self, command: Command, valid_until: Nanos) -> CommandAnswer {
+        let sequence = self.command_queue.commands.ask(command, valid_until).expect("room for a command");
         self.step_after(1);
-        let answer = self.command_queue.answer().expect("every command is answered in its cycle");
-        assert_eq!(answer.sequence, self.sequence);
+        let answer = self.command_queue.commands.answer().expect("every command is answered in its cycle");
+        assert_eq!(answer.sequence, sequence);
         answer
     }
 
     /// Asks what cannot be answered in the same cycle, and runs it.
     pub fn queue_request(&mut self, command: Command) -> Option<CommandAnswer> {
-        self.sequence += 1;
-        assert!(self.command_queue.push_command(PendingCommand { sequence: self.sequence, command }));
+        self.command_queue.commands.ask(command, Nanos(u64::MAX)).expect("room for a command");
         self.step_after(1);
-        self.command_queue.answer()
+        self.command_queue.commands.answer()
     }
 
     /// Runs one cycle that must answer.
     pub fn step_to_answer(&mut self) -> CommandAnswer {
         self.step_after(1);
-        self.command_queue.answer().expect("an answer that was waited for")
+        self.command_queue.commands.answer().expect("an answer that was waited for")
     }
 
     /// The service thread's part: starts the links that were handed out over. True when all are there again.
     pub fn restore_buses(&mut self) -> bool {
-        let mut handover = self.command_queue.failed_links().expect("links of failed buses are handed out");
+        let mut handover =
+            self.command_queue.trajectories.failed_links().expect("links of failed buses are handed out");
         let mut links = handover.links.iter_mut().flatten();
         handover.recovered = links.all(|link| link.reopen().is_ok());
         let recovered = handover.recovered;
-        self.command_queue.return_links(handover);
+        self.command_queue.trajectories.return_links(handover);
         recovered
     }
 
@@ -462,7 +464,7 @@ impl CycleHarness {
     }
 
     pub fn offer_as(&mut self, trajectory: Trajectory, generation: u64) -> Decision {
-        let mut empty = self.command_queue.empty_box().expect("boxes go round");
+        let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
         *empty = CheckedTrajectory {
             trajectory_id: 1000 + generation,
             generation,
@@ -470,10 +472,13 @@ impl CycleHarness {
             replaces: Replaces::Rest,
             trajectory,
         };
-        self.command_queue.offer(empty);
+        self.command_queue.trajectories.offer(empty);
         self.step_after(1);
-        let TrajectoryResult { decision, .. } =
-            self.command_queue.trajectory_result().expect("every trajectory is answered in its cycle");
+        let TrajectoryResult { decision, .. } = self
+            .command_queue
+            .trajectories
+            .trajectory_result()
+            .expect("every trajectory is answered in its cycle");
         decision
     }
 

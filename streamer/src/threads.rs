@@ -1,0 +1,112 @@
+//! The threads beside the cycle and the cycle log: started together, ended together.
+use crate::commands::CommandThread;
+use crate::intake::CommandQueue;
+use crate::log::{self, CommandLog};
+use crate::names::Names;
+use crate::ports::{PortError, PortWatch};
+use crate::pose_store::PoseStore;
+use crate::publisher::{Publisher, Surroundings};
+use crate::recorder::Candidate;
+use crate::report::Readers;
+use crate::stop_socket::{StopThread, bind_file};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+use taustream_arm::Settings;
+use taustream_arm::daemon::Manager;
+use tracing::{error, warn};
+
+/// Why the streamer cannot serve.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Shared memory refuses.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// A thread or a histogram is not to be had.
+    #[error("cannot start a thread: {0}")]
+    System(#[from] io::Error),
+}
+
+/// The threads.
+#[derive(Debug)]
+pub struct Threads {
+    stop: Arc<AtomicBool>,
+    all: Vec<JoinHandle<()>>,
+}
+
+impl Threads {
+    /// Starts all of them, and opens the arm's ports.
+    ///
+    /// # Errors
+    /// When shared memory refuses, for instance because a streamer serves this arm already.
+    pub fn start(
+        settings: &Settings,
+        runtime: &Path,
+        (command_queue, readers): (CommandQueue, Readers),
+        (pose_store, candidates): (PoseStore, Option<Sender<Candidate>>),
+    ) -> Result<Self, StartError> {
+        let names = Names::of(settings);
+        let (command_events, command_reader) = log::events();
+        let (socket_events, socket_reader) = log::events();
+        let command_log = CommandLog::new(vec![command_reader, socket_reader], names.clone());
+        let (obstacles, obstacles_in) = channel();
+        let (files, files_in) = channel();
+        let rounds = Arc::new(AtomicU64::new(0));
+        let (pulse, arm) = (Arc::clone(&readers.pulse), settings.name.clone());
+        let commands = CommandThread {
+            port: command_queue.commands,
+            pulse: Arc::clone(&pulse),
+            names: names.clone(),
+            events: command_events,
+            obstacles: obstacles_in,
+            rounds: Arc::clone(&rounds),
+        };
+        let (port, events) = (command_queue.socket, socket_events);
+        let socket = StopThread { port, pulse, names, events, command_rounds: rounds, arm: arm.clone() };
+        let port = command_queue.trajectories;
+        let around = Surroundings { port, readers, command_log, obstacles, pose_store, candidates };
+        let mut publisher = Publisher::new(settings, around)?;
+
+        let (mut watch, ends) = PortWatch::new(&arm, runtime, 2);
+        let mut threads = Self { stop: Arc::default(), all: Vec::new() };
+        let mut ends = ends.into_iter();
+        if let (Some(first), Some(second)) = (ends.next(), ends.next()) {
+            let stop = Arc::clone(&threads.stop);
+            threads.spawn("commands", 1 << 20, move || commands.serve(&first, &stop))?;
+            let stop = Arc::clone(&threads.stop);
+            threads.spawn("publisher", 2 << 20, move || publisher.serve(&second, &stop))?;
+        }
+        if let Err(e) = watch.open_first() {
+            threads.finish();
+            return Err(e.into());
+        }
+        match bind_file(&arm, runtime) {
+            Ok(listener) => drop(files.send(listener)),
+            Err(e) => warn!("{}: the streamer's own socket cannot be made there: {e}", runtime.display()),
+        }
+        let stop = Arc::clone(&threads.stop);
+        let manager = Manager::from_environment();
+        threads.spawn("stop", 512 << 10, move || socket.serve(&files_in, manager, &stop))?;
+        threads.all.push(watch.start(files, Arc::clone(&threads.stop))?);
+        Ok(threads)
+    }
+
+    fn spawn(&mut self, name: &str, stack: usize, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        self.all.push(thread::Builder::new().name(name.into()).stack_size(stack).spawn(work)?);
+        Ok(())
+    }
+
+    /// Ends all of them, after they have written what is left.
+    pub fn finish(self) {
+        self.stop.store(true, Ordering::Release);
+        for thread in self.all {
+            let name = thread.thread().name().unwrap_or("without name").to_owned();
+            if thread.join().is_err() {
+                error!("the thread {name} has panicked");
+            }
+        }
+    }
+}
