@@ -95,8 +95,8 @@ impl LineQueue {
 fn write_all(mut sink: impl Sink, queued: &Receiver<Vec<u8>>, counts: &Counts) {
     for line in queued {
         let lost = counts.lost.swap(0, Ordering::Relaxed);
-        let told = if lost > 0 { sink.write(&sink.lost(lost)) } else { Ok(()) };
-        if told.and_then(|()| sink.write(&line)).is_err() {
+        let reported = if lost > 0 { sink.write(&sink.lost(lost)) } else { Ok(()) };
+        if reported.and_then(|()| sink.write(&line)).is_err() {
             // A sink that refuses gets no line about it: the next one that is taken carries the count.
             counts.lost.fetch_add(lost + 1, Ordering::Relaxed);
         }
@@ -171,7 +171,7 @@ pub fn start_log() -> Log {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     let registry = tracing_subscriber::registry().with(filter);
     let named = env::var("JOURNAL_STREAM").ok().and_then(|stream| Journal::behind_stderr(&stream));
-    // A second call changes nothing: the first log goes on.
+    // A second call changes nothing: the first log continues.
     let queue = match named {
         Some(journal) => LineQueue::start(journal).inspect(|queue| {
             let _first_goes_on = registry.with(journal::JournalLayer::new(queue.clone())).try_init();

@@ -74,7 +74,7 @@ fn run(settings: &Settings) -> Result<()> {
                 files.clear();
             }
         }
-        // A streamer that lives opens its own services anew meanwhile.
+        // A streamer that lives opens its own services again meanwhile.
         thread::sleep(AGAIN_AFTER);
         let _said_by_join = taustream_arm::runtime::directory();
     }

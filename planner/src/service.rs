@@ -223,7 +223,7 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Plans on a thread of its own: whatever goes wrong there, the service goes on. Planning ends when its requester goes;
+    /// Plans on a thread of its own: whatever goes wrong there, the service continues. Planning ends when its requester goes;
     /// others are answered meanwhile.
     fn plan(
         &self,

@@ -329,7 +329,7 @@ fn service_second_planner_of_an_arm_is_refused() {
     });
 }
 
-/// Walls that no way round the base leads past, and a goal behind them: a search that goes on until its deadline.
+/// Walls that no way round the base leads past, and a goal behind them: a search that continues until its deadline.
 fn walled() -> Scene {
     let wall = |name: &str, y: f64| {
         format!(
@@ -340,9 +340,9 @@ fn walled() -> Scene {
     Scene::from_toml(std::path::Path::new("walled.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
-/// Goal: nobody has to wait for a motion that nobody waits for. Method: a request with a deadline far beyond the test's patience is
+/// Goal: no client waits for a motion without a client. Method: a request with a deadline far beyond the timeout of the test is
 /// dropped, as Ctrl-C does, or its process is gone; the next one must be answered long before that deadline. While the first
-/// one is planned, others are told so.
+/// one is planned, others get that answer.
 #[test]
 fn service_planning_ends_when_its_requester_goes_and_others_are_answered_meanwhile() {
     let played = Played::new(Phase::Holding);

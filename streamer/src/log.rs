@@ -21,7 +21,7 @@ use tracing::{error, info, warn};
 const EVENTS: usize = 256;
 /// The same line is written once in this time, s.
 const SAME_LINE_S: f64 = 1.0;
-/// Lines of one kind that are told apart; beyond them, all of the kind are counted together.
+/// Lines of one kind that are distinguished; beyond them, all of the kind are counted together.
 const LINES_MAX: usize = 64;
 
 /// Something that became of a command.

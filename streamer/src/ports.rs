@@ -1,9 +1,9 @@
-//! Ports in shared memory, opened, watched and opened anew.
+//! Ports in shared memory, opened, watched and opened again.
 //!
 //! Names in shared memory can vanish under a running streamer: the system deletes a user's segments at logout (`RemoveIPC=`),
 //! cleaners delete what is old in /tmp, people delete runtime directories. Nobody who comes later finds the streamer then. The
 //! thread of this module looks for the files that the ports stand on, says when one is gone, has all ports closed, clears what is
-//! left of the arm, and has them opened again. Ports cannot move between threads, so each thread opens its own when it is told.
+//! left of the arm, and has them opened again. Ports cannot move between threads, so each thread opens its own on request.
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
 use crate::stop_socket::bind_file;
 use std::os::unix::net::UnixListener;

@@ -158,7 +158,7 @@ impl Publisher {
         }
     }
 
-    /// Starts the links of failed buses over. What stands in the way is the answer to the `clear-fault` that asked.
+    /// Restarts the links of failed buses. The reason of a failure is the answer to the `clear-fault` that asked.
     fn restore_buses(&mut self) {
         let Some(mut handover) = self.port.failed_links() else { return };
         let mut obstacles = Vec::new();

@@ -214,7 +214,7 @@ fn start_after_any_kind_of_file_was_spoiled_and_a_kill_comes_up_and_leaves_no_se
 }
 
 /// Goal: what its sender has given up is not carried out later. Method: the streamer is stopped by the kernel; a command, and a
-/// motion, are sent and given up; then it goes on.
+/// motion, are sent and given up; then it continues.
 #[test]
 fn commands_and_motions_that_were_given_up_are_not_carried_out_later() {
     let arm = Arm::new("late");
