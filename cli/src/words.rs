@@ -17,9 +17,9 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
 pub(crate) fn pause_sentence(report: &Report) -> Option<String> {
     let Pause { reason, gap_s } = report.pause()?;
     Some(match reason {
-        PauseReason::Operator => "paused by command; `taustream resume` goes on".to_owned(),
+        PauseReason::Operator => "paused by command; `taustream resume` continues".to_owned(),
         PauseReason::Stall => format!(
-            "paused because no setpoint left for {:.1} ms (the computer was busy or asleep); `taustream resume` goes on",
+            "paused because no setpoint left for {:.1} ms (the computer was busy or asleep); `taustream resume` continues",
             gap_s * 1e3
         ),
     })

@@ -247,7 +247,7 @@ impl PortWatch {
         }
         if let Some(missing) = missing {
             error!(
-                "{} of this running streamer has vanished or was replaced: somebody deletes files (RemoveIPC=yes at logout, a cleaner \
+                "{} of this running streamer has vanished or was replaced: another process deletes files (RemoveIPC=yes at logout, a cleaner \
                  of /tmp, rm -rf); `stop`, `stop --fast` and `torque-off` work all the same; opening the services anew",
                 missing.display()
             );
