@@ -132,9 +132,7 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     let Panel { curves, limits, filled_areas, is_log, .. } = &scaled;
     let (across, values) = ranges(area, &scaled);
     let ends = [across.start, across.end - (across.end - across.start) * LEGEND_SHARE / (1.0 + LEGEND_SHARE)];
-    // Marks are sums of steps: what should be zero is what their rounding leaves.
-    let rounding = 1e-9 * (across.end - across.start).min(values.end - values.start);
-    let plain = |at: &f64| number::figures(if at.abs() < rounding { 0.0 } else { *at });
+    let plain = ticks(&across, &values);
     let power = |exponent: &f64| format!("{:.1e}", 10_f64.powf(*exponent));
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
@@ -181,6 +179,13 @@ pub fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
         .label_font(("sans-serif", 13))
         .draw()?;
     Ok(())
+}
+
+/// Words of the ticks of two axes. Ticks are sums of steps: one that should be zero is what their rounding leaves, and
+/// would read "-0.0".
+pub fn ticks(across: &Range<f64>, values: &Range<f64>) -> impl Fn(&f64) -> String + use<> {
+    let rounding = 1e-9 * (across.end - across.start).min(values.end - values.start);
+    move |at| number::figures(if at.abs() < rounding { 0.0 } else { *at })
 }
 
 /// The axes: all points and limits, with a little room above and below.

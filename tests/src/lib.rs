@@ -17,6 +17,7 @@ pub mod cycle_log;
 pub mod damiao_scenarios;
 pub mod debian;
 pub mod demo_file;
+pub mod documents;
 pub mod machine;
 pub mod mit_setpoints;
 mod on_path;

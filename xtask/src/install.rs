@@ -1,7 +1,9 @@
 //! `cargo xtask install`: the one list of what goes where, for installing by hand, for tests and for packages.
-use crate::{manual, workspace};
+use crate::{manual, packages, workspace};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use std::env;
+use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, Permissions};
 use std::io::ErrorKind;
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -10,7 +12,7 @@ use std::process::{Command, ExitCode};
 
 const HELP: &str = "\
 Examples:
-  sudo cargo xtask install --root /                       build in release and install on this machine
+  cargo xtask install                                       build in release, then install on this machine through sudo
   cargo xtask install --root stage --programs target/debug  into a directory, from programs that are there
 
 docs/services.md has the next steps: settings, bus, users, start.";
@@ -18,8 +20,8 @@ docs/services.md has the next steps: settings, bus, users, start.";
 /// Where to install.
 #[derive(Args, Debug)]
 pub(crate) struct RootArguments {
-    /// The root of the file system to install into.
-    #[arg(long, value_name = "DIR")]
+    /// The root of the file system to install into; below / it takes root's rights, through sudo for anybody else.
+    #[arg(long, value_name = "DIR", default_value = "/")]
     root: PathBuf,
 }
 
@@ -38,7 +40,7 @@ pub(crate) struct Arguments {
 const PROGRAMS: [&str; 4] = ["taustream", "taustream-planner", "taustream-streamer", "taustream-servosim"];
 
 /// Files of the source tree: from, to, mode.
-const FILES: [(&str, &str, u32); 12] = [
+const FILES: [(&str, &str, u32); 14] = [
     ("systemd/taustream@.target", "usr/lib/systemd/system/taustream@.target", 0o644),
     ("systemd/taustream-streamer@.service", "usr/lib/systemd/system/taustream-streamer@.service", 0o644),
     ("systemd/taustream-planner@.service", "usr/lib/systemd/system/taustream-planner@.service", 0o644),
@@ -53,14 +55,17 @@ const FILES: [(&str, &str, u32); 12] = [
     ("systemd/modules-load.conf", "usr/lib/modules-load.d/taustream.conf", 0o644),
     // sudo takes no rule that others may write.
     ("systemd/sudoers", "etc/sudoers.d/taustream", 0o440),
-    ("docs/services.md", "usr/share/doc/taustream/services.md", 0o644),
+    ("config/demo.toml", "usr/share/taustream/demo.toml", 0o644),
+    ("README.md", "usr/share/doc/taustream/README.md", 0o644),
+    ("CHANGELOG.md", "usr/share/doc/taustream/CHANGELOG.md", 0o644),
     ("LICENSE-APACHE", "usr/share/doc/taustream/LICENSE-APACHE", 0o644),
     ("LICENSE-MIT", "usr/share/doc/taustream/LICENSE-MIT", 0o644),
 ];
 
 /// Folders of the source tree that are taken whole: shipped data, and bus files that do nothing before they are copied
 /// to /etc/systemd/network, because a wrong bit rate disturbs a bus that works.
-const FOLDERS: [(&str, &str); 5] = [
+const FOLDERS: [(&str, &str); 6] = [
+    ("docs", "usr/share/doc/taustream/docs"),
     ("config/paths", "usr/share/taustream/paths"),
     ("config/robots", "usr/share/taustream/robots"),
     ("config/scenes", "usr/share/taustream/scenes"),
@@ -76,6 +81,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
         None => workspace::build_release(&source, None)?,
     };
     let root = &arguments.root.root;
+    if is_this_machine(root) && !packages::is_root() {
+        return as_root(&[
+            "install".as_ref(),
+            "--root".as_ref(),
+            root.as_os_str(),
+            "--programs".as_ref(),
+            programs.as_os_str(),
+        ]);
+    }
     let count = stage(&source, &programs, root)?;
     manual::install(&programs.join("taustream"), &root.join("usr/share"))?;
     println!("installed {count} files, manual pages and completions below {}", root.display());
@@ -85,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
             &["systemd-tmpfiles", "--create"],
             &["systemctl", "daemon-reload"],
         ])?;
-        println!("next: docs/services.md, \"An arm\"");
+        println!("next: /usr/share/doc/taustream/docs/services.md, \"An arm\"");
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -94,8 +108,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
 pub(crate) fn undo(arguments: &RootArguments) -> Result<ExitCode> {
     let root = &arguments.root;
     let here = is_this_machine(root);
-    if here && Command::new("systemctl").args(["--quiet", "is-active", "taustream*"]).status()?.success() {
-        bail!("services are running; end them first: systemctl disable --now 'taustream@*.target'");
+    if here && !packages::is_root() {
+        return as_root(&["uninstall".as_ref(), "--root".as_ref(), root.as_os_str()]);
+    }
+    if here && services_run()? {
+        bail!("services are running; stop them first: systemctl disable --now 'taustream@*.target'");
     }
     let mut count = manual::remove(&root.join("usr/share"))?;
     for Item { to, .. } in items(&workspace::root()?, Path::new(""))? {
@@ -188,10 +205,44 @@ fn is_this_machine(root: &Path) -> bool {
     root.canonicalize().is_ok_and(|root| root == Path::new("/"))
 }
 
-/// Lets systemd take notice. A machine that systemd does not run is not notified.
+/// Runs this program again as root through sudo, which asks for the password itself.
+///
+/// # Errors
+/// When there is no sudo; with the command to run as root.
+fn as_root(arguments: &[&OsStr]) -> Result<ExitCode> {
+    let own = env::current_exe().context("the path of this program is unknown; is /proc mounted?")?;
+    let shown: Vec<String> = arguments.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let command = format!("{} {}", own.display(), shown.join(" "));
+    if !packages::exists("sudo") {
+        bail!("this takes root's rights, and there is no sudo; as root: {command}");
+    }
+    println!("+ sudo {command}");
+    let status = Command::new("sudo").arg("--").arg(&own).args(arguments).status();
+    let status = status.context("sudo cannot be started")?;
+    if !status.success() {
+        bail!("sudo {command}: {status}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Whether systemd runs this machine: a container or a chroot has the programs of systemd at most.
+fn has_systemd() -> bool {
+    Path::new("/run/systemd/system").is_dir()
+}
+
+/// Whether systemd runs a service of ours. A machine without systemd runs none.
+fn services_run() -> Result<bool> {
+    if !has_systemd() {
+        return Ok(false);
+    }
+    let status = Command::new("systemctl").args(["--quiet", "is-active", "taustream*"]).status();
+    Ok(status.context("systemctl cannot be started")?.success())
+}
+
+/// Notifies systemd of changed files. A machine without systemd needs none of it.
 fn manager(commands: &[&[&str]]) -> Result<()> {
-    if !Path::new("/run/systemd/system").is_dir() {
-        println!("systemd does not run here: not notified");
+    if !has_systemd() {
+        println!("systemd does not run here: users, directories and units are not set up");
         return Ok(());
     }
     for words in commands {

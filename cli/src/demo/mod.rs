@@ -36,7 +36,7 @@ fn perform(form: Form, args: &DemoArgs) -> Result<Summary, Failure> {
     let mut summary = moved?;
     ended?;
 
-    summary.plots = recording::write_all(&args.output, &arm.joints, &summary.samples)?;
+    summary.plots = recording::write_all(&args.output, &demo.settings.robot.joints, &summary.samples)?;
     summary.add_cycle_log(&processes.cycle_log());
     Ok(summary)
 }

@@ -1,13 +1,13 @@
 //! A trajectory: position, velocity, acceleration and jerk of every joint, beside its limits where the robot is known,
 //! and the arm in three views.
-use super::panel::{JOINT_COLOURS, draw_panels, undrawable};
+use super::panel::{JOINT_COLOURS, draw_panels, motion_limits, undrawable};
 use super::views::Stage;
 use crate::failure::Failure;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::Path;
 use taustream_arm::text::counted;
-use taustream_arm::{Robot, RobotJoint, Scene, TrajectoryFile};
-use taustream_claims::chart::{Area, Curve, Drawn, LimitLine, thinned};
+use taustream_arm::{Robot, Scene, TrajectoryFile};
+use taustream_claims::chart::{Area, Curve, Drawn, thinned};
 use taustream_motion::trajectory::Cursor;
 
 /// Samples of each curve.
@@ -16,8 +16,6 @@ const WIDTH_PX: u32 = 1500;
 const VIEWS_PX: u32 = 520;
 const CURVES_PX: u32 = 920;
 const TITLE_PX: u32 = 44;
-/// A limit that all joints share.
-const SHARED: RGBColor = RGBColor(90, 90, 90);
 
 /// Draws the trajectory of a file as SVG; with a robot, its limits and the arm too.
 pub(crate) fn svg(
@@ -59,7 +57,8 @@ fn draw(root: &Area<'_>, path: &Path, file: &TrajectoryFile, arm: Option<(&Robot
         }
     };
     let robot = arm.map(|(robot, _)| robot);
-    draw_panels(&curves_area, &curves(file, robot), &limits(robot))?;
+    let joints = robot.map_or(&[][..], |robot| &robot.joints);
+    draw_panels(&curves_area, &curves(file, robot), &motion_limits(joints))?;
     Ok(root.present()?)
 }
 
@@ -88,31 +87,6 @@ fn curves(file: &TrajectoryFile, robot: Option<&Robot>) -> [Vec<Curve>; 4] {
         let panel = (0..trajectory.joints()).zip(JOINT_COLOURS).map(curve).collect();
         order += 1;
         panel
-    })
-}
-
-/// The motion limits of every panel: one pair of lines where all joints have the same, else one pair a joint.
-fn limits(robot: Option<&Robot>) -> [Vec<LimitLine>; 4] {
-    let Some(robot) = robot else { return Default::default() };
-    let of: [fn(&RobotJoint) -> [f64; 2]; 4] = [
-        |joint| joint.limits.position_rad,
-        |joint| [-joint.limits.motion.velocity_rad_s, joint.limits.motion.velocity_rad_s],
-        |joint| [-joint.limits.motion.acceleration_rad_s2, joint.limits.motion.acceleration_rad_s2],
-        |joint| [-joint.limits.motion.jerk_rad_s3, joint.limits.motion.jerk_rad_s3],
-    ];
-    of.map(|limit| {
-        let mut pairs: Vec<([f64; 2], RGBColor)> =
-            robot.joints.iter().map(limit).zip(JOINT_COLOURS).collect();
-        let is_shared = pairs
-            .windows(2)
-            .all(|two| matches!(two, [a, b] if a.0.map(f64::to_bits) == b.0.map(f64::to_bits)));
-        if is_shared {
-            pairs.truncate(1);
-            pairs.iter_mut().for_each(|(_, colour)| *colour = SHARED);
-        }
-        let mut label = if is_shared { "limit of all joints" } else { "limits (dashed)" }.to_owned();
-        let lines = pairs.into_iter().flat_map(|(pair, colour)| pair.map(|value| (value, colour)));
-        lines.map(|(value, colour)| LimitLine { value, colour, label: std::mem::take(&mut label) }).collect()
     })
 }
 
@@ -174,14 +148,5 @@ mod tests {
         let (robot, _) = shipped();
         let empty = Scene { file: PathBuf::new(), ..Scene::default() };
         assert!(svg(Path::new("rest.json"), &file(&[]), Some((&robot, &empty))).unwrap().contains("</svg>"));
-    }
-
-    #[test]
-    fn limits_that_differ_are_drawn_for_each_joint() {
-        let (mut robot, _) = shipped();
-        assert_eq!(limits(Some(&robot))[1].len(), 2);
-        robot.joints[3].limits.motion.velocity_rad_s = 1.0;
-        assert_eq!(limits(Some(&robot))[1].len(), 12);
-        assert_eq!(limits(Some(&robot))[2].len(), 2);
     }
 }

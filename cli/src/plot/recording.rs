@@ -1,14 +1,15 @@
 //! Joint curves as SVG: position, velocity, acceleration and jerk over time, commanded and measured.
 //!
-//! Commanded derivatives are the streamer's own. Drives send positions only, so measured derivatives are those of a
+//! Commanded derivatives are the streamer's own. Drives send positions only, so measured velocity and acceleration are those of a
 //! cubic fitted to the measured positions around each instant (Savitzky and Golay, Analytical Chemistry 36, 1964, for
 //! uneven times); the pictures say so. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
-use super::panel::{JOINT_COLOURS, PANELS, draw_panels, undrawable};
+use super::panel::{JOINT_COLOURS, PANELS, draw_panels, motion_limits, undrawable};
 use crate::failure::Failure;
 use crate::output::write_whole;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::{Path, PathBuf};
-use taustream_claims::chart::{Area, Curve, Drawn, Point, thinned};
+use taustream_arm::RobotJoint;
+use taustream_claims::chart::{Area, Curve, Drawn, LimitLine, Point, thinned};
 use taustream_motion::{JointArray, Setpoint};
 
 /// One instant of a recording.
@@ -26,13 +27,15 @@ pub(crate) struct Sample {
 
 /// Half the width of the fit, in samples.
 const FIT_HALF_WIDTH: usize = 5;
+/// The panel of the jerk.
+const JERK: usize = 3;
 const SIZE_PX: (u32, u32) = (1100, 1180);
 const COMMANDED: RGBColor = RGBColor(31, 119, 180);
 const MEASURED: RGBColor = RGBColor(255, 127, 14);
 /// Writes `motion.svg` with all joints and one picture a joint into `directory`; the files that were written.
 pub(crate) fn write_all(
     directory: &Path,
-    joints: &[String],
+    joints: &[RobotJoint],
     samples: &[Sample],
 ) -> Result<Vec<PathBuf>, Failure> {
     let measured: Vec<Vec<[f64; 4]>> = (0..joints.len()).map(|j| measured_derivatives(samples, j)).collect();
@@ -41,14 +44,21 @@ pub(crate) fn write_all(
     let overview = directory.join("motion.svg");
     let panels = PANELS.map(|_| Vec::new());
     let panels = add_overview(panels, joints, samples, &measured);
-    draw(&overview, "All joints: commanded (thin, dark) over measured (wide, light)", &panels)?;
+    let title = "All joints: commanded (thin, dark) over measured (wide, light)";
+    draw(&overview, title, &panels, &motion_limits(joints))?;
     files.push(overview);
 
-    for (j, name) in joints.iter().enumerate() {
+    for (j, joint) in joints.iter().enumerate() {
+        let name = &joint.name;
         let file = directory.join(format!("joint{}-{}.svg", j + 1, file_word(name)));
         let title = format!("Joint {} {name}: commanded and measured", j + 1);
         let measured = measured.get(j).map_or(&[][..], Vec::as_slice);
-        draw(&file, &title, &joint_panels(j, samples, measured))?;
+        draw(
+            &file,
+            &title,
+            &joint_panels(j, samples, measured),
+            &motion_limits(std::slice::from_ref(joint)),
+        )?;
         files.push(file);
     }
     Ok(files)
@@ -61,17 +71,17 @@ fn file_word(name: &str) -> String {
 
 fn add_overview(
     mut panels: [Vec<Curve>; 4],
-    joints: &[String],
+    joints: &[RobotJoint],
     samples: &[Sample],
     measured: &[Vec<[f64; 4]>],
 ) -> [Vec<Curve>; 4] {
     for (order, panel) in panels.iter_mut().enumerate() {
-        for (j, (name, colour)) in joints.iter().zip(JOINT_COLOURS).enumerate() {
+        for (j, (joint, colour)) in joints.iter().zip(JOINT_COLOURS).enumerate() {
             let of_joint = measured.get(j).map_or(&[][..], Vec::as_slice);
             let points = measured_points(samples, of_joint, order);
             panel.push(Curve { label: String::new(), colour, width_px: 5, opacity: 0.3, points });
             let points = commanded_points(samples, j, order);
-            panel.push(Curve { label: name.clone(), colour, width_px: 1, opacity: 1.0, points });
+            panel.push(Curve { label: joint.name.clone(), colour, width_px: 1, opacity: 1.0, points });
         }
     }
     panels
@@ -91,7 +101,7 @@ fn joint_panels(j: usize, samples: &[Sample], measured: &[[f64; 4]]) -> [Vec<Cur
         let points = measured_points(samples, measured, order);
         order += 1;
         let measured = Curve { label: label.to_owned(), colour: MEASURED, width_px: 1, opacity: 1.0, points };
-        vec![commanded, measured]
+        if measured.points.is_empty() { vec![commanded] } else { vec![commanded, measured] }
     })
 }
 
@@ -104,7 +114,11 @@ fn commanded_points(samples: &[Sample], j: usize, order: usize) -> Vec<Point> {
     thinned(samples.iter().map(|s| (s.t_s, value(s))).collect())
 }
 
+/// The measured curve of a panel. Encoder counts leave nothing but noise of the third derivative: it is not drawn.
 fn measured_points(samples: &[Sample], measured: &[[f64; 4]], order: usize) -> Vec<Point> {
+    if order == JERK {
+        return Vec::new();
+    }
     let value = |m: &[f64; 4]| m.get(order).copied().unwrap_or(f64::NAN);
     thinned(samples.iter().zip(measured).map(|(s, m)| (s.t_s, value(m))).collect())
 }
@@ -172,17 +186,22 @@ fn solve(mut m: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     Some(x)
 }
 
-fn draw_on(root: &Area<'_>, title: &str, panels: &[Vec<Curve>; 4]) -> Drawn {
+fn draw_on(root: &Area<'_>, title: &str, panels: &[Vec<Curve>; 4], limits: &[Vec<LimitLine>; 4]) -> Drawn {
     root.fill(&WHITE)?;
     let body = root.titled(title, ("sans-serif", 24).into_font())?;
-    draw_panels(&body, panels, &Default::default())?;
+    draw_panels(&body, panels, limits)?;
     Ok(root.present()?)
 }
 
-fn draw(file: &Path, title: &str, panels: &[Vec<Curve>; 4]) -> Result<(), Failure> {
+fn draw(
+    file: &Path,
+    title: &str,
+    panels: &[Vec<Curve>; 4],
+    limits: &[Vec<LimitLine>; 4],
+) -> Result<(), Failure> {
     let mut svg = String::new();
     let root = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
-    let drawn = draw_on(&root, title, panels);
+    let drawn = draw_on(&root, title, panels, limits);
     drop(root);
     drawn.map_err(|e| undrawable(file, e.as_ref()))?;
     write_whole(file, &svg)
@@ -200,6 +219,11 @@ mod tests {
             Sample { t_s, commanded: Setpoint::default(), measured_rad, measured_age_s }
         };
         (0..samples).map(sample).collect()
+    }
+
+    fn joints() -> Vec<RobotJoint> {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
+        taustream_arm::Robot::load(&file).unwrap().joints
     }
 
     /// Goal: what is drawn as measured derivative is the derivative. Method: a cubic is fitted exactly, at its ends too.
@@ -231,18 +255,19 @@ mod tests {
         let dir = std::env::temp_dir().join(format!("taustream-plot-{}", std::process::id()));
         std::fs::create_dir_all(&dir).unwrap();
         let samples = recording(5000, f64::sin);
-        let files = write_all(&dir, &["pan/../x".to_owned(), "lift".to_owned()], &samples).unwrap();
+        let joint = |name: &str| RobotJoint { name: name.to_owned(), ..joints()[0].clone() };
+        let files = write_all(&dir, &[joint("pan/../x"), joint("lift")], &samples).unwrap();
         assert_eq!(files.len(), 3);
         assert!(files.iter().all(|f| f.parent() == Some(dir.as_path())), "{files:?}");
         for file in &files {
             let svg = std::fs::read_to_string(file).unwrap();
-            for word in ["time (s)", "jerk (rad/s^3)", "<polyline", "</svg>"] {
+            for word in ["time (s)", "jerk (rad/s^3)", "limit", "<polyline", "</svg>"] {
                 assert!(svg.contains(word), "{}: no {word}", file.display());
             }
             assert!(svg.len() < 1_000_000, "{} bytes", svg.len());
         }
         // A recording of nothing is drawn as empty axes, not as a failure.
-        assert!(write_all(&dir, &["pan".to_owned()], &[]).is_ok());
+        assert!(write_all(&dir, &[joint("pan")], &[]).is_ok());
         std::fs::remove_dir_all(&dir).unwrap();
     }
 }

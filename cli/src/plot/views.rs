@@ -4,19 +4,21 @@ use nalgebra::Point3;
 use plotters::prelude::{ChartBuilder, Circle, Color, IntoFont, LineSeries, Polygon, RGBColor, Text};
 use std::ops::Range;
 use taustream_arm::{Robot, Scene};
-use taustream_claims::chart::{Area, Drawn, Point, span};
+use taustream_claims::chart::{Area, Drawn, Point, span, ticks};
 use taustream_motion::{JointArray, Trajectory};
 
 /// Poses of the arm from start to end; more run together.
 const POSES: u32 = 9;
 /// Points of the path of the tip.
 const PATH_POINTS: u32 = 400;
-/// Obstacles far away count this much of the arm's own extent, so that a floor does not make the arm a dot.
-const AROUND: f64 = 0.35;
+/// Obstacles are shown whole up to this much of the arm's own extent beyond it, so that a floor does not make the arm a dot.
+const AROUND: f64 = 1.0;
 /// Room for the axes' words, px.
 const LABELS_PX: (u32, u32) = (64, 42);
 const MARGIN_PX: u32 = 12;
 const TITLE_PX: u32 = 30;
+/// Height of an obstacle's name.
+const LABEL_PX: u32 = 12;
 /// The arm at the start and at the end; poses between are between.
 const FIRST: RGBColor = RGBColor(150, 200, 232);
 const LAST: RGBColor = RGBColor(8, 48, 107);
@@ -127,6 +129,8 @@ fn reach(own: impl Iterator<Item = f64>, others: impl Iterator<Item = f64>) -> R
 fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> Drawn {
     let (title, right, up) = seen.view.words();
     let (low, high) = ((x_m.start, y_m.start), (x_m.end, y_m.end));
+    let plain = ticks(&x_m, &y_m);
+    let m_per_px = length(&x_m) / f64::from(area.dim_in_pixel().0.max(1));
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN_PX)
         .caption(title, ("sans-serif", 18))
@@ -139,6 +143,8 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
         .y_desc(up)
         .x_labels(7)
         .y_labels(7)
+        .x_label_formatter(&plain)
+        .y_label_formatter(&plain)
         .label_style(("sans-serif", 13))
         .light_line_style(RGBColor(248, 248, 248))
         .bold_line_style(RGBColor(232, 232, 232))
@@ -166,16 +172,41 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
     chart.draw_series(LineSeries::new(seen.tip.iter().copied(), PATH.stroke_width(2)))?;
     let ends = seen.tip.first().into_iter().chain(seen.tip.last());
     chart.draw_series(ends.map(|p| Circle::new(*p, 4, PATH.filled())))?;
-    let font = ("sans-serif", 12).into_font().color(&OBSTACLE);
-    for (name, obstacle) in &seen.obstacles {
-        let shown = clipped(obstacle.clone(), low, high);
-        let (x, y) = (span(shown.iter().map(|p| p.0)), span(shown.iter().map(|p| p.1)));
-        if !shown.is_empty() {
-            let at = (x.start + 0.1 * length(&x), y.start + 0.5 * length(&y));
-            chart.draw_series([Text::new(name.clone(), at, font.clone())])?;
-        }
+    let font = ("sans-serif", LABEL_PX).into_font().color(&OBSTACLE);
+    for (name, at) in labels(seen, (low, high), m_per_px) {
+        chart.draw_series([Text::new(name.to_owned(), at, font.clone())])?;
     }
     Ok(())
+}
+
+/// Where the names of obstacles stand: on their obstacle, moved down until they hide no other name.
+fn labels<'s>(seen: &'s Seen, (low, high): (Point, Point), m_per_px: f64) -> Vec<(&'s str, Point)> {
+    let height_m = f64::from(LABEL_PX) * m_per_px;
+    let mut placed: Vec<(&str, Point, f64)> = Vec::new();
+    for (name, obstacle) in &seen.obstacles {
+        let shown = clipped(obstacle.clone(), low, high);
+        if shown.is_empty() {
+            continue;
+        }
+        let (x, y) = (span(shown.iter().map(|p| p.0)), span(shown.iter().map(|p| p.1)));
+        let letters: u32 = name.chars().map(|_| 1).sum();
+        let width_m = 0.6 * height_m * f64::from(letters);
+        let left = (x.start + 0.1 * length(&x)).min(high.0 - width_m).max(low.0);
+        let mut at = (left, y.start + 0.5 * length(&y));
+        let hides = |at: Point, placed: &[(&str, Point, f64)]| {
+            placed.iter().any(|(_, other, wide_m)| {
+                (at.1 - other.1).abs() < height_m && at.0 < other.0 + wide_m && other.0 < at.0 + width_m
+            })
+        };
+        // Each step passes one name at least, so that as many steps as names suffice.
+        for _ in 0..placed.len() {
+            if hides(at, &placed) {
+                at.1 -= 1.1 * height_m;
+            }
+        }
+        placed.push((name, at, width_m));
+    }
+    placed.into_iter().map(|(name, at, _)| (name, at)).collect()
 }
 
 /// The colour of a pose on the way.

@@ -53,15 +53,77 @@ impl Line {
         Self(vec![Span::new(text, tone)])
     }
 
-    /// The line within so many columns.
+    /// The line within so many columns; what does not fit is left out by whole words, and dots say so.
     pub(crate) fn cut(self, columns: usize) -> Self {
-        let mut left = columns;
+        let length: usize = self.0.iter().map(|span| span.text.chars().count()).sum();
+        if length <= columns {
+            return self;
+        }
+        let whole: Vec<char> = self.0.iter().flat_map(|span| span.text.chars()).collect();
+        let room = columns.saturating_sub(DOTS.len());
+        // The last word that ends within the room; a single long word is cut where it must be.
+        let end =
+            (1..=room).rev().find(|at| whole.get(*at).is_some_and(|c| c.is_whitespace())).unwrap_or(room);
+        let mut left = end;
         let mut kept = Vec::new();
         for span in self.0 {
             let text: String = span.text.chars().take(left).collect();
             left -= text.chars().count();
             kept.push(Span { text, tone: span.tone });
         }
+        kept.push(Span::new(DOTS.chars().take(columns).collect::<String>(), Tone::Quiet));
         Self(kept)
+    }
+
+    /// The line as several lines of so many columns, broken between words.
+    pub(crate) fn wrapped(self, columns: usize) -> Vec<Self> {
+        let mut lines = Vec::new();
+        let mut line = Self::default();
+        let mut used = 0;
+        for span in self.0 {
+            for word in span.text.split_inclusive(' ') {
+                let length = word.chars().count();
+                if used > 0 && used + word.trim_end().chars().count() > columns {
+                    lines.push(std::mem::take(&mut line));
+                    used = 0;
+                }
+                used += length;
+                line.0.push(Span::new(word, span.tone));
+            }
+        }
+        lines.push(line);
+        lines
+    }
+}
+
+/// What stands where text was left out.
+const DOTS: &str = " ..";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(line: &Line) -> String {
+        line.0.iter().map(|span| span.text.as_str()).collect()
+    }
+
+    #[test]
+    fn line_too_long_ends_with_a_whole_word_and_dots() {
+        let line = || Line(vec![Span::plain("joint 3 elbow "), Span::new("is outside", Tone::Bad)]);
+        assert_eq!(text(&line().cut(24)), "joint 3 elbow is outside");
+        assert_eq!(text(&line().cut(23)), "joint 3 elbow is ..");
+        assert_eq!(text(&line().cut(16)), "joint 3 elbow ..");
+        assert_eq!(text(&line().cut(2)), " .");
+        assert_eq!(text(&Line::of("averylongword", Tone::Plain).cut(8)), "avery ..");
+    }
+
+    #[test]
+    fn wrapped_line_keeps_every_word() {
+        let line =
+            Line(vec![Span::plain("FAULT: joint 3 elbow "), Span::new("is outside its range", Tone::Bad)]);
+        let lines = line.wrapped(16);
+        assert_eq!(lines.iter().map(text).collect::<String>(), "FAULT: joint 3 elbow is outside its range");
+        assert!(lines.iter().all(|line| text(line).trim_end().chars().count() <= 16), "{lines:?}");
+        assert!(lines.len() >= 3);
     }
 }

@@ -51,7 +51,9 @@ impl Picture {
         before: Option<&Report>,
         columns: usize,
     ) -> Vec<Line> {
-        let mut lines = vec![self.state(r, phase), self.motion(r), self.fault(r, phase), Line::default()];
+        let mut lines = vec![self.state(r, phase), self.motion(r)];
+        lines.extend(self.fault(r, phase).wrapped(columns));
+        lines.push(Line::default());
         lines.extend(table(r, &self.arm, self.scale.as_ref(), columns, self.ink));
         lines.push(Line::default());
         lines.extend(self.buses(r));
@@ -183,7 +185,8 @@ fn timing(r: &Report) -> [Line; 2] {
 
 /// A report in one line of a log, faults as text.
 pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
-    let pose: Vec<String> = r.measured_rad.iter().take(r.joints()).map(|q| format!("{q:+.3}")).collect();
+    let angle = |q: &f64| if q.is_finite() { format!("{q:+.3}") } else { "-".to_owned() };
+    let pose: Vec<String> = r.measured_rad.iter().take(r.joints()).map(angle).collect();
     let fault = if r.fault_reason == 0 {
         pause_sentence(r).map_or_else(String::new, |text| format!("  {text}"))
     } else {
@@ -297,5 +300,10 @@ mod tests {
         );
         assert!(line(&fault, Phase::Fault, &arm()).contains("FAULT: tracking error"));
         assert_eq!(line(&fault, Phase::Fault, &arm()).lines().count(), 1);
+        let before_feedback = Report { measured_rad: [f64::NAN; 8], ..report() };
+        assert!(
+            line(&before_feedback, Phase::Configuring, &arm()).contains("q - - rad"),
+            "no NaN for people"
+        );
     }
 }

@@ -73,7 +73,7 @@ fn settings(shared: &Path) -> Result<String> {
         ("\nstall_resume_ms = 20\n", "\nstall_resume_ms = 200\n".to_owned()),
         ("\ndrive_watchdog_ms = 100\n", "\ndrive_watchdog_ms = 500\n".to_owned()),
         ("\nfeedback_age_s_max = 0.05\n", "\nfeedback_age_s_max = 0.25\n".to_owned()),
-        ("\n[simulator]\n", format!("\n[simulator]\n{START}\n")),
+        ("\nstart_rad = [-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]\n", format!("\n{START}\n")),
     ] {
         ensure!(text.contains(old), "the shipped settings have no {old}");
         text = text.replacen(old, &new, 1);
