@@ -67,16 +67,13 @@ fn read_interface(table: &mut Table<'_>) -> Option<String> {
 /// `virtual = true` or a bit rate: a bus whose load cannot be known is only taken where it has none.
 fn read_bus_kind(table: &mut Table<'_>) -> Option<BusKind> {
     let expected = "virtual = true (vcan) or bitrate_bit_s, one of the two";
-    let is_virtual = if table.has("virtual") { table.flag("virtual")? } else { false };
+    let is_virtual = table.flag_or("virtual", false);
     let [low, high] = BITRATE_BIT_S;
-    let bitrate =
-        if table.has("bitrate_bit_s") { Some(table.integer("bitrate_bit_s", low, high)?) } else { None };
-    let data = if table.has("data_bitrate_bit_s") {
-        // The data phase is the faster one, or bit rate switch has no purpose.
-        Some(table.integer("data_bitrate_bit_s", bitrate.unwrap_or(low), DATA_BITRATE_BIT_S_MAX)?)
-    } else {
-        None
-    };
+    let bitrate = table.integer_if_there("bitrate_bit_s", low, high);
+    // The data phase is the faster one, or bit rate switch has no purpose.
+    let slowest = bitrate.flatten().unwrap_or(low);
+    let data = table.integer_if_there("data_bitrate_bit_s", slowest, DATA_BITRATE_BIT_S_MAX);
+    let (is_virtual, bitrate, data) = (is_virtual?, bitrate?, data?);
     let rate = |bit_s: i64| u32::try_from(bit_s).ok();
     match (is_virtual, bitrate, data) {
         (true, None, None) => Some(BusKind::Virtual),
@@ -102,9 +99,9 @@ fn read_bus_kind(table: &mut Table<'_>) -> Option<BusKind> {
 /// How often setpoints and answers come; without the keys, every cycle.
 fn read_traffic(table: &mut Table<'_>) -> Option<Traffic> {
     let setpoint_every = table.integer_or("setpoint_every", 1, 1, i64::from(SETPOINT_EVERY_MAX));
-    let stagger = if table.has("stagger") { table.flag("stagger") } else { Some(false) };
+    let stagger = table.flag_or("stagger", false);
     let feedback_every = table.integer_or("feedback_every", 1, 1, i64::from(FEEDBACK_EVERY_MAX));
-    let packed = if table.has("packed") { table.flag("packed") } else { Some(false) };
+    let packed = table.flag_or("packed", false);
     if stagger == Some(true) && setpoint_every == Some(1) {
         let expected = "stagger together with setpoint_every of 2 or more: with setpoint_every = 1 there is nothing to stagger";
         table.fault("stagger", "true", expected);

@@ -259,6 +259,13 @@ impl<'b> Table<'b> {
             Some(node) => self.integer_of(key, &node, low, high),
         }
     }
+    /// The integer of a key that may be absent; the outer `None` only after a fault.
+    pub(crate) fn integer_if_there(&mut self, key: &'static str, low: i64, high: i64) -> Option<Option<i64>> {
+        match self.take(key) {
+            None => Some(None),
+            Some(node) => self.integer_of(key, &node, low, high).map(Some),
+        }
+    }
     fn integer_of(&self, key: &str, node: &Node, low: i64, high: i64) -> Option<i64> {
         if let Value::Integer(integer) = node.value
             && (low..=high).contains(&integer)
@@ -270,10 +277,20 @@ impl<'b> Table<'b> {
     /// True or false; never taken from a number or a word.
     pub(crate) fn flag(&mut self, key: &'static str) -> Option<bool> {
         let node = self.need(key, "true or false")?;
+        self.flag_of(key, &node)
+    }
+    /// True or false, or the default when the key is absent; `None` only after a fault.
+    pub(crate) fn flag_or(&mut self, key: &'static str, default: bool) -> Option<bool> {
+        match self.take(key) {
+            None => Some(default),
+            Some(node) => self.flag_of(key, &node),
+        }
+    }
+    fn flag_of(&self, key: &str, node: &Node) -> Option<bool> {
         if let Value::Flag(flag) = node.value {
             return Some(flag);
         }
-        self.refuse(key, &node, "true or false")
+        self.refuse(key, node, "true or false")
     }
     /// A text that is not empty; its absence is a fault.
     pub(crate) fn text(&mut self, key: &'static str, expected: &str) -> Option<String> {

@@ -302,7 +302,7 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
     let watchdog = table.integer("drive_watchdog_ms", 1, 10_000);
     let heartbeat = table.has("heartbeat_lost_ms").then(|| table.integer("heartbeat_lost_ms", 1, 60_000));
     let priority = table.integer_or("priority", default::PRIORITY, 1, 99);
-    let cpu = table.has("cpu").then(|| table.integer("cpu", 0, 1023));
+    let cpu = table.integer_if_there("cpu", 0, 1023);
     let report_rate_hz = table.number_or("report_rate_hz", default::REPORT_RATE_HZ, &RATE_HZ);
     table.done();
     Some(CycleSettings {
@@ -316,10 +316,7 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
         })
         .ok()?,
         priority: u8::try_from(priority?).ok()?,
-        cpu: match cpu {
-            Some(cpu) => Some(usize::try_from(cpu?).ok()?),
-            None => None,
-        },
+        cpu: cpu?.and_then(|cpu| usize::try_from(cpu).ok()),
         report_rate_hz: report_rate_hz?,
     })
 }

@@ -199,8 +199,10 @@ fn examine(kind: &Kind, (file, sample): (&Path, &Table), (path, name): (&str, &s
     at(&mut wrong, path).insert(name.to_owned(), Value::String("\u{1}".to_owned()));
     let said = faults(kind, file, &wrong);
     if let Some((.., expected)) = said.into_iter().find(|(key, ..)| key.starts_with(&full)) {
-        // The plainest sentence of several samples: the others name joints and files of their sample.
-        if known.expected.is_empty() || expected.len() < known.expected.len() {
+        // The plainest sentence of several samples: the others name joints and files of their sample, or tell that the
+        // key has no place in it.
+        let misplaced = |sentence: &str| sentence.is_empty() || sentence.starts_with("this key only");
+        if misplaced(&known.expected) || (!misplaced(&expected) && expected.len() < known.expected.len()) {
             known.expected = expected;
         }
     }

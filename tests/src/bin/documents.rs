@@ -115,7 +115,7 @@ fn unhurried(line: &str) -> String {
         ("period_us", "5000"),
         ("stall_resume_ms", "2000"),
         ("drive_watchdog_ms", "4000"),
-        ("feedback_age_s_max", "1.9"),
+        ("feedback_age_s_max", "1.0"),
         ("drive_timeout_s", "30.0"),
     ];
     let key = line.split('=').next().unwrap_or("").trim();
