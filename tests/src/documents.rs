@@ -54,18 +54,13 @@ pub fn blocks(file: &Path, text: &str) -> Result<Vec<Block>> {
         let at = || format!("{}:{}", file.display(), index + 1);
         let indentation = line.len() - line.trim_start().len();
         if let Some(info) = line.trim_start().strip_prefix("```") {
-            match open.take() {
-                Some((_, block)) => found.extend(block),
-                None => {
-                    let kind = kind_of(info.trim()).with_context(at)?;
-                    let block = kind.map(|kind| Block {
-                        file: file.to_owned(),
-                        line: index + 2,
-                        kind,
-                        lines: Vec::new(),
-                    });
-                    open = Some((indentation, block));
-                }
+            if let Some((_, block)) = open.take() {
+                found.extend(block);
+            } else {
+                let kind = kind_of(info.trim()).with_context(at)?;
+                let line = index + 2;
+                let block = kind.map(|kind| Block { file: file.to_owned(), line, kind, lines: Vec::new() });
+                open = Some((indentation, block));
             }
             continue;
         }

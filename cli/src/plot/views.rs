@@ -180,7 +180,7 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
 }
 
 /// Where the names of obstacles stand: on their obstacle, moved down until they hide no other name.
-fn labels<'s>(seen: &'s Seen, (low, high): (Point, Point), m_per_px: f64) -> Vec<(&'s str, Point)> {
+fn labels(seen: &Seen, (low, high): (Point, Point), m_per_px: f64) -> Vec<(&str, Point)> {
     let height_m = f64::from(LABEL_PX) * m_per_px;
     let mut placed: Vec<(&str, Point, f64)> = Vec::new();
     for (name, obstacle) in &seen.obstacles {
