@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn installed_tree_is_removed_without_a_trace_but_of_others() {
-        let root = std::env::temp_dir().join(format!("taustream-install-{}", std::process::id()));
+        let root = env::temp_dir().join(format!("taustream-install-{}", std::process::id()));
         let programs = root.join("programs");
         fs::create_dir_all(&programs).unwrap();
         for name in PROGRAMS {

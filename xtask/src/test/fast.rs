@@ -3,6 +3,11 @@ use super::{Outcome, Part, Step, rights};
 use crate::packages;
 use crate::place::{Place, perform};
 use anyhow::Result;
+use std::env;
+use std::process::Command;
+
+/// The version that deny.toml is written for.
+const DENY_VERSION: &str = "0.20.2";
 
 const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
     Step { name, part: Part::Fast, packages: &[], programs: false, run }
@@ -10,7 +15,6 @@ const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
 
 pub(super) const STEPS: &[Step] = &[
     step("format", |place| cargo(place, "format", &["fmt", "--all", "--check"])),
-    step("licences", licences),
     step("lints", |place| {
         cargo(place, "lints", &["clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"])
     }),
@@ -20,8 +24,12 @@ pub(super) const STEPS: &[Step] = &[
     step("documentation", |place| {
         cargo(place, "documentation", &["doc", "--locked", "--workspace", "--no-deps"])
     }),
+    Step { programs: true, ..step("commands of the documentation", documents) },
     Step { programs: true, ..step("demo without real-time rights", rights::demo) },
 ];
+
+/// Licences, sources and banned crates of all dependencies.
+pub(super) const LICENCES: &[Step] = &[Step { part: Part::Licences, ..step("licences", licences) }];
 
 /// Builds all programs. The same features as for the tests: a build of the programs alone would build every
 /// dependency a second time.
@@ -34,13 +42,26 @@ fn cargo(place: &Place, what: &str, words: &[&str]) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Licences, sources and banned crates of all dependencies, where cargo-deny is installed: building it takes longer than
-/// many a test.
+/// Every command block of README and docs, as printed.
+fn documents(place: &Place) -> Result<Outcome> {
+    let mut command = Command::new(place.programs.join("documents"));
+    command.arg("--root").arg(&place.root).arg("--output").arg(place.target.join("documents"));
+    perform("commands of the documentation", &mut command)?;
+    Ok(Outcome::Passed)
+}
+
+/// cargo-deny is built into the target folder where it is not installed: few machines have it.
 fn licences(place: &Place) -> Result<Outcome> {
+    let tools = place.target.join("tools");
+    let mut path = env::var_os("PATH").unwrap_or_default();
     if !packages::exists("cargo-deny") {
-        return Ok(Outcome::Skipped(
-            "cargo-deny is not installed (cargo install --locked cargo-deny)".into(),
-        ));
+        let install = ["install", "--locked", "--quiet", "cargo-deny", "--version", DENY_VERSION, "--root"];
+        let what = "cargo-deny from crates.io (some minutes, once)";
+        perform(what, place.cargo().args(install).arg(&tools))?;
+        let all = std::iter::once(tools.join("bin")).chain(env::split_paths(&path));
+        path = env::join_paths(all)?;
     }
-    cargo(place, "licences, sources and bans", &["deny", "--locked", "check", "licenses", "bans", "sources"])
+    let words = ["deny", "--locked", "check", "licenses", "bans", "sources"];
+    perform("licences, sources and bans", place.cargo().args(words).env("PATH", path))?;
+    Ok(Outcome::Passed)
 }

@@ -41,8 +41,10 @@ pub(crate) struct Arguments {
 /// Steps that need the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Part {
-    /// Format, lints, tests, documentation, licences, the demo without real-time rights.
+    /// Format, lints, tests, the commands of the documentation, the demo without real-time rights.
     Fast,
+    /// Licences, sources and banned crates of all dependencies, by cargo-deny.
+    Licences,
     /// Our numbers against other people's libraries and against programs written from the papers.
     Peers,
     /// Links, masters, devices and scenarios on a real vcan0 in the test machine.
@@ -77,7 +79,7 @@ struct Step {
 
 /// Every step, in the order in which they run.
 fn steps() -> impl Iterator<Item = &'static Step> {
-    [fast::STEPS, peers::STEPS, vcan::STEPS, services::STEPS].into_iter().flatten()
+    [fast::STEPS, fast::LICENCES, peers::STEPS, vcan::STEPS, services::STEPS].into_iter().flatten()
 }
 
 /// Runs what was requested; without `--repeat` the first failure ends the run.
