@@ -28,7 +28,7 @@ const GUEST: &str = include_str!("../machine/guest.sh");
 /// Time for boot, the guest's own time-out and power-off, on top of the command's limit.
 const BOOT_AND_HALT: Duration = Duration::from_secs(60);
 /// Nice value of the guest: it gets its CPU at once beside ordinary work, and no limit of real-time scheduling stops it.
-const NICE: i8 = -15;
+const NICE: i8 = -20;
 /// How often the host looks after the guest.
 const LOOK: Duration = Duration::from_millis(20);
 /// Time between asking the guest's processes to end and killing them.
@@ -106,7 +106,7 @@ impl Default for Machine {
 
 impl Machine {
     /// 300 s, 1 GiB, two interfaces, nothing writable through to the host, bound to the last CPU, ordinary scheduling
-    /// with a nice value of -15 where that is permitted.
+    /// with a nice value of -20 where that is permitted.
     #[must_use]
     pub fn new() -> Self {
         // Its kernel and its processes hand over to each other by ptrace: on one CPU a system call costs half.

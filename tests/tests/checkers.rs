@@ -354,6 +354,22 @@ fn last_cycle_before_a_gap_may_go_with_its_interface_and_no_other() {
     check_mode(&part).expect_err("a wrong target in what came through");
 }
 
+/// Lines as the streamer writes them: the words of the format are fixed.
+#[test]
+fn log_line_of_every_kind_is_read() {
+    let log = r#"{"event":"start","format":1,"robot":"ur5","digest":"8c","joints":1,"period_us":1000}
+{"event":"trajectory","tick":4,"trajectory_id":7,"generation":2,"file":{},"start_offset_rad":[0.0]}
+{"event":"cycle","tick":5,"time_ns":9,"sync":[3],"frames":[8],"phase":"moving","trajectory_id":7,"s":0.5,"sigma":1.0,"position_rad":[-0.5],"off_path_rad":[0.0],"joint_sent":[true],"sent":[2],"lost":[0]}
+{"event":"phase","tick":6,"from":"moving","to":"holding","reason":"end of trajectory","joint":null,"bus":null,"code":null,"value":null}
+{"event":"lost","records":3}"#;
+    let events = parse(log).expect("every line");
+    assert!(matches!(events[0], Event::Start { joints: 1, .. }));
+    assert!(matches!(events[1], Event::Trajectory { trajectory_id: 7, .. }));
+    assert!(matches!(&events[2], Event::Cycle(cycle) if cycle.joint_sent == [true] && cycle.tick == 5));
+    assert!(matches!(&events[3], Event::Phase { to, .. } if to == "holding"));
+    assert_eq!(events[4], Event::Lost { records: 3 });
+}
+
 #[test]
 fn log_line_that_is_not_understood_is_an_error() {
     assert!(parse("{\"event\":\"surprise\"}").is_err());

@@ -35,7 +35,7 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     writable: Vec<PathBuf>,
     /// Nice value of the machine on the host, if that is permitted.
-    #[arg(long, value_name = "N", default_value_t = -15, allow_hyphen_values = true, value_parser = clap::value_parser!(i8).range(-20..=19))]
+    #[arg(long, value_name = "N", default_value_t = -20, allow_hyphen_values = true, value_parser = clap::value_parser!(i8).range(-20..=19))]
     nice: i8,
     /// Run the machine at this SCHED_FIFO priority of the host instead, if that is permitted. Only for commands that
     /// sleep most of the time: the host stops busy real-time processes for 50 ms of every second.
