@@ -8,7 +8,7 @@ use crate::protocol;
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
 use crate::settings::{Bus, BusKind, FEEDBACK_EVERY_MAX, SETPOINT_EVERY_MAX, Servo, Traffic};
-use crate::trust;
+use crate::{stall, trust};
 use std::collections::BTreeSet;
 
 /// Longest interface name of Linux (IFNAMSIZ without its closing zero).
@@ -199,7 +199,7 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
     index
 }
 
-/// Nothing here has a default: each of these moves the arm, or says how it falls.
+/// Nothing here but `after_stall` has a default: each of these moves the arm, or says how it falls.
 fn read_servo(
     table: &mut Table<'_>,
     robot: Option<&Robot>,
@@ -213,6 +213,7 @@ fn read_servo(
     let feedback_range_rad = table.interval("feedback_range_rad", &FEEDBACK_RAD);
     let reaction = trust::read_reaction(table);
     let limp_is_safe = table.flag("limp_is_safe");
+    let after_stall = stall::read(table, protocol.as_ref());
     Some(Servo {
         joint: joint?,
         bus: bus?,
@@ -224,6 +225,7 @@ fn read_servo(
         feedback_range_rad: feedback_range_rad?,
         reaction: reaction?,
         limp_is_safe: limp_is_safe?,
+        after_stall: after_stall?,
     })
 }
 

@@ -2,7 +2,7 @@
 use crate::document::{self, Node};
 use crate::protocol::Protocol;
 use crate::reader::{Bounds, FaultList, Table};
-use crate::{Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
+use crate::{AfterStall, Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
 
 /// What carries frames.
@@ -112,6 +112,8 @@ pub struct Servo {
     pub reaction: Reaction,
     /// True when the joint may lose torque without harm (a brake, or no load).
     pub limp_is_safe: bool,
+    /// What follows a stall.
+    pub after_stall: AfterStall,
 }
 
 /// The cycle and what it tolerates.

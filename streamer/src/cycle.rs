@@ -102,11 +102,11 @@ impl Core {
     pub fn new(settings: &Settings, buses: Buses, intake: Intake, reports: Writers) -> Self {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
-        let (cycle, rules) = (&settings.cycle, &settings.supervision);
+        let cycle = &settings.cycle;
         Self {
             intake,
             ledger: Ledger::new(settings),
-            track: Track::new(&limits, joints, cycle, rules),
+            track: Track::new(settings),
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
             supervisor: Supervisor::new(settings),

@@ -201,6 +201,8 @@ pub struct CycleState {
     pub gap_s: f64,
     /// That time is beyond what the drives bridge: trajectory time does not advance.
     pub frozen: bool,
+    /// That time is beyond what the drives bridge, and the trajectory goes on in time, as the settings say.
+    pub bridged: bool,
     /// The setpoint is the trajectory's end.
     pub end_reached: bool,
     /// sigma is 0 and stays so.
@@ -246,6 +248,7 @@ impl CycleState {
             scale: Scale::default(),
             gap_s: 0.0,
             frozen: false,
+            bridged: false,
             end_reached: false,
             at_rest: false,
             can_ramp: false,

@@ -4,7 +4,8 @@
 //! guard, supervision and the report read it. A joint whose frame was refused was not commanded, whatever became of the
 //! others: its last setpoint stays the one before, and the time since then grows.
 //!
-//! A drive bridges a gap of `tolerated_gap_periods` of its own setpoints. A joint that misses more, while others continue,
+//! A drive bridges a gap of `tolerated_gap_periods` of its own setpoints, or a whole stall where the settings say that the
+//! motion goes on (`after_stall`). A joint that misses more, while others continue,
 //! has *stopped*: its drive stands at the last setpoint that it got, so nothing but that is commanded until the arm is at
 //! rest (`Track`), and supervision stops the others on their path.
 use crate::cycle_state::{CycleState, LostSetpoints};
@@ -108,7 +109,7 @@ impl Ledger {
     pub fn new(settings: &Settings) -> Self {
         let joints = settings.robot.joints.len();
         let mut ledger = Self::of_joints(joints);
-        ledger.tolerated = u64::from(settings.cycle.tolerated_gap_periods).max(1);
+        ledger.tolerated = u64::from(settings.bridged_gap_periods()).max(1);
         ledger.lost_max = settings.lost_cycles_max().max(1).saturating_mul(2).min(WINDOW - 1);
         for servo in &settings.servos {
             let every = settings.buses.get(servo.bus).map_or(1, |bus| bus.traffic.setpoint_every);

@@ -217,8 +217,14 @@ pub fn note(note: &Note, names: &Names) {
             bus_fault.word(),
             bus_fault.remedy(names.interface(*bus))
         ),
-        Note::Stall { gap_s } => {
-            warn!("no setpoint was sent for {gap_s:.4} s: trajectory time does not advance");
+        Note::Stall { gap_s, goes_on: false } => {
+            warn!(
+                "no setpoint was sent for {gap_s:.4} s: the drives stopped at the last one, which may exceed the stop \
+                 limits; trajectory time does not advance until they are at rest"
+            );
+        }
+        Note::Stall { gap_s, goes_on: true } => {
+            warn!("no setpoint was sent for {gap_s:.4} s: the motion goes on in time (after_stall)");
         }
     }
 }

@@ -64,6 +64,8 @@ pub enum Note {
     Stall {
         /// How long, s.
         gap_s: f64,
+        /// The motion goes on in time; else it stands still until the joints rest.
+        goes_on: bool,
     },
 }
 
@@ -305,7 +307,8 @@ impl Reporter {
 
     /// Trajectory time stops because the loop was late; a failed bus is reported as such.
     fn stalls_now(&self, cycle_state: &CycleState) -> bool {
-        cycle_state.frozen && !self.frozen_before && cycle_state.failed_bus().is_none()
+        let begins = cycle_state.bridged || cycle_state.frozen && !self.frozen_before;
+        begins && cycle_state.failed_bus().is_none()
     }
 
     /// Notes what a controller tells: what is new at most ten times a second, the same again once a second, with its
@@ -339,7 +342,10 @@ impl Reporter {
         }
         self.note_buses(cycle_state);
         if self.stalls_now(cycle_state) {
-            let _ = self.queues.notes.push(Note::Stall { gap_s: cycle_state.gap_s });
+            let _ = self
+                .queues
+                .notes
+                .push(Note::Stall { gap_s: cycle_state.gap_s, goes_on: cycle_state.bridged });
         }
         self.frozen_before = cycle_state.frozen;
         for transition in transitions.iter().flatten() {

@@ -7,12 +7,12 @@ use crate::approach::Approach;
 use crate::cycle_state::{CycleState, Decision, TrajectoryResult};
 use crate::intake::Boxed;
 use crate::last_sent::Ledger;
-use taustream_arm::settings::{CycleSettings, Supervision};
+use taustream_arm::Settings;
 use taustream_messages::Phase;
 use taustream_messages::trajectory::is_newer;
 use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
 use taustream_motion::trajectory::Cursor;
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint};
+use taustream_motion::{JointArray, Setpoint};
 
 /// Settled scales are restarted after this many periods, so that their time axis stays short and exact.
 const AXIS_PERIODS_MAX: u64 = 60_000;
@@ -54,6 +54,8 @@ pub struct Track {
     joints: usize,
     period_s: f64,
     tolerated_periods: u64,
+    /// Longest gap over which the motion goes on; more than the tolerated one where a stall is bridged.
+    bridged_periods: u64,
     base_tolerance_rad: f64,
     ramp_s: f64,
     scale: TimeScale,
@@ -70,18 +72,16 @@ pub struct Track {
 impl Track {
     /// A track that holds the zero pose until [`Self::set_pose`].
     #[must_use]
-    pub fn new(
-        limits: &[JointLimits; MAX_JOINTS],
-        joints: usize,
-        cycle: &CycleSettings,
-        supervision: &Supervision,
-    ) -> Self {
+    pub fn new(settings: &Settings) -> Self {
+        let (limits, joints) = (settings.robot.limits(), settings.robot.joints.len());
+        let (cycle, supervision) = (&settings.cycle, &settings.supervision);
         // Clamped to what a stop may take; settings without room for a stop were refused before.
-        let ramp_s = TimeScale::settled(0.0, ramp_duration_s(limits, joints)).ramp_duration_s();
+        let ramp_s = TimeScale::settled(0.0, ramp_duration_s(&limits, joints)).ramp_duration_s();
         Self {
             joints,
             period_s: f64::from(cycle.period_us) * 1e-6,
             tolerated_periods: u64::from(cycle.tolerated_gap_periods).max(1),
+            bridged_periods: u64::from(settings.bridged_gap_periods()).max(1),
             base_tolerance_rad: supervision.base_tolerance_rad,
             ramp_s,
             scale: TimeScale::settled(0.0, ramp_s),
@@ -160,7 +160,9 @@ impl Track {
         let mut restart = self.restart;
         if let Some(running) = &self.running {
             cycle_state.trajectory_id = running.trajectory_id;
-            if periods > self.tolerated_periods && !self.starting {
+            cycle_state.bridged =
+                periods > self.tolerated_periods && periods <= self.bridged_periods && !self.starting;
+            if periods > self.bridged_periods && !self.starting {
                 self.scale = TimeScale::settled(0.0, self.ramp_s);
                 (self.sent.axis, self.next.axis) = (0, 0);
                 (cycle_state.frozen, restart) = (true, true);

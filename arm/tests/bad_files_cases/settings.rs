@@ -49,6 +49,13 @@ pub(crate) const CASES: &[Case] = &[
     (Settings, "drive_watchdog_ms = 100", "", "cycle.drive_watchdog_ms", "missing"),
     (
         Settings,
+        "limp_is_safe = true",
+        "limp_is_safe = true\nafter_stall = \"stop\"",
+        "servo[0].after_stall",
+        "\"freeze\" or \"go-on\"",
+    ),
+    (
+        Settings,
         "drive_watchdog_ms = 100",
         "drive_watchdog_ms = 100\nheartbeat_lost_ms = 200",
         "cycle.heartbeat_lost_ms",

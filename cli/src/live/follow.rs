@@ -23,12 +23,25 @@ pub(crate) struct Executed {
     pub(crate) executed_s: f64,
     /// Largest tracking error of any joint while it moved.
     pub(crate) tracking_error_rad_max: f64,
+    /// Stalls of the streamer's loop on the way: gaps between setpoints that the drives do not bridge.
+    pub(crate) stalls: u64,
 }
 
 impl fmt::Display for Executed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let error_mrad = self.tracking_error_rad_max * 1e3;
-        write!(f, "executed      in {:.3} s, largest tracking error {error_mrad:.3} mrad", self.executed_s)
+        write!(f, "executed      in {:.3} s, largest tracking error {error_mrad:.3} mrad", self.executed_s)?;
+        let unit = match self.stalls {
+            0 => return Ok(()),
+            1 => "gap",
+            _ => "gaps",
+        };
+        write!(
+            f,
+            "\nstalls        {} {unit} between setpoints longer than the drives bridge: the computer was busy; there the \
+             drives may have left the limits (`after_stall` in the settings)",
+            self.stalls
+        )
     }
 }
 
@@ -87,11 +100,13 @@ struct Watch {
     seen: bool,
     first_ns: Option<u64>,
     tracking_error_rad_max: f64,
+    /// Stalls of the streamer before the motion.
+    stalls_before: Option<u64>,
 }
 
 impl Watch {
     fn of(trajectory_id: u64) -> Self {
-        Self { trajectory_id, seen: false, first_ns: None, tracking_error_rad_max: 0.0 }
+        Self { trajectory_id, seen: false, first_ns: None, tracking_error_rad_max: 0.0, stalls_before: None }
     }
 
     /// `Some` when the motion has ended at its end; an error when it has ended elsewhere.
@@ -102,10 +117,12 @@ impl Watch {
         };
         if r.trajectory_id != self.trajectory_id {
             // Until the first report after the acceptance an older motion stands there.
+            self.stalls_before = Some(r.stalls);
             let why = format!("another one, {}, took over", r.trajectory_id);
             return if self.seen { Err(stopped("dropped", &why)) } else { Ok(None) };
         }
         self.seen = true;
+        let stalls_before = *self.stalls_before.get_or_insert(r.stalls);
         let errors = r.tracking_error_rad.iter().take(r.joints());
         self.tracking_error_rad_max = errors.fold(self.tracking_error_rad_max, |max, e| max.max(e.abs()));
         match phase {
@@ -128,6 +145,7 @@ impl Watch {
         Ok(Some(Executed {
             executed_s: Duration::from_nanos(executed_ns).as_secs_f64(),
             tracking_error_rad_max: self.tracking_error_rad_max,
+            stalls: r.stalls.saturating_sub(stalls_before),
         }))
     }
 }
@@ -171,6 +189,20 @@ mod tests {
         ];
         let end = walk(&steps).unwrap().unwrap();
         assert!((end.executed_s - 1.25).abs() < 1e-12, "{end:?}");
+        assert!(!end.to_string().contains("stalls"), "{end}");
+    }
+
+    #[test]
+    fn motion_in_which_the_loop_stalled_says_so_with_the_count_of_its_own_stalls() {
+        let with = |stalls, report| Report { stalls, ..report };
+        let steps = [
+            (with(4, report(3, 1.0, 90)), Phase::Holding),
+            (with(5, report(7, 0.5, 100)), Phase::Moving),
+            (with(6, report(7, 1.0, 1350)), Phase::Holding),
+        ];
+        let end = walk(&steps).unwrap().unwrap();
+        assert_eq!(end.stalls, 2);
+        assert!(end.to_string().contains("2 gaps between setpoints"), "{end}");
     }
 
     #[test]

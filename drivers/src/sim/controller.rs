@@ -17,6 +17,8 @@ pub struct LoopParameters {
     pub integral_time_s: f64,
     /// First-order lag of the torque (current loop).
     pub torque_lag_s: f64,
+    /// For how long after a setpoint's period the reference goes on at its speed when no setpoint follows; 0: it stops.
+    pub extrapolation_s: f64,
 }
 
 /// Lag of the velocity that is fed forward: late SYNCs make the reference a staircase, which this smooths.
@@ -46,9 +48,10 @@ impl Line {
     const fn resting(at_rad: f64) -> Self {
         Self { from_rad: at_rad, to_rad: at_rad, begins: Nanos(0), duration_s: 1.0 }
     }
-    /// The angle; after its end it rests.
-    fn at(&self, now: Nanos) -> f64 {
-        let share = (now.since_s(self.begins) / self.duration_s).min(1.0);
+    /// The angle; `beyond_s` after its end it rests.
+    fn at(&self, now: Nanos, beyond_s: f64) -> f64 {
+        let time_s = now.since_s(self.begins).min(self.duration_s + beyond_s);
+        let share = time_s / self.duration_s;
         self.from_rad + share * (self.to_rad - self.from_rad)
     }
 }
@@ -186,7 +189,7 @@ impl Controller {
         match self.mode {
             Mode::Released => {}
             Mode::Following => {
-                let next_rad = self.line.at(now);
+                let next_rad = self.line.at(now, self.loops.extrapolation_s);
                 // The slope of the step that ends now: the line's own, also where one line meets the next.
                 self.reference_rad_s = (next_rad - self.reference_rad) / dt_s;
                 self.reference_rad = next_rad;

@@ -67,7 +67,7 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
 const QUEUE_FRAMES: u32 = 64;
 
 /// Every key, for unknown ones to be found, and for the nearest known key to be named.
-const KEYS: [&str; 31] = [
+const KEYS: [&str; 32] = [
     "bus_queue_frames",
     "dummy_mapping",
     "start_rad",
@@ -84,6 +84,7 @@ const KEYS: [&str; 31] = [
     "velocity_bandwidth_rad_s",
     "integral_time_ms",
     "torque_lag_ms",
+    "extrapolation_ms",
     "following_window_rad",
     "following_timeout_ms",
     "soft_limit_margin_rad",
@@ -238,6 +239,7 @@ impl Section<'_> {
             velocity_bandwidth_rad_s: self.number("velocity_bandwidth_rad_s", at, 400.0, 10.0..=600.0),
             integral_time_s: self.number("integral_time_ms", at, 20.0, 5.0..=1000.0) * 1e-3,
             torque_lag_s: self.number("torque_lag_ms", at, 0.3, 0.0..=0.5) * 1e-3,
+            extrapolation_s: self.number("extrapolation_ms", at, 0.0, 0.0..=1000.0) * 1e-3,
         }
     }
 

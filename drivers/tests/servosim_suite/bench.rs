@@ -33,6 +33,7 @@ pub(crate) fn parameters() -> DriveParameters {
             velocity_bandwidth_rad_s: 400.0,
             integral_time_s: 0.02,
             torque_lag_s: 0.3e-3,
+            extrapolation_s: 0.0,
         },
         following_window_rad: 0.3,
         following_timeout_ms: 50,

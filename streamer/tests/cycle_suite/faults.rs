@@ -1,6 +1,7 @@
 //! Every supervised fault, stall and guard trip, and the way back.
-use crate::harness::{CycleHarness, HOME_RAD, JOINTS, World, swing};
+use crate::harness::{CycleHarness, HOME_RAD, JOINTS, World, shipped_settings, swing};
 use crate::{arrived, assert_on_path, assert_within_stop_limits};
+use taustream_arm::AfterStall;
 use taustream_drivers::{DriveState, DriveTarget, LinkFault};
 use taustream_messages::{Command, FaultReason, PauseReason, Phase};
 use taustream_motion::{Stroke, Trajectory};
@@ -139,6 +140,37 @@ fn stall_within_tolerance_goes_on_in_true_time() {
     assert!((after - before - 2e-3).abs() < 1e-12, "{before} to {after}");
     harness.run_until(Phase::Holding, 5_000);
     assert_on_path(&harness, &trajectory);
+}
+
+/// Goal: where every servo goes on, a stall that the settings let resume costs no time on the path, and is counted; a longer
+/// one freezes; and one servo that freezes freezes the arm.
+#[test]
+fn stall_of_an_arm_that_goes_on_is_bridged_in_time_and_counted() {
+    for (gap, freezes, bridged) in
+        [(12, None, true), (20, None, true), (21, None, false), (12, Some(4), false)]
+    {
+        let mut settings = shipped_settings();
+        settings.servos.iter_mut().for_each(|servo| servo.after_stall = AfterStall::GoOn);
+        if let Some(joint) = freezes {
+            settings.servos[joint].after_stall = AfterStall::Freeze;
+        }
+        let mut harness = CycleHarness::with(settings);
+        let trajectory = harness.move_it();
+        harness.run(600);
+        let before = *harness.cycles.last().unwrap();
+        harness.step_after(gap);
+        let after = *harness.cycles.last().unwrap();
+        let passed_s = if bridged { gap as f64 * 1e-3 } else { 0.0 };
+        assert!((after.s - before.s - passed_s).abs() < 1e-9, "a gap of {gap}: {} to {}", before.s, after.s);
+        assert_eq!(after.sigma > 0.0, bridged, "a gap of {gap}");
+        harness.run(10);
+        assert_eq!(harness.report.unwrap().stalls, 1, "a gap of {gap}");
+        if bridged {
+            harness.run_until(Phase::Holding, 5_000);
+            assert_eq!(harness.report.unwrap().guard_trips, 0, "a gap of {gap}");
+        }
+        assert_on_path(&harness, &trajectory);
+    }
 }
 
 #[test]
