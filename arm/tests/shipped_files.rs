@@ -45,7 +45,7 @@ fn piper_settings_are_refused_for_their_protocol_alone_and_the_robot_is_reported
         for part in [
             "\"piper\"",
             "comes in a later version",
-            "the robot itself is sound (piper: 6 joints, 6 collision shapes)",
+            "the robot itself is valid (piper: 6 joints, 6 collision shapes)",
         ] {
             assert!(words.contains(part), "{part:?} is missing in {words}");
         }

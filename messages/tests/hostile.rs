@@ -95,7 +95,7 @@ fn trajectory_written_and_read_is_the_same() {
 #[test]
 fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
     let cases: [(Corrupted, &str); 10] = [
-        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 3"),
+        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 4"),
         (Corrupted::Joints(0), "0 joints"),
         (Corrupted::Joints(9), "joint_count is 9"),
         (Corrupted::StrokeCount(600), "stroke_count is 600; at most 512"),

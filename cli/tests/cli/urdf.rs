@@ -17,12 +17,12 @@ fn check_of_a_urdf_says_what_was_found_what_was_left_out_and_what_may_touch() {
         "base link plinth, tip link tool0",
         "4.900 kg by the links that state a mass",
         "moves with turn: 1 sphere, 1 hull",
-        "stands still: 1 cylinder",
+        "is fixed: 1 cylinder",
         "links WITHOUT collision geometry: world, bracket_frame, tool0, camera_cover",
         "note: joint \"right_finger_slide\" (prismatic) is to follow joint \"left_finger_slide\", which is ignored",
         "NOTHING keeps it from being hit",
-        "MAY TOUCH because the robot file says so: palm-camera",
-        "MAY TOUCH because the SRDF says so: ",
+        "MAY TOUCH by the robot file: palm-camera",
+        "MAY TOUCH by the SRDF: ",
         "MAY TOUCH by the contact rule",
     ] {
         assert!(checked.done().contains(words), "no {words:?} in:\n{}", checked.out);

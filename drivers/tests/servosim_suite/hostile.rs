@@ -85,7 +85,7 @@ fn bad_fault_requests_get_a_message_that_names_the_offender() {
         ("joint=0,kind=stuck", "joint=0 is no joint"),
         ("joint=knee,kind=stuck", "joint=knee is no joint"),
         ("joint=1,kind=explode", "kind=explode is unknown"),
-        ("joint=1,kind=stuck,joint=2", "joint stands twice"),
+        ("joint=1,kind=stuck,joint=2", "joint appears twice"),
         ("joint=1,kind=stuck,color=red", "\"color=red\" is no part"),
         ("joint=1,kind=stuck,at_s=-1", "at_s=-1: expected seconds"),
         ("joint=1,kind=stuck,at_s=NaN", "at_s=NaN: expected seconds"),
