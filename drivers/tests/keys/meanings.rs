@@ -129,6 +129,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Longest stall after which the motion resumes by itself, ms; without it 20.",
     ),
     (
+        "Settings files: cycle.heartbeat_lost_ms",
+        "Time without this master's heartbeat after which CANopen drives stop; `drive_watchdog_ms` + 250.",
+    ),
+    (
         "Settings files: cycle.drive_watchdog_ms",
         "Time without setpoints after which the drives stop by themselves, ms.",
     ),
@@ -183,6 +187,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: servo[].feedback", "What the encoder knows after power-up."),
     ("Settings files: servo[].feedback_range_rad", "Joint angles that the feedback tells apart."),
     ("Settings files: servo[].reaction", "What the drive does when setpoints stop coming."),
+    (
+        "Settings files: servo[].after_stall",
+        "How the motion goes on after a stall that the drives do not bridge; `go-on` for MIT motors, else `freeze`.",
+    ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
@@ -220,6 +228,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: simulator.position_gain_1_s", "Gain of the position loop; 60."),
     ("Settings files: simulator.velocity_bandwidth_rad_s", "Bandwidth of the velocity loop; 400."),
     ("Settings files: simulator.integral_time_ms", "Integral time of the velocity loop; 20."),
+    (
+        "Settings files: simulator.extrapolation_ms",
+        "For how long a CiA 402 drive goes on at its speed when no setpoint follows; 0: it stops.",
+    ),
     ("Settings files: simulator.torque_lag_ms", "Lag of the torque loop; 0.3."),
     ("Settings files: simulator.following_window_rad", "CiA 402: following error window; 0.3."),
     ("Settings files: simulator.following_timeout_ms", "CiA 402: following error time out; 50."),
