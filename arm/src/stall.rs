@@ -1,4 +1,4 @@
-//! How a motion goes on after a stall of the streamer's loop: a gap between two setpoints that the drives do not bridge.
+//! How a motion continues after a stall of the streamer's loop: a gap between two setpoints that the drives do not bridge.
 use crate::document::shown;
 use crate::protocol::{DamiaoMode, Protocol};
 use crate::reader::Table;
@@ -31,7 +31,7 @@ impl AfterStall {
     #[must_use]
     pub(crate) const fn by_default(protocol: &Protocol) -> Self {
         match protocol {
-            // The velocity stands in every command, so the motor goes on meanwhile.
+            // The velocity stands in every command, so the motor continues meanwhile.
             Protocol::Damiao(damiao) if matches!(damiao.mode, DamiaoMode::Mit { .. }) => Self::GoOn,
             Protocol::Damiao(_) | Protocol::Cia402(_) => Self::Freeze,
         }
@@ -54,14 +54,14 @@ pub(crate) fn read(table: &mut Table<'_>, protocol: Option<&Protocol>) -> Option
 }
 
 impl Settings {
-    /// How the arm goes on after a stall: all joints move along one path, so one that freezes freezes all.
+    /// How the arm continues after a stall: all joints move along one path, so one that freezes freezes all.
     #[must_use]
     pub fn after_stall(&self) -> AfterStall {
         let freezes = self.servos.iter().any(|servo| servo.after_stall == AfterStall::Freeze);
         if freezes { AfterStall::Freeze } else { AfterStall::GoOn }
     }
 
-    /// The longest gap between two setpoints, in periods, over which the motion goes on along its path.
+    /// The longest gap between two setpoints, in periods, over which the motion continues along its path.
     #[must_use]
     pub fn bridged_gap_periods(&self) -> u32 {
         let cycle = &self.cycle;

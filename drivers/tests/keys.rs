@@ -49,7 +49,7 @@ fn kinds() -> Vec<Kind> {
     vec![
         Kind {
             title: "Robot files",
-            about: "`config/robots`; how to describe an arm is told in [robots.md](robots.md).",
+            about: "`config/robots`; [robots.md](robots.md) explains how to describe an arm.",
             samples: vec![
                 shipped("config/robots/ur5.toml", &[("name = ", &format!("{payload}name = "))]),
                 shipped("config/robots/piper.toml", &[]),

@@ -1,7 +1,7 @@
 //! What a stall of the setpoints does to a joint, by kind of drive and by what is sent after it: the table of
 //! `docs/adr/0012-what-follows-a-stall.md`, measured on simulated drives.
 //!
-//! A joint moves at constant speed. For 3 to 20 ms no frame comes; then the setpoints go on in one of three ways. Measured is
+//! A joint moves at constant speed. For 3 to 20 ms no frame comes; then the setpoints continue in one of three ways. Measured is
 //! the largest acceleration of the link from the stall's first missing setpoint to 60 ms after its end, from the true
 //! velocity, and beside it what arithmetic says of the drive's reference alone.
 #![expect(

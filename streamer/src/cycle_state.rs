@@ -201,7 +201,7 @@ pub struct CycleState {
     pub gap_s: f64,
     /// That time is beyond what the drives bridge: trajectory time does not advance.
     pub frozen: bool,
-    /// That time is beyond what the drives bridge, and the trajectory goes on in time, as the settings say.
+    /// That time is beyond what the drives bridge, and the trajectory continues in time, as the settings say.
     pub bridged: bool,
     /// The setpoint is the trajectory's end.
     pub end_reached: bool,

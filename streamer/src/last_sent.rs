@@ -5,7 +5,7 @@
 //! others: its last setpoint stays the one before, and the time since then grows.
 //!
 //! A drive bridges a gap of `tolerated_gap_periods` of its own setpoints, or a whole stall where the settings say that the
-//! motion goes on (`after_stall`). A joint that misses more, while others continue,
+//! motion continues (`after_stall`). A joint that misses more, while others continue,
 //! has *stopped*: its drive stands at the last setpoint that it got, so nothing but that is commanded until the arm is at
 //! rest (`Track`), and supervision stops the others on their path.
 use crate::cycle_state::{CycleState, LostSetpoints};

@@ -27,7 +27,7 @@ const LINES_MAX: usize = 64;
 /// Something that became of a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CommandEvent {
-    /// A command was asked for.
+    /// A command was requested.
     PendingCommand {
         /// Which.
         command: Command,

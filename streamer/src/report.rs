@@ -64,7 +64,7 @@ pub enum Note {
     Stall {
         /// How long, s.
         gap_s: f64,
-        /// The motion goes on in time; else it stands still until the joints rest.
+        /// The motion continues in time; else it stands still until the joints rest.
         goes_on: bool,
     },
 }

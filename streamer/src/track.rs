@@ -54,7 +54,7 @@ pub struct Track {
     joints: usize,
     period_s: f64,
     tolerated_periods: u64,
-    /// Longest gap over which the motion goes on; more than the tolerated one where a stall is bridged.
+    /// Longest gap over which the motion continues; more than the tolerated one where a stall is bridged.
     bridged_periods: u64,
     base_tolerance_rad: f64,
     ramp_s: f64,

@@ -17,7 +17,7 @@ pub struct LoopParameters {
     pub integral_time_s: f64,
     /// First-order lag of the torque (current loop).
     pub torque_lag_s: f64,
-    /// For how long after a setpoint's period the reference goes on at its speed when no setpoint follows; 0: it stops.
+    /// For how long after a setpoint's period the reference continues at its speed when no setpoint follows; 0: it stops.
     pub extrapolation_s: f64,
 }
 

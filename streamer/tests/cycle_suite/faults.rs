@@ -142,7 +142,7 @@ fn stall_within_tolerance_goes_on_in_true_time() {
     assert_on_path(&harness, &trajectory);
 }
 
-/// Goal: where every servo goes on, a stall that the settings let resume costs no time on the path, and is counted; a longer
+/// Goal: where every servo continues, a stall that the settings let resume costs no time on the path, and is counted; a longer
 /// one freezes; and one servo that freezes freezes the arm.
 #[test]
 fn stall_of_an_arm_that_goes_on_is_bridged_in_time_and_counted() {
