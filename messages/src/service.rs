@@ -4,6 +4,7 @@
 //! two arms, or two users, on one host do not meet. Nothing is read from an iceoryx2 file, and segments belong
 //! to one uid only.
 use crate::files::{ArmFiles, Footprint, NODE_COUNTER, ROOT, SEGMENTS, UsersLock};
+use crate::operator::abstract_name;
 use crate::{CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TrajectoryMessage};
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
@@ -12,6 +13,8 @@ use iceoryx2::prelude::{
     FileName, LogLevel, Path as IceoryxPath, SemanticString, SignalHandlingMode, ipc,
     set_log_level_from_env_or,
 };
+use rustix::net::sockopt::socket_peercred;
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -77,6 +80,18 @@ pub enum ServiceError {
         uid: u32,
         /// Other users who serve it, as a clause; empty if none.
         others: String,
+    },
+    /// The streamer runs, and cannot be found in shared memory.
+    #[error(
+        "taustream-streamer of arm `{arm}` runs (process {pid}), but does not answer in shared memory: its names may be gone (RemoveIPC=yes at \
+         logout, a cleaner of /tmp, rm -rf), then it opens them again within a second or two, or it hangs; try again; `stop`, \
+         `stop --fast` and `torque-off` use its own socket meanwhile"
+    )]
+    NamesGone {
+        /// The arm's name.
+        arm: String,
+        /// The streamer's process.
+        pid: i32,
     },
     /// Another process serves this arm in the same role.
     #[error("arm `{arm}` has a taustream-{who} already{}; end that one first", pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
@@ -178,6 +193,25 @@ fn close_node_counter(prefix: &str) {
     }
 }
 
+/// The streamer's program.
+const STREAMER: &str = "taustream-streamer";
+
+/// The process behind the abstract name of a streamer's own socket, if it is of this user.
+fn streamer_of(arm: &str, uid: u32) -> Option<i32> {
+    let socket = socket_with(
+        AddressFamily::UNIX,
+        SocketType::STREAM,
+        SocketFlags::NONBLOCK | SocketFlags::CLOEXEC,
+        None,
+    )
+    .ok()?;
+    let address = SocketAddrUnix::new_abstract_name(abstract_name(arm, uid).as_bytes()).ok()?;
+    // Non-blocking: a full queue is an answer too, but says nothing about who serves.
+    connect(&socket, &address).ok()?;
+    let peer = socket_peercred(&socket).ok()?;
+    (peer.uid.as_raw() == uid).then(|| peer.pid.as_raw_nonzero().get())
+}
+
 impl Wire {
     /// Joins the services of `arm` (the settings' name) as this user, under `node_name`. `runtime` is the runtime
     /// directory of all processes of the arm, which must exist and belong to this user.
@@ -223,6 +257,11 @@ impl Wire {
     /// That no process serves this arm, naming other users who do.
     #[must_use]
     pub fn not_running(&self, who: &'static str) -> ServiceError {
+        if who == STREAMER
+            && let Some(pid) = streamer_of(&self.arm, self.uid)
+        {
+            return ServiceError::NamesGone { arm: self.arm.clone(), pid };
+        }
         let uids = users_of(&self.arm).into_iter().filter(|uid| *uid != self.uid);
         let list: Vec<String> = uids.map(|uid| uid.to_string()).collect();
         let others = if list.is_empty() {

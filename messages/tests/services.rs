@@ -2,6 +2,7 @@
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
+use taustream_messages::files::ArmFiles;
 use taustream_messages::service::{ServiceError, Wire};
 use taustream_messages::{LAYOUT_VERSION, Phase, Report};
 
@@ -103,4 +104,97 @@ fn readers_of_reports_beyond_the_maximum_are_refused_with_the_number_and_the_rem
     assert!(error.contains("24") && error.contains("end one"), "{error}");
     publisher.send_copy(report(5)).expect("send");
     assert!(readers.iter().all(|r| r.receive().expect("receive").is_some()));
+}
+
+/// Everything of an arm in shared memory and below the runtime directory.
+fn names_of(arm: &Arm) -> Vec<PathBuf> {
+    let mine = format!(".{}.", arm.name);
+    let mut found = Vec::new();
+    let mut directories = vec![PathBuf::from("/dev/shm"), arm.runtime.clone()];
+    while let Some(directory) = directories.pop() {
+        for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+            if entry.path().is_dir() {
+                directories.push(entry.path());
+            } else if entry.file_name().to_string_lossy().contains(&mine) {
+                found.push(entry.path());
+            }
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Goal: a service that starts clears what is left of its own arm, and nothing of another one in the same runtime directory.
+#[test]
+fn claim_clears_what_is_left_of_its_arm_and_nothing_of_another() {
+    let (dead, mut alive) = (Arm::new("dead"), Arm::new("alive"));
+    std::fs::remove_dir_all(&alive.runtime).expect("its own");
+    alive.runtime = dead.runtime.clone();
+    let wire = alive.join("streamer");
+    let publisher = wire.report_publisher().expect("publisher");
+    let subscriber = wire.report_subscriber().expect("subscriber");
+    let before = names_of(&alive);
+    let uid = rustix::process::geteuid().as_raw();
+    let left = [
+        PathBuf::from(format!("/dev/shm/taustream.{uid}.{}.left_5.data", dead.name)),
+        dead.runtime.join(format!("iceoryx2/services/taustream.{uid}.{}.left.service", dead.name)),
+        dead.runtime.join(format!("iceoryx2/nodes/12345/taustream.{uid}.{}.node.details", dead.name)),
+    ];
+    for file in &left {
+        std::fs::create_dir_all(file.parent().expect("a directory")).expect("made");
+        std::fs::write(file, "spoiled").expect("written");
+    }
+    let claim = ArmFiles::of(&dead.name, &dead.runtime).claim("streamer").expect("claims");
+    assert_eq!(left.iter().filter(|file| file.exists()).count(), 0, "left behind");
+    assert!(!dead.runtime.join("iceoryx2/nodes/12345").exists());
+    assert_eq!(names_of(&alive), before, "another arm's names were touched");
+    let second = ArmFiles::of(&dead.name, &dead.runtime).claim("streamer").expect_err("a second streamer");
+    assert!(second.to_string().contains(&std::process::id().to_string()), "{second}");
+    drop(claim);
+    publisher.send_copy(report(3)).expect("sent");
+    assert_eq!(subscriber.receive().expect("received").expect("one report").sequence, 3);
+}
+
+/// Goal: names that live are not cleared, and the footprint tells when one of them goes.
+#[test]
+fn claim_beside_a_living_process_clears_nothing_and_missing_files_are_noticed() {
+    let arm = Arm::new("beside");
+    let wire = arm.join("planner");
+    let _server = wire.plan_server().expect("server");
+    let before = names_of(&arm);
+    let claim = ArmFiles::of(&arm.name, &arm.runtime).claim("streamer").expect("claims");
+    claim.started();
+    assert_eq!(names_of(&arm), before);
+    let footprint = wire.footprint();
+    assert!(footprint.len() >= 6, "{footprint:?}");
+    assert_eq!(footprint.missing(), None);
+    let path = names_of(&arm).into_iter().find(|path| path.starts_with("/dev/shm")).expect("a segment");
+    let bytes = std::fs::read(&path).expect("readable");
+    std::fs::remove_file(&path).expect("removed");
+    assert_eq!(footprint.missing().map(std::path::Path::to_owned), Some(path.clone()));
+    // The same name again is another file.
+    std::fs::write(&path, bytes).expect("written");
+    assert!(footprint.missing().is_some(), "{}", path.display());
+}
+
+/// Goal: names that another user took first are refused at once, with file, owner and remedy. Only root can play that user.
+#[test]
+fn name_of_another_user_is_refused_at_once_with_file_owner_and_remedy() {
+    let uid = rustix::process::geteuid().as_raw();
+    let arm = Arm::new("squat");
+    let path = PathBuf::from(format!("/dev/shm/taustream.{uid}.{}.0123_node.0_10_0.global_mgmt", arm.name));
+    std::fs::write(&path, "").expect("written");
+    if uid == 0 {
+        std::os::unix::fs::chown(&path, Some(65_534), None).expect("root may");
+        let error = Wire::join(&arm.name, "test", &arm.runtime).expect_err("another user's");
+        let sentence = error.to_string();
+        for word in [path.to_str().expect("text"), "uid 65534", "rm "] {
+            assert!(sentence.contains(word), "{sentence}");
+        }
+    }
+    std::fs::remove_file(&path).expect("removed");
+    rustix::fs::mknodat(rustix::fs::CWD, &path, rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR, 0)
+        .expect("a pipe");
+    let error = Wire::join(&arm.name, "test", &arm.runtime).expect_err("a pipe");
+    assert!(error.to_string().contains("a pipe"), "{error}");
 }

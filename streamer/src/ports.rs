@@ -220,6 +220,7 @@ impl PortWatch {
             if let Some(claim) = &self.claim {
                 claim.started();
             }
+            let _gone = std::fs::remove_file(socket_file(&self.arm, self.files.runtime()));
         };
         thread::Builder::new().name("ports".into()).stack_size(512 << 10).spawn(work)
     }

@@ -80,7 +80,8 @@ impl Threads {
             threads.spawn("publisher", 2 << 20, move || publisher.serve(&second, &stop))?;
         }
         if let Err(e) = watch.open_first() {
-            threads.finish();
+            // Not joined: one of them may be what hangs.
+            threads.stop.store(true, Ordering::Release);
             return Err(e.into());
         }
         match bind_file(&arm, runtime) {

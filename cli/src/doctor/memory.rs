@@ -13,7 +13,7 @@ const PREFIX: &str = "taustream.";
 const PROGRAMS: [&str; 3] = ["taustream-streamer", "taustream-planner", "taustream"];
 
 pub(crate) fn examine(s: &Subject) -> Vec<Finding> {
-    vec![swap(s), shared_memory(s), stale_segments(s), runtime_directory(s)]
+    vec![swap(s), shared_memory(s), stale_segments(s), runtime_directory(s), lasting_names(s)]
 }
 
 fn swap(s: &Subject) -> Finding {
@@ -86,7 +86,12 @@ fn runtime_directory(s: &Subject) -> Finding {
     }
     if metadata.uid() != s.uid {
         let what = format!("{} belongs to uid {}, and this is uid {}", s.runtime, metadata.uid(), s.uid);
-        return Finding::problem(NAME, what, remedy);
+        // Services of that user may run there: it is not to be removed.
+        return Finding::problem(
+            NAME,
+            what,
+            "act as that user, or set TAUSTREAM_RUNTIME_DIR to a directory of your own",
+        );
     }
     let mode = metadata.mode() & 0o7777;
     if mode & 0o077 != 0 {
@@ -97,4 +102,52 @@ fn runtime_directory(s: &Subject) -> Finding {
         );
     }
     Finding::ok(NAME, format!("{} belongs to uid {} alone", s.runtime, s.uid))
+}
+
+/// What deletes the files of running services behind their back.
+fn lasting_names(s: &Subject) -> Finding {
+    const NAME: &str = "files of services";
+    if s.uid >= LOGIN_UID_MIN && s.tree.has("run/systemd/system") && removes_ipc(s) {
+        return Finding::warning(
+            NAME,
+            format!(
+                "logind deletes the segments of uid {} at its last logout (RemoveIPC=yes): commands then fail until the services are open again",
+                s.uid
+            ),
+            "run the services as a system user, or: loginctl enable-linger, or RemoveIPC=no in /etc/systemd/logind.conf",
+        );
+    }
+    if ["/tmp/", "tmp/", "/var/tmp/", "var/tmp/"].iter().any(|start| s.runtime.starts_with(start)) {
+        return Finding::warning(
+            NAME,
+            format!(
+                "{}: cleaners of /tmp delete what is old, sockets and locks of running services too",
+                s.runtime
+            ),
+            "set TAUSTREAM_RUNTIME_DIR to a directory below /run, or log in by logind, which makes /run/user/UID",
+        );
+    }
+    Finding::ok(NAME, "nothing is known to delete them")
+}
+
+/// Users from here on log in; logind spares those below.
+const LOGIN_UID_MIN: u32 = 1000;
+
+/// Whether logind removes what a user left in shared memory: its default, unless a configuration says otherwise. The last one
+/// that is read counts: drop-ins by their names, after the main file.
+fn removes_ipc(s: &Subject) -> bool {
+    let mut files = vec!["etc/systemd/logind.conf".to_owned()];
+    let mut names: Vec<String> =
+        ["usr/lib/systemd/logind.conf.d", "run/systemd/logind.conf.d", "etc/systemd/logind.conf.d"]
+            .iter()
+            .flat_map(|folder| s.tree.names(folder).into_iter().map(move |name| format!("{folder}/{name}")))
+            .collect();
+    names.sort_by(|a, b| a.rsplit('/').next().cmp(&b.rsplit('/').next()));
+    files.extend(names);
+    let setting = |line: &str| {
+        let (key, value) = line.split_once('=')?;
+        (key.trim() == "RemoveIPC").then(|| !["no", "false", "off", "0"].contains(&value.trim()))
+    };
+    let texts = files.iter().filter_map(|file| s.tree.text(file));
+    texts.flat_map(|text| text.lines().filter_map(setting).collect::<Vec<_>>()).last().unwrap_or(true)
 }

@@ -411,7 +411,11 @@ fn runtime_directory_and_shared_memory_are_graded() {
     fs::set_permissions(computer.path("run/taustream"), fs::Permissions::from_mode(0o755)).unwrap();
     computer.finds("runtime directory", Grade::Problem, &["0755", "chmod 0700"]);
     computer.subject.uid += 1;
-    computer.finds("runtime directory", Grade::Problem, &["belongs to uid", "TAUSTREAM_RUNTIME_DIR"]);
+    computer.finds(
+        "runtime directory",
+        Grade::Problem,
+        &["belongs to uid", "act as that user", "TAUSTREAM_RUNTIME_DIR"],
+    );
 
     let mut computer = Computer::healthy();
     computer.subject.shm_free = Some(1 << 20);
@@ -421,6 +425,26 @@ fn runtime_directory_and_shared_memory_are_graded() {
     computer.write("dev/shm/taustream.1000.ur5.x", "");
     computer.write("proc/600/comm", "taustream-plann\n");
     computer.finds("stale segments", Grade::Ok, &["not checked"]);
+}
+
+#[test]
+fn what_deletes_files_of_running_services_is_named() {
+    let mut computer = Computer::healthy();
+    // The directory must be the user's own for the other findings; only the number of a login user counts here.
+    computer.subject.runtime = "nowhere".to_owned();
+    computer.subject.uid = 1000;
+    computer.write("run/systemd/system/x", "");
+    computer.finds("files of services", Grade::Warning, &["RemoveIPC=yes", "uid 1000", "enable-linger"]);
+    computer.write("etc/systemd/logind.conf", "[Login]\n#RemoveIPC=no\nRemoveIPC=yes\n");
+    computer.finds("files of services", Grade::Warning, &["RemoveIPC"]);
+    computer.write("etc/systemd/logind.conf.d/arm.conf", "[Login]\nRemoveIPC = no\n");
+    computer.finds("files of services", Grade::Ok, &[]);
+    computer.subject.runtime = "tmp/taustream-1000".to_owned();
+    computer.finds("files of services", Grade::Warning, &["/tmp", "TAUSTREAM_RUNTIME_DIR"]);
+    computer.subject.uid = 990;
+    computer.subject.runtime = "nowhere".to_owned();
+    computer.remove("etc/systemd/logind.conf.d/arm.conf");
+    computer.finds("files of services", Grade::Ok, &[]);
 }
 
 #[test]

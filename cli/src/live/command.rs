@@ -1,5 +1,5 @@
 //! enable, disable, pause, resume, speed, stop, torque-off, clear-fault: one command, then the wait for its effect.
-use super::client::{Client, Limit};
+use super::client::{Client, Limit, STREAMER};
 use super::stop_way;
 use crate::arm::ArmName;
 use crate::failure::Failure;
@@ -125,30 +125,32 @@ fn stop(arm: &ArmName, command: Command, request: &'static str, wait_s: f64) -> 
     let why = loop {
         match progressed.recv_timeout(Duration::from_millis(5)) {
             Ok(Progress::Answered) => answered = true,
-            Ok(Progress::Ended(Err(failure))) if !answered && failure.is_of_transport() => {
-                break failure.to_string();
+            Ok(Progress::Ended(Err(failure))) if failure.is_of_transport() => {
+                break failure;
             }
             Ok(Progress::Ended(ended)) => return ended,
-            Err(RecvTimeoutError::Disconnected) => break "it has failed".to_owned(),
-            Err(RecvTimeoutError::Timeout) if !answered && limit.is_over() => {
-                break format!("no answer within {SHARED_MEMORY_S_MAX} s");
-            }
+            Err(RecvTimeoutError::Disconnected) => break no_answer(arm),
+            Err(RecvTimeoutError::Timeout) if !answered && limit.is_over() => break no_answer(arm),
             Err(RecvTimeoutError::Timeout) => interrupt::check()?,
         }
     };
-    stop_by_socket(arm, command, request, wait_s)
-        .map(|answer| Answer {
-            message: format!(
+    match stop_by_socket(arm, command, request, wait_s) {
+        Ok(answer) => {
+            let message = format!(
                 "{}; by the streamer's own socket, because shared memory failed: {why}",
                 answer.message
-            ),
-            ..answer
-        })
-        .map_err(
-            |failure| {
-                if failure.is_of_socket() { Failure::Failed(format!("{why}; {failure}")) } else { failure }
-            },
-        )
+            );
+            Ok(Answer { message, ..answer })
+        }
+        // Both ways agree that nobody is there.
+        Err(failure) if failure.is_of_socket() && why.kind() == "not-running" => Err(why),
+        Err(failure) if failure.is_of_socket() => Err(Failure::Failed(format!("{why}; {failure}"))),
+        Err(failure) => Err(failure),
+    }
+}
+
+fn no_answer(arm: &ArmName) -> Failure {
+    Failure::NoAnswer { who: STREAMER, arm: arm.name.clone(), waited_s: SHARED_MEMORY_S_MAX }
 }
 
 fn stop_by_socket(

@@ -44,7 +44,9 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &WatchArgs) -> Resu
         Ok(settings) => (ArmName::of(&settings), Some(Scale::of(&settings))),
         Err(_) => (ArmName::read(settings)?, None),
     };
-    let client = Client::join(&arm.name)?;
+    let name = arm.name.clone();
+    let mut client = Client::join(&name)?;
+    let mut footprint = client.wire().footprint();
     let end = Limit::after_s(args.seconds.unwrap_or(f64::INFINITY));
     let mut watch = Watch::new(form, arm, scale, args)?;
     while !interrupt::has_come() && !end.is_over() {
@@ -54,6 +56,14 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &WatchArgs) -> Resu
             return Ok(());
         }
         watch.show_silence(&client)?;
+        if watch.is_silent()
+            && footprint.missing().is_some()
+            && let Ok(joined) = Client::join(&name)
+        {
+            // Closed in earnest, the old ports would delete files of the same names that the streamer has made meanwhile.
+            Box::leak(Box::new(std::mem::replace(&mut client, joined)));
+            footprint = client.wire().footprint();
+        }
         if watch.is_left_within(POLL)? {
             break;
         }
@@ -158,6 +168,10 @@ impl Watch {
                 screen.draw(&lines).map_err(closed)
             }
         }
+    }
+
+    fn is_silent(&self) -> bool {
+        self.received.elapsed().as_secs_f64() >= SILENCE_S_MAX
     }
 
     /// Says that no reports come, once in a log and all the time on a terminal.
