@@ -214,6 +214,8 @@ fn read_servo(
     let reaction = trust::read_reaction(table);
     let limp_is_safe = table.flag("limp_is_safe");
     let after_stall = stall::read(table, protocol.as_ref());
+    let limp_risk_acknowledged =
+        if table.has("limp_risk_acknowledged") { table.flag("limp_risk_acknowledged") } else { Some(false) };
     Some(Servo {
         joint: joint?,
         bus: bus?,
@@ -226,6 +228,7 @@ fn read_servo(
         reaction: reaction?,
         limp_is_safe: limp_is_safe?,
         after_stall: after_stall?,
+        limp_risk_acknowledged: limp_risk_acknowledged?,
     })
 }
 

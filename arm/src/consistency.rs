@@ -110,6 +110,23 @@ pub(crate) fn check_damiao(fault_list: &FaultList, settings: &Settings) {
     }
 }
 
+/// An arm with joints that fall begins slowly after each enable: what falls in motion falls harder.
+pub(crate) fn check_limp_risk(fault_list: &FaultList, settings: &Settings) {
+    let first_percent = settings.supervision.first_speed_percent;
+    let Some(servo) = settings.servos.iter().find(|servo| servo.limp_risk_acknowledged) else { return };
+    if first_percent > LIMP_RISK_PERCENT_MAX {
+        let joint = settings.robot.joints.get(servo.joint).map_or("?", |joint| &joint.name);
+        let expected = format!(
+            "at most {LIMP_RISK_PERCENT_MAX} percent: joint {joint} falls when commands stop (limp_risk_acknowledged), and each \
+             enable begins at this speed"
+        );
+        fault_list.add(None, "supervision.first_speed_percent", &format!("{first_percent:?}"), &expected);
+    }
+}
+
+/// Highest first speed of an arm with joints that fall.
+const LIMP_RISK_PERCENT_MAX: f64 = 25.0;
+
 /// A bus that its own cycle does not fit on would lose setpoints from the first second.
 pub(crate) fn check_loads(fault_list: &FaultList, settings: &Settings) {
     for (i, bus) in settings.buses.iter().enumerate() {

@@ -14,6 +14,7 @@ pub mod daemon;
 mod description;
 pub mod digest;
 mod document;
+pub mod drive_scale;
 pub mod fault;
 mod hull;
 mod identifiers;
@@ -41,6 +42,7 @@ pub mod trust;
 mod urdf;
 
 pub use bus_load::BusLoad;
+pub use drive_scale::{Overruled, ScaleObject};
 pub use fault::{Fault, Faults};
 pub use lookup::{Kind, find};
 pub use mass::LinkMass;

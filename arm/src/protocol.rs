@@ -3,6 +3,7 @@
 //! A number of one protocol means nothing to another, so the keys of a protocol are unknown keys beside the name of
 //! another. Everything here moves the arm or says how it falls: no key has a default.
 use crate::document::shown;
+use crate::drive_scale::{self, Overruled};
 use crate::reader::{Bounds, Table};
 use crate::robot::{Robot, RobotJoint};
 use crate::text::counted;
@@ -25,6 +26,8 @@ pub struct Cia402 {
     pub gear_ratio: f64,
     /// Encoder counts a motor revolution.
     pub counts_per_rev: f64,
+    /// Objects of the drive that are not compared with these settings.
+    pub overruled: Overruled,
 }
 
 /// How a Damiao motor is addressed, scaled and held. Its angles are those of its output shaft, behind its own gear.
@@ -108,7 +111,7 @@ const EXPECTED: &str = "\"cia402\" (CANopen CiA 402, cyclic synchronous position
 /// Protocols that are planned for.
 const LATER: [&str; 5] = ["piper", "robstride", "myactuator", "cubemars", "odrive"];
 
-const CIA402_KEYS: [&str; 2] = ["gear_ratio", "counts_per_rev"];
+const CIA402_KEYS: [&str; 3] = ["gear_ratio", "counts_per_rev", "overruled_objects"];
 const DAMIAO_KEYS: [&str; 9] = [
     "feedback_id",
     "mode",
@@ -185,7 +188,8 @@ fn read_id(table: &mut Table<'_>, [low, high]: [i64; 2]) -> Option<u8> {
 fn read_cia402(table: &mut Table<'_>) -> Option<Cia402> {
     let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
     let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
-    Some(Cia402 { gear_ratio: gear_ratio?, counts_per_rev: counts_per_rev? })
+    let overruled = drive_scale::read_overruled(table);
+    Some(Cia402 { gear_ratio: gear_ratio?, counts_per_rev: counts_per_rev?, overruled: overruled? })
 }
 
 fn read_damiao(table: &mut Table<'_>) -> Option<Damiao> {

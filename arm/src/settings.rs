@@ -114,6 +114,8 @@ pub struct Servo {
     pub limp_is_safe: bool,
     /// What follows a stall.
     pub after_stall: AfterStall,
+    /// Its owner knows that the joint falls when commands stop, because its servo cannot hold then.
+    pub limp_risk_acknowledged: bool,
 }
 
 /// The cycle and what it tolerates.
@@ -276,6 +278,7 @@ impl Settings {
         consistency::check_jump(fault_list, &settings);
         consistency::check_damiao(fault_list, &settings);
         consistency::check_traffic(fault_list, &settings);
+        consistency::check_limp_risk(fault_list, &settings);
         Some(settings)
     }
 }

@@ -115,13 +115,29 @@ pub(crate) fn check_reaction(table: &Table<'_>, servo: &Servo, joint: &RobotJoin
         table.fault("reaction", &shown(servo.reaction.word()), &expected);
         return;
     }
-    if !servo.reaction.ends_limp() || servo.limp_is_safe {
+    let falls = servo.reaction.ends_limp() && !servo.limp_is_safe;
+    let can_hold = known.contains(&Reaction::Hold);
+    if servo.limp_risk_acknowledged && (!falls || can_hold) {
+        let expected = if falls {
+            "false: this servo can hold, so its reaction is to be \"hold\""
+        } else {
+            "false: a risk is acknowledged only where a joint may fall (limp_is_safe = false) and its servo cannot hold"
+        };
+        table.fault("limp_risk_acknowledged", "true", expected);
+        return;
+    }
+    if !falls || servo.limp_risk_acknowledged {
         return;
     }
     let hold = if known.contains(&Reaction::Hold) { "\"hold\"" } else { "a servo that can hold" };
+    let acknowledge = if can_hold {
+        ""
+    } else {
+        "; or state limp_risk_acknowledged = true: it then may fall, every enable says so and begins at the first speed"
+    };
     let expected = format!(
         "{hold}, as joint {} may not lose its torque (limp_is_safe = false) and with this reaction it {}; or fit a \
-         brake or a counterweight and state limp_is_safe = true",
+         brake or a counterweight and state limp_is_safe = true{acknowledge}",
         joint.name,
         servo.reaction.sentence()
     );

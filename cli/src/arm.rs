@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile};
 use taustream_messages::service::is_arm_name;
-use taustream_streamer::names::{BusName, Names};
+use taustream_streamer::names::{BusName, Names, ServoName};
 
 /// Where a controller keeps the settings of its one arm.
 const INSTALLED: &str = "/etc/taustream/settings.toml";
@@ -15,7 +15,7 @@ const INSTALLED_DIRECTORY: &str = "/etc/taustream/settings";
 const SHIPPED: &str = "vcan6";
 
 /// Name of an arm and of its joints: all that commands and status need.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ArmName {
     /// Names its services.
     pub(crate) name: String,
@@ -23,6 +23,8 @@ pub(crate) struct ArmName {
     pub(crate) joints: Vec<String>,
     /// Names of the buses; empty when the settings could not be read.
     pub(crate) buses: Vec<BusName>,
+    /// The servos, base to tip; empty when the settings could not be read.
+    pub(crate) servos: Vec<ServoName>,
 }
 
 impl ArmName {
@@ -33,13 +35,14 @@ impl ArmName {
 
     /// The names, for sentences about joints and buses.
     pub(crate) fn names(&self) -> Names {
-        Names { joints: self.joints.clone(), buses: self.buses.clone() }
+        let Self { joints, buses, servos, .. } = self.clone();
+        Names { joints, buses, servos }
     }
 
     /// The arm of settings that were read as a whole.
     pub(crate) fn of(settings: &Settings) -> Self {
-        let Names { joints, buses } = Names::of(settings);
-        Self { name: settings.name.clone(), joints, buses }
+        let Names { joints, buses, servos } = Names::of(settings);
+        Self { name: settings.name.clone(), joints, buses, servos }
     }
 
     /// The arm that settings name. A fault elsewhere in them must not keep anybody from stopping the arm: the name
@@ -54,7 +57,7 @@ impl ArmName {
                     "note: {} has faults (`taustream check` shows them); using only its name `{name}`",
                     path.display()
                 ));
-                Ok(Self { name, joints: Vec::new(), buses: Vec::new() })
+                Ok(Self { name, ..Self::default() })
             }
         }
     }

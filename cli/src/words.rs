@@ -51,7 +51,7 @@ mod tests {
     use taustream_messages::{Cause, FaultReason};
 
     fn arm() -> ArmName {
-        ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], buses: Vec::new() }
+        ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], ..ArmName::default() }
     }
 
     /// Goal: a received report is printed with this arm's names, and what another release wrote is not taken for "no fault".
@@ -59,9 +59,10 @@ mod tests {
     fn fault_sentence_reads_the_report_of_this_arm() {
         let mut report = Report { joint_count: 2, ..Report::default() };
         assert_eq!(fault_sentence(&report, &arm()), "no fault is reported");
-        report.set_cause(Some(Cause::new(FaultReason::DriveFault).at_joint(1).code(0x8611)));
+        report
+            .set_cause(Some(Cause::new(FaultReason::DriveFault).at_joint(1).code(0x8611).amount(24.0, 0.0)));
         let text = fault_sentence(&report, &arm());
-        assert_eq!(text, "drive fault at joint 2 `lift`: 0x8611 following error too large");
+        assert_eq!(text, "drive fault at joint 2 `lift`: 0x8611 following error too large (status 0x0018)");
         report.fault_reason = 99;
         assert!(fault_sentence(&report, &arm()).contains("code 99"));
     }

@@ -110,13 +110,28 @@ pub struct ServoStatus {
     pub error_code: u32,
     /// Object or register that was refused, in the protocol's numbers (CiA 402: `index << 8 | sub`); 0 for none.
     pub refused_object: u32,
+    /// What the drive states of the refused object and what the settings say; 0 where there are no such numbers.
+    pub refused_numbers: [f64; 2],
     /// The drive warns.
     pub warning: bool,
     /// The drive has stopped because it heard nothing of its master for too long.
     pub lost_master: bool,
+    /// Code of its newest emergency message, "error reset" not counted; 0 before the first.
+    pub emergency: u32,
+    /// How many of them came; it wraps.
+    pub emergencies: u32,
 }
 
 impl ServoStatus {
+    /// What it refused, or states about itself against the settings.
+    #[must_use]
+    pub const fn refusal(&self) -> crate::bring_up::Refusal {
+        crate::bring_up::Refusal {
+            code: self.error_code,
+            object: self.refused_object,
+            numbers: self.refused_numbers,
+        }
+    }
     /// Before any feedback.
     pub const UNKNOWN: Self = Self {
         state: DriveState::Absent,
@@ -127,8 +142,11 @@ impl ServoStatus {
         status_word: 0,
         error_code: 0,
         refused_object: 0,
+        refused_numbers: [0.0; 2],
         warning: false,
         lost_master: false,
+        emergency: 0,
+        emergencies: 0,
     };
 }
 

@@ -6,7 +6,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum FaultReason {
-    /// A drive reported a fault; code = its error code.
+    /// A drive reported a fault; code = its error code, value = its statusword when it tripped.
     DriveFault = 1,
     /// No feedback of a joint for too long; value = age in s.
     FeedbackLate = 2,
@@ -31,7 +31,8 @@ pub enum FaultReason {
     TorqueOff = 11,
     /// The operator asked for a fast stop.
     Operator = 12,
-    /// A drive refused a configuration step; code = its error code, object = what it refused.
+    /// A drive refused a configuration step, or states about itself what the settings deny; code = its error code,
+    /// object = what it refused or states, value = what it states, limit = what the settings say.
     ConfigurationRefused = 13,
     /// A drive has no fault, but warns; code = statusword.
     DriveWarning = 14,
@@ -157,10 +158,13 @@ impl BusFault {
             Self::OtherMaster => "another master commands the drives",
         }
     }
-    /// What to do about it, before `clear-fault`.
+    /// What to do about it, before `clear-fault`; `has_cable`: there is a cable to look at.
     #[must_use]
-    pub fn remedy(self, interface: &str) -> String {
+    pub fn remedy(self, interface: &str, has_cable: bool) -> String {
         match self {
+            Self::QueueFull | Self::Unconfirmed | Self::SetpointsLost if !has_cable => {
+                "check that the simulated servos run and keep up".to_owned()
+            }
             Self::QueueFull | Self::Unconfirmed | Self::SetpointsLost => {
                 "see that the drives are powered, the cable is whole, both ends are terminated and the bit rate is theirs"
                     .to_owned()
@@ -210,14 +214,21 @@ pub struct Cause {
 pub enum Evidence {
     /// The reason says it all.
     None,
-    /// Error code of a drive.
-    DriveError(u32),
+    /// A drive's fault.
+    DriveError {
+        /// Its error code; 0 while none is known.
+        code: u32,
+        /// Its statusword when it tripped.
+        status_word: u32,
+    },
     /// Error code and object of a refused configuration step.
     Refusal {
         /// The code.
         code: u32,
         /// The object; 0 when none is to blame.
         object: u32,
+        /// What the drive states of the object, and what the settings say; 0 where there are no such numbers.
+        numbers: [f64; 2],
     },
     /// A statusword.
     Statusword(u32),
@@ -262,14 +273,24 @@ impl Cause {
         Self { bus: Some(bus), ..cause }
     }
 
+    /// The statusword of a drive's fault.
+    fn status_word(&self) -> u32 {
+        let whole = (0.0..=f64::from(u32::MAX)).contains(&self.value);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 32 bits")]
+        let word = if whole { self.value as u32 } else { 0 };
+        word
+    }
+
     /// What is to be shown beside the reason: the one rule for logs, status and answers.
     #[must_use]
     pub fn evidence(&self) -> Evidence {
         match self.reason {
             FaultReason::TorqueOff | FaultReason::Operator => Evidence::None,
-            FaultReason::DriveFault => Evidence::DriveError(self.code),
+            FaultReason::DriveFault => {
+                Evidence::DriveError { code: self.code, status_word: self.status_word() }
+            }
             FaultReason::ConfigurationRefused | FaultReason::EnergisedUnowned => {
-                Evidence::Refusal { code: self.code, object: self.object }
+                Evidence::Refusal { code: self.code, object: self.object, numbers: [self.value, self.limit] }
             }
             FaultReason::DriveDropped | FaultReason::DriveWarning => Evidence::Statusword(self.code),
             FaultReason::BusFault => Evidence::Bus(BusFault::from_code(self.code)),

@@ -1,7 +1,8 @@
 //! Why a command was accepted or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
 use taustream_drivers::DriveState;
-use taustream_messages::{Phase, ReferenceState};
+use taustream_drivers::bring_up::Refusal;
+use taustream_messages::{Cause, Phase, ReferenceState};
 
 /// The cycle's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,14 +37,14 @@ pub enum AnswerReason {
     ClearedOff,
     Already,
     NothingMoves,
-    NotConfigured { joint: usize, state: DriveState },
+    NotConfigured { joint: usize, state: DriveState, refusal: Refusal },
     NotAtRest { joint: usize, speed_rad_s: f64, limit_rad_s: f64 },
     SpeedUnknown,
     OutOfRange { joint: usize, position_rad: f64, range_rad: [f64; 2] },
     NoFeedback { joint: usize, age_s: f64 },
     Warns { joint: usize, status_word: u32 },
     Tracking { joint: usize, error_rad: f64, limit_rad: f64 },
-    ClearFirst,
+    ClearFirst { cause: Option<Cause> },
     StopFirst,
     EnableFirst,
     NothingToResume,
@@ -71,7 +72,13 @@ impl AnswerReason {
     /// The sentence for people.
     #[must_use]
     pub fn sentence(&self, names: &Names) -> String {
-        self.taken().or_else(|| self.of_referencing(names)).unwrap_or_else(|| self.refused(names))
+        let taken = self.taken().map(|text| match (self, names.fall_warning()) {
+            (Self::Enabling | Self::Unlocked | Self::TakingOver, Some(warning)) => {
+                format!("{text}; {warning}")
+            }
+            _ => text,
+        });
+        taken.or_else(|| self.of_referencing(names)).unwrap_or_else(|| self.refused(names))
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
@@ -149,11 +156,17 @@ impl AnswerReason {
     fn refused(self, names: &Names) -> String {
         let name = |joint| names.joint(joint);
         match self {
-            Self::NotConfigured { joint, state } => format!(
-                "{} is not ready ({}); check power and connection of its drive, then `status`",
-                name(joint),
-                state_word(state)
-            ),
+            Self::NotConfigured { joint, state, refusal } => {
+                let why = if refusal.code == 0 {
+                    format!("; {}, then `status`", present(names, joint))
+                } else {
+                    format!(": {}", names.refusal(joint, &refusal))
+                };
+                format!("{} is not ready ({}){why}", name(joint), state_word(state))
+            }
+            Self::ClearFirst { cause: Some(cause) } => {
+                format!("`clear-fault` first, once the cause is fixed: {}", names.fault(&cause))
+            }
             Self::NotAtRest { joint, speed_rad_s, limit_rad_s } => format!(
                 "{} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm is at rest",
                 name(joint)
@@ -162,13 +175,16 @@ impl AnswerReason {
                 "{} is at {position_rad:.4} rad, outside its range [{low:.4}, {high:.4}]; move it back by hand",
                 name(joint)
             ),
-            Self::NoFeedback { joint, age_s } => format!(
-                "no feedback from {} for {age_s:.3} s; check power and connection of its drive",
-                name(joint)
-            ),
+            Self::NoFeedback { joint, age_s } if age_s.is_infinite() => {
+                format!("no feedback from {} yet; {}", name(joint), present(names, joint))
+            }
+            Self::NoFeedback { joint, age_s } => {
+                format!("no feedback from {} for {age_s:.3} s; {}", name(joint), present(names, joint))
+            }
             Self::Warns { joint, status_word } => format!(
-                "the drive of {} warns (status {status_word:#06x}); remove the cause at the drive",
-                name(joint)
+                "the drive of {} warns (status {}); remove the cause at the drive",
+                name(joint),
+                names.status_word(joint, status_word)
             ),
             Self::Tracking { joint, error_rad, limit_rad } => format!(
                 "{} is {error_rad:.4} rad from its command (limit {limit_rad}); `disable` and free the arm",
@@ -212,7 +228,7 @@ impl AnswerReason {
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above")]
     fn plain_refusal(self) -> &'static str {
         match self {
-            Self::ClearFirst => "the arm is in fault; `status` shows why, then `clear-fault`",
+            Self::ClearFirst { .. } => "`clear-fault` first, once the cause is fixed; `status` shows it",
             Self::SpeedUnknown => {
                 "too little feedback to know that the arm is at rest; try again in a second"
             }
@@ -225,6 +241,15 @@ impl AnswerReason {
             Self::ShuttingDown => "the streamer is shutting down",
             _ => "it is not possible now",
         }
+    }
+}
+
+/// What to look at when a drive is silent.
+fn present(names: &Names, joint: usize) -> &'static str {
+    if names.joint_has_cable(joint) {
+        "check power and connection of its drive"
+    } else {
+        "check that its simulated servo runs"
     }
 }
 

@@ -238,7 +238,7 @@ impl ServoDriver for BenchDriver {
 /// The frame of an energised servo's setpoint, packed as its protocol packs it.
 fn setpoint(servo: &Servo, command: &JointCommand) -> CanFrame {
     match servo.protocol {
-        Protocol::Cia402(Cia402 { gear_ratio, counts_per_rev }) => {
+        Protocol::Cia402(Cia402 { gear_ratio, counts_per_rev, .. }) => {
             let Servo { sign, zero_offset_rad, .. } = *servo;
             let scale = CountScale { sign, gear_ratio, counts_per_rev, zero_offset_rad };
             encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, command.position_rad))

@@ -215,7 +215,11 @@ pub fn note(note: &Note, names: &Names) {
             "{}: {}; nothing is sent on it until `clear-fault`; {}",
             names.bus(*bus),
             bus_fault.word(),
-            bus_fault.remedy(names.interface(*bus))
+            names.bus_remedy(*bus, *bus_fault)
+        ),
+        Note::Emergency { joint, code, count } => warn!(
+            "emergency message of the {} ({count} since the last such line)",
+            names.drive_error(*joint, *code)
         ),
         Note::Stall { gap_s, goes_on: false } => {
             warn!(

@@ -3,7 +3,7 @@
 use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
-use taustream_drivers::bring_up::{explain, explain_refusal};
+use taustream_drivers::bring_up::{Refusal, explain_on, explain_refusal_on, explain_status};
 use taustream_messages::{BusFault, BusReport, Cause, Evidence};
 
 /// A bus as its settings name it.
@@ -13,6 +13,19 @@ pub struct BusName {
     pub name: String,
     /// Its network interface.
     pub interface: String,
+    /// It has a cable; a vcan or local link has none.
+    pub has_cable: bool,
+}
+
+/// The servo of a joint as its settings name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ServoName {
+    /// Index of its bus.
+    pub bus: usize,
+    /// Its protocol, as settings name it.
+    pub protocol: &'static str,
+    /// The joint falls when commands stop, and its owner has acknowledged that.
+    pub falls: bool,
 }
 
 /// Names of joints and buses, in the order of the settings; empty where the settings could not be read.
@@ -22,17 +35,77 @@ pub struct Names {
     pub joints: Vec<String>,
     /// The buses.
     pub buses: Vec<BusName>,
+    /// The servos, in the order of the joints.
+    pub servos: Vec<ServoName>,
 }
 
 impl Names {
     /// The names of an arm.
     #[must_use]
     pub fn of(settings: &Settings) -> Self {
-        let bus = |b: &taustream_arm::Bus| BusName { name: b.name.clone(), interface: b.interface.clone() };
+        let bus = |b: &taustream_arm::Bus| BusName {
+            name: b.name.clone(),
+            interface: b.interface.clone(),
+            has_cable: b.kind != taustream_arm::BusKind::Virtual,
+        };
+        let servo = |s: &taustream_arm::Servo| ServoName {
+            bus: s.bus,
+            protocol: s.protocol.name(),
+            falls: s.limp_risk_acknowledged,
+        };
         Self {
             joints: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
             buses: settings.buses.iter().map(bus).collect(),
+            servos: settings.servos.iter().map(servo).collect(),
         }
+    }
+
+    /// Whether a bus has a cable; one of which nothing is known may.
+    fn has_cable(&self, bus: usize) -> bool {
+        self.buses.get(bus).is_none_or(|b| b.has_cable)
+    }
+
+    /// Whether a joint's servo hangs on a cable.
+    pub(crate) fn joint_has_cable(&self, joint: usize) -> bool {
+        self.servos.get(joint).is_none_or(|servo| self.has_cable(servo.bus))
+    }
+
+    /// What everybody near the arm must know while it is energised; none where every joint stays when commands stop.
+    #[must_use]
+    pub fn fall_warning(&self) -> Option<String> {
+        let falling = self.servos.iter().enumerate().filter(|(_, servo)| servo.falls);
+        let names: Vec<&str> =
+            falling.map(|(joint, _)| self.joints.get(joint).map_or("?", String::as_str)).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "KEEP CLEAR, and support the arm before `disable`: falling when commands stop (limp_risk_acknowledged): {}",
+                names.join(", ")
+            )
+        })
+    }
+
+    /// What a drive's error code says, and what to do: "0x8611 following error too large".
+    #[must_use]
+    pub fn error_code(&self, joint: usize, code: u32) -> String {
+        explain_on(code, self.joint_has_cable(joint))
+    }
+
+    /// The same, with the joint: "drive of joint 3 `elbow`: 0x8611 following error too large".
+    #[must_use]
+    pub fn drive_error(&self, joint: usize, code: u32) -> String {
+        format!("drive of {}: {}", self.joint(joint), self.error_code(joint, code))
+    }
+
+    /// A drive's refusal, as its fault says it.
+    #[must_use]
+    pub fn refusal(&self, joint: usize, refusal: &Refusal) -> String {
+        explain_refusal_on(refusal, self.joint_has_cable(joint))
+    }
+
+    /// A drive's status word in words: "0x0218 fault".
+    #[must_use]
+    pub fn status_word(&self, joint: usize, word: u32) -> String {
+        explain_status(self.servos.get(joint).map(|servo| servo.protocol), word)
     }
 
     /// A joint as text, by its zero-based index: "joint 3 `elbow`".
@@ -48,7 +121,7 @@ impl Names {
     #[must_use]
     pub fn bus(&self, bus: usize) -> String {
         match self.buses.get(bus) {
-            Some(BusName { name, interface }) => format!("bus `{name}` ({interface})"),
+            Some(BusName { name, interface, .. }) => format!("bus `{name}` ({interface})"),
             None => format!("bus {}", bus + 1),
         }
     }
@@ -67,11 +140,20 @@ impl Names {
             (None, Some(bus)) => format!(" on {}", self.bus(bus)),
             (None, None) => String::new(),
         };
+        let joint = cause.joint.unwrap_or(usize::MAX);
         let evidence = match cause.evidence() {
             Evidence::None => String::new(),
-            Evidence::DriveError(code) => format!(": {}", explain(code)),
-            Evidence::Refusal { code, object } => format!(": {}", explain_refusal(code, object)),
-            Evidence::Statusword(word) => format!(": {word:#06x}"),
+            Evidence::DriveError { code: 0, status_word } => {
+                format!(": no error code yet; status {}", self.status_word(joint, status_word))
+            }
+            Evidence::DriveError { code, status_word } => {
+                let status = self.status_word(joint, status_word);
+                format!(": {} (status {status})", self.error_code(joint, code))
+            }
+            Evidence::Refusal { code, object, numbers } => {
+                format!(": {}", self.refusal(joint, &Refusal { code, object, numbers }))
+            }
+            Evidence::Statusword(word) => format!(": {}", self.status_word(joint, word)),
             Evidence::Bus(bus_fault) => format!(": {}", self.bus_fault(cause, bus_fault)),
             Evidence::Value(value) => format!(": {value:.6}"),
             Evidence::Amount { value, limit } => format!(": {value:.6} against {limit:.6}"),
@@ -105,8 +187,17 @@ impl Names {
             | BusFault::Restarted
             | BusFault::ErrorPassive => String::new(),
         };
-        let remedy = bus_fault.remedy(cause.bus.map_or("IFACE", |bus| self.interface(bus)));
+        let remedy = match cause.bus {
+            Some(bus) => self.bus_remedy(bus, bus_fault),
+            None => bus_fault.remedy("IFACE", true),
+        };
         format!("{}{count}; {remedy}", bus_fault.word())
+    }
+
+    /// What to do about a bus.
+    #[must_use]
+    pub fn bus_remedy(&self, bus: usize, bus_fault: BusFault) -> String {
+        bus_fault.remedy(self.interface(bus), self.has_cable(bus))
     }
 
     /// The state of a bus: "well", or what is wrong with it and what its controller said last.
@@ -116,7 +207,7 @@ impl Names {
             None => "well".to_owned(),
             Some(bus_fault) => {
                 let silent = if report.silent == 0 { "" } else { ", nothing is sent until `clear-fault`" };
-                format!("{}{silent}; {}", bus_fault.word(), bus_fault.remedy(self.interface(bus)))
+                format!("{}{silent}; {}", bus_fault.word(), self.bus_remedy(bus, bus_fault))
             }
         };
         let error = ErrorFrame { class: report.error_class, data: report.error_data };
@@ -133,8 +224,13 @@ mod tests {
     use taustream_messages::FaultReason;
 
     fn names() -> Names {
-        let bus = BusName { name: "arm".into(), interface: "can3".into() };
-        Names { joints: vec!["pan".into(), "lift".into()], buses: vec![bus] }
+        let bus = BusName { name: "arm".into(), interface: "can3".into(), has_cable: true };
+        let servo = |protocol| ServoName { bus: 0, protocol, falls: false };
+        Names {
+            joints: vec!["pan".into(), "lift".into()],
+            buses: vec![bus],
+            servos: vec![servo("cia402"), servo("damiao")],
+        }
     }
 
     #[test]
@@ -147,8 +243,12 @@ mod tests {
                 "tracking error (rad) at joint 2 `lift`: 0.120000 against 0.050000",
             ),
             (
-                cause(FaultReason::DriveFault).at_joint(0).code(0x8611),
-                "drive fault at joint 1 `pan`: 0x8611 following error too large",
+                cause(FaultReason::DriveFault).at_joint(0).code(0x8611).amount(f64::from(0x0218), 0.0),
+                "drive fault at joint 1 `pan`: 0x8611 following error too large (status 0x0218 fault)",
+            ),
+            (
+                cause(FaultReason::DriveFault).at_joint(0).amount(f64::from(0x0218), 0.0),
+                "drive fault at joint 1 `pan`: no error code yet; status 0x0218 fault",
             ),
             (
                 refused(0x0604_0041, 0x16_0002).at_joint(1),
@@ -162,11 +262,11 @@ mod tests {
             ),
             (
                 cause(FaultReason::DriveDropped).at_joint(0).code(0x0250),
-                "drive left operation by itself (statusword) at joint 1 `pan`: 0x0250",
+                "drive left operation by itself (statusword) at joint 1 `pan`: 0x0250 switch on disabled",
             ),
             (
                 cause(FaultReason::DriveWarning).at_joint(0).code(0x12B7),
-                "drive warns (statusword) at joint 1 `pan`: 0x12b7",
+                "drive warns (statusword) at joint 1 `pan`: 0x12B7 operation enabled, warning",
             ),
             (cause(FaultReason::Operator), "fast stop by the operator"),
             (
@@ -189,6 +289,27 @@ mod tests {
         ];
         for (cause, expected) in cases {
             assert_eq!(names().fault(&cause), expected);
+        }
+    }
+
+    /// Goal: where there is no cable nobody is sent to look at one.
+    #[test]
+    fn links_without_a_cable_get_no_advice_about_cables() {
+        let mut names = names();
+        names.buses[0].has_cable = false;
+        let no_answer = Refusal { code: 0x1_0001, object: 0, numbers: [0.0; 2] };
+        let motor_gone = 0x2_0107;
+        for text in [
+            names.fault(&Cause::bus(0, BusFault::QueueFull, 3.0, 3.0)),
+            names.fault(&Cause::bus(0, BusFault::Unconfirmed, 3.0, 0.0)),
+            names.refusal(0, &no_answer),
+            names.drive_error(0, 0x1_0003),
+            names.drive_error(1, motor_gone),
+        ] {
+            for word in ["cable", "terminat", "wiring", "bit rate"] {
+                assert!(!text.contains(word), "{text}");
+            }
+            assert!(text.contains("simulated servo"), "{text}");
         }
     }
 

@@ -97,6 +97,10 @@ impl Supervisor {
                 let pose_rad = self.trusted_pose(cycle_state)?;
                 self.watch.restart(&pose_rad);
                 actions.pose_rad = Some(pose_rad);
+                if self.begins_slowly {
+                    self.speed = (self.rules.first_speed_percent / 100.0).clamp(0.0, 1.0);
+                    self.speed_chosen = false;
+                }
                 self.step(Event::EnableRequested, cycle_state, actions);
                 Ok(AnswerReason::Enabling)
             }
@@ -104,7 +108,9 @@ impl Supervisor {
             Phase::Configuring => {
                 Err(self.first_not(cycle_state, DriveState::Disabled).unwrap_or(AnswerReason::SpeedUnknown))
             }
-            Phase::Fault | Phase::FastStopping | Phase::Braking => Err(AnswerReason::ClearFirst),
+            Phase::Fault | Phase::FastStopping | Phase::Braking => {
+                Err(AnswerReason::ClearFirst { cause: self.cause() })
+            }
             Phase::Disabling => Err(AnswerReason::Wait),
             Phase::Enabling
             | Phase::Holding
@@ -210,7 +216,7 @@ impl Supervisor {
         } else if self.phase == Phase::Moving {
             Ok(AnswerReason::Already)
         } else if self.phase == Phase::Fault {
-            Err(AnswerReason::ClearFirst)
+            Err(AnswerReason::ClearFirst { cause: self.cause() })
         } else {
             Err(AnswerReason::NothingToResume)
         }

@@ -60,6 +60,15 @@ pub enum Note {
         /// Why.
         bus_fault: BusFault,
     },
+    /// A drive has sent an emergency message.
+    Emergency {
+        /// Zero-based joint.
+        joint: usize,
+        /// Its code.
+        code: u32,
+        /// Emergency messages of this drive since the note before this one, this one included.
+        count: u32,
+    },
     /// No setpoint left for longer than the drives bridge.
     Stall {
         /// How long, s.
@@ -195,6 +204,7 @@ pub struct Reporter {
     records_lost: u64,
     last_running: Running,
     noted: [NotedBus; BUSES_MAX],
+    noted_drives: [NotedDrive; MAX_JOINTS],
     counts: Report,
 }
 
@@ -205,6 +215,14 @@ struct NotedBus {
     error_frames: u64,
     tick: u64,
     failed: Option<BusFault>,
+}
+
+/// What was last noted of a drive.
+#[derive(Clone, Copy, Debug, Default)]
+struct NotedDrive {
+    emergency: u32,
+    emergencies: u32,
+    tick: u64,
 }
 
 /// The trajectory that runs or ran last.
@@ -245,6 +263,7 @@ impl Reporter {
             records_lost: 0,
             last_running: Running::default(),
             noted: [NotedBus::default(); BUSES_MAX],
+            noted_drives: [NotedDrive::default(); MAX_JOINTS],
             counts,
         }
     }
@@ -336,11 +355,31 @@ impl Reporter {
         }
     }
 
+    /// Notes emergency messages, of healthy drives too: what is new at most ten times a second, the same again once a second.
+    fn note_drives(&mut self, cycle_state: &CycleState) {
+        let second_ticks = 1_000_000_000 / self.period_ns;
+        for (joint, (servo, noted)) in cycle_state.servos.iter().zip(&mut self.noted_drives).enumerate() {
+            let (code, count) = (servo.emergency, servo.emergencies.wrapping_sub(noted.emergencies));
+            let rest_ticks = if code == noted.emergency { second_ticks } else { second_ticks / 10 };
+            let is_due =
+                noted.emergencies == 0 || cycle_state.tick.number.saturating_sub(noted.tick) >= rest_ticks;
+            if count > 0 && is_due {
+                *noted = NotedDrive {
+                    emergency: code,
+                    emergencies: servo.emergencies,
+                    tick: cycle_state.tick.number,
+                };
+                let _ = self.queues.notes.push(Note::Emergency { joint, code, count });
+            }
+        }
+    }
+
     fn write_notes(&mut self, cycle_state: &CycleState, transitions: &[Option<Transition>; TRANSITIONS_MAX]) {
         if let Some(trip) = cycle_state.trip {
             let _ = self.queues.notes.push(Note::Trip { trip, sweep_rad: cycle_state.sweep_rad });
         }
         self.note_buses(cycle_state);
+        self.note_drives(cycle_state);
         if self.stalls_now(cycle_state) {
             let _ = self
                 .queues

@@ -66,6 +66,8 @@ pub struct Supervisor {
     pub(crate) speed: f64,
     /// The speed was set since the start.
     pub(crate) speed_chosen: bool,
+    /// Each enable begins at the first speed: a joint falls when commands stop.
+    pub(crate) begins_slowly: bool,
     /// A stall froze the motion; it continues when the drives rest.
     pub(crate) stalled_since: Option<Nanos>,
     /// How long no setpoint left before it, s.
@@ -104,6 +106,7 @@ impl Supervisor {
             referencing: Referencing::new(settings),
             torque_off: false,
             speed_chosen: false,
+            begins_slowly: settings.servos.iter().any(|servo| servo.limp_risk_acknowledged),
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
             stall_gap_s: 0.0,
@@ -349,6 +352,7 @@ impl Supervisor {
     }
 
     fn evaluate_drives(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
+        self.complete_cause(cycle_state);
         // Buses that just came back are evaluated from the next cycle on.
         let failed = cycle_state.failed_bus().is_some() && cycle_state.restored.is_none();
         match self.phase {
@@ -394,7 +398,7 @@ impl Supervisor {
             let reason = match servo.state {
                 DriveState::Refused => FaultReason::ConfigurationRefused,
                 DriveState::EnergisedUnowned => FaultReason::EnergisedUnowned,
-                DriveState::Fault => FaultReason::DriveFault,
+                DriveState::Fault => return self.watch.drive_cause(cycle_state, joint),
                 DriveState::Absent
                 | DriveState::Configuring
                 | DriveState::Disabled
@@ -403,7 +407,8 @@ impl Supervisor {
                 | DriveState::Enabled
                 | DriveState::Disabling => return None,
             };
-            let cause = Cause::new(reason).at_joint(joint).code(servo.error_code);
+            let [stated, expected] = servo.refused_numbers;
+            let cause = Cause::new(reason).at_joint(joint).code(servo.error_code).amount(stated, expected);
             Some(Cause { object: servo.refused_object, ..cause })
         });
         if let Some(cause) = bad {
@@ -451,6 +456,18 @@ impl Supervisor {
         let cause = self.watch.bus_cause(cycle_state).or(lost).or_else(overdue);
         if let Some(cause) = cause {
             self.raise(Event::StopFault, cause, cycle_state, actions);
+        }
+    }
+
+    /// A drive's code may come after its statusword: by its emergency message, or when it is asked.
+    fn complete_cause(&mut self, cycle_state: &CycleState) {
+        let Some(cause) = &mut self.cause else { return };
+        let servo = cause.joint.and_then(|joint| cycle_state.servos.get(joint));
+        if let Some(servo) = servo
+            && cause.reason == FaultReason::DriveFault
+            && cause.code == 0
+        {
+            cause.code = servo.error_code;
         }
     }
 
@@ -557,8 +574,15 @@ impl Supervisor {
     }
 
     pub(crate) fn first_not(&self, cycle_state: &CycleState, state: DriveState) -> Option<AnswerReason> {
-        let mut others = self.servos(cycle_state).filter(|(_, s)| s.state != state);
-        others.next().map(|(joint, s)| AnswerReason::NotConfigured { joint, state: s.state })
+        // A drive that says what is wrong with it comes before one that is only not ready yet.
+        let not = |s: &ServoStatus| s.state != state;
+        let telling = self.servos(cycle_state).filter(|(_, s)| not(s) && s.error_code != 0);
+        let mut others = telling.chain(self.servos(cycle_state).filter(|(_, s)| not(s)));
+        others.next().map(|(joint, s)| AnswerReason::NotConfigured {
+            joint,
+            state: s.state,
+            refusal: s.refusal(),
+        })
     }
 
     /// The first drive that carries torque, or did at its last feedback.

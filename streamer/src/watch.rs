@@ -324,7 +324,7 @@ fn transport_cycles(settings: &Settings) -> [usize; MAX_JOINTS] {
 fn drive_cause(cycle_state: &CycleState, joint: usize, enabling: bool) -> Option<Cause> {
     let servo = cycle_state.servos.get(joint)?;
     let cause = |reason, code| Cause::new(reason).at_joint(joint).code(code);
-    let fault = cause(FaultReason::DriveFault, servo.error_code);
+    let fault = cause(FaultReason::DriveFault, servo.error_code).amount(f64::from(servo.status_word), 0.0);
     let dropped = cause(FaultReason::DriveDropped, servo.status_word);
     let warning = cause(FaultReason::DriveWarning, servo.status_word);
     match servo.state {

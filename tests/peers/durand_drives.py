@@ -43,7 +43,7 @@ class Drive:
 
     STATUS = {"off": 0x0240, "ready": 0x0221, "on": 0x0223, "enabled": 0x1227, "quick": 0x0207}
 
-    def __init__(self, interface, node_id, position, modes=OFFERS_CSP):
+    def __init__(self, interface, node_id, position, modes=OFFERS_CSP, scale=None):
         bus = can.Bus(interface="socketcan", channel=interface)
         self.node = MinimalNode(CANBusNetwork(bus), node_id)
         self.od, self.state = self.node.object_dictionary, "off"
@@ -60,6 +60,11 @@ class Drive:
         period = Record()
         period[1], period[2] = Variable(DT.UNSIGNED8, "rw", 1), Variable(DT.INTEGER8, "rw", -3)
         self.od[0x60C2] = period
+        # What the drive states of its scale: index to numerator and denominator. Devices need not state anything.
+        for index, (above, below) in (scale or {}).items():
+            ratio = Record()
+            ratio[1], ratio[2] = Variable(DT.UNSIGNED32, "rw", above), Variable(DT.UNSIGNED32, "rw", below)
+            self.od[index] = ratio
         self.od.update_callbacks[(0x6040, 0)].add(self.control)
         self.od.update_callbacks[(0x6060, 0)].add(lambda mode: self.od.write(0x6061, 0, mode))
         self.od.update_callbacks[(0x607A, 0)].add(self.target)
@@ -155,7 +160,8 @@ def drives(interface, **of_third):
 
 def moves_them(arm, interface):
     """Enable, two plans, disable: the devices are where the goals are."""
-    devices = drives(interface)
+    # Five state no scale; the third states the one of the settings, in other numbers.
+    devices = drives(interface, scale={0x608F: (262144, 2), 0x6091: (202, 2), 0x6092: (101 * 131072, 1)})
     check("ready" in arm.start("taustream-streamer", "--link", "socketcan").stdout.readline(), "streamer")
     check("ready" in arm.start("taustream-planner").stdout.readline(), "planner")
     arm.await_status("configured drives", lambda s: s["phase"] == "disabled")
@@ -196,7 +202,7 @@ def is_refused(arm, devices, words):
 
 
 def main():
-    """A motion, and two refusals."""
+    """A motion, and four refusals."""
     programs, settings = sys.argv[1:3]
     interface = sys.argv[3] if len(sys.argv) > 3 else "vcan0"
     # A PDO that is switched off hears SYNC all the same in durand, and complains of it.
@@ -208,6 +214,8 @@ def main():
     try:
         moves_them(arm, interface)
         is_refused(arm, drives(interface, modes=1), ("elbow", "0x6502", "cyclic synchronous position"))
+        is_refused(arm, drives(interface, scale={0x6091: (50, 1)}), ("elbow", "0x6091", "50", "101"))
+        is_refused(arm, drives(interface, scale={0x608F: (131072, 0)}), ("elbow", "0x608F", "zero"))
         devices = drives(interface)
         devices[4].refuse(0x1600, 2)
         is_refused(arm, devices, ("wrist_2", "0x1600:02", "0x08000020"))

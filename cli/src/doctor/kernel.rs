@@ -48,6 +48,8 @@ fn can(s: &Subject) -> Finding {
         s.settings.as_ref().is_some_and(|settings| settings.buses.iter().all(|b| b.kind == BusKind::Virtual));
     if only_virtual {
         let what = format!("{what}; the buses of these settings are virtual and can use the local link");
+        let remedy =
+            format!("start streamer and taustream-servosim with --link local; for a real arm, {remedy}");
         return Finding::warning(NAME, what, remedy);
     }
     Finding::problem(NAME, what, remedy)

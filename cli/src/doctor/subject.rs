@@ -31,15 +31,26 @@ impl Subject {
         self.settings.as_ref().and_then(|s| s.cycle.cpu)
     }
 
-    /// The process whose rights count: a running streamer, else this one, which asks for the user. Its directory in
-    /// /proc, and who it is as text.
+    /// The process whose rights count: a running streamer of this user, else this one, which asks for the user. Its directory
+    /// in /proc, and who it is as text. Another user's streamer says nothing of what this user may.
     pub(crate) fn process(&self) -> (String, String) {
-        let streamer =
-            self.processes().find(|(_, name)| STREAMER.starts_with(name) && name.len() >= COMM_MAX);
-        match streamer {
-            Some((pid, _)) => (format!("proc/{pid}"), format!("the running {STREAMER} (process {pid})")),
-            None => ("proc/self".to_owned(), "this user".to_owned()),
+        let is_streamer = |name: &str| STREAMER.starts_with(name) && name.len() >= COMM_MAX;
+        let streamers: Vec<u32> =
+            self.processes().filter(|(_, name)| is_streamer(name)).map(|(pid, _)| pid).collect();
+        if let Some(pid) = streamers.iter().find(|pid| self.owner(**pid) == Some(self.uid)) {
+            return (format!("proc/{pid}"), format!("the running {STREAMER} (process {pid})"));
         }
+        let others = streamers.first().map_or_else(String::new, |pid| {
+            format!(" (the running {STREAMER}, process {pid}, is another user's)")
+        });
+        ("proc/self".to_owned(), format!("this user{others}"))
+    }
+
+    /// The user that a process acts as.
+    fn owner(&self, pid: u32) -> Option<u32> {
+        let status = self.tree.text(&format!("proc/{pid}/status"))?;
+        let ids = status.lines().find_map(|line| line.strip_prefix("Uid:"))?;
+        ids.split_whitespace().nth(1)?.parse().ok()
     }
 
     /// `SCHED_FIFO` or `SCHED_RR` priority of a process; 0 for an ordinary one.

@@ -344,10 +344,19 @@ fn rights_are_those_of_a_running_streamer_else_of_the_user() {
     // Capabilities make up for both.
     computer.write("proc/self/status", "CapEff:\t0000000000804000\n");
     assert!(computer.findings().iter().all(|f| f.grade == Grade::Ok), "{:?}", computer.findings());
-    // A streamer that runs has its own.
+    // A streamer that runs has its own, but only this user's says anything of what this user may.
     computer.write("proc/500/comm", "taustream-strea\n");
     computer.write("proc/500/limits", LIMITS);
     computer.write("proc/self/status", "CapEff:\t0\n");
+    let uid = computer.subject.uid;
+    computer.write("proc/500/status", &format!("Uid:\t{uid}\t{}\t{uid}\t{uid}\n", uid + 1));
+    let others = computer.findings();
+    let priority = others.iter().find(|f| f.name == "real-time priority").unwrap();
+    assert!(
+        priority.grade == Grade::Problem && priority.what.contains("process 500, is another user's"),
+        "{priority}"
+    );
+    computer.write("proc/500/status", &format!("Uid:\t{uid}\t{uid}\t{uid}\t{uid}\n"));
     computer.finds("real-time priority", Grade::Ok, &["process 500", "99"]);
 }
 

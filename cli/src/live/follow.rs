@@ -166,7 +166,7 @@ mod tests {
     }
 
     fn arm() -> ArmName {
-        ArmName { name: "a".into(), joints: Vec::new(), buses: Vec::new() }
+        ArmName { name: "a".into(), ..ArmName::default() }
     }
 
     fn walk(steps: &[(Report, Phase)]) -> Result<Option<Executed>, String> {

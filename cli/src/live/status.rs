@@ -26,6 +26,10 @@ struct JointStatus {
     feedback_age_s: f64,
     drive_status: u32,
     drive_error: u32,
+    /// The status word as text.
+    drive_status_text: String,
+    /// The error code as text; null when there is none.
+    drive_error_text: Option<String>,
     /// It is referenced; only then it may be energised.
     referenced: bool,
     reference: &'static str,
@@ -193,6 +197,7 @@ fn paused(r: &Report) -> Option<PauseStatus> {
 fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
     let at = |array: &[f64], joint: usize| array.get(joint).copied().unwrap_or(f64::NAN);
     let word = |array: &[u32], joint: usize| array.get(joint).copied().unwrap_or(0);
+    let names = arm.names();
     (0..r.joints())
         .map(|j| JointStatus {
             name: arm.joints.get(j).cloned().unwrap_or_else(|| format!("joint{}", j + 1)),
@@ -207,6 +212,10 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
             feedback_age_s: at(&r.feedback_age_s, j),
             drive_status: word(&r.drive_status, j),
             drive_error: word(&r.drive_error, j),
+            drive_status_text: names.status_word(j, word(&r.drive_status, j)),
+            drive_error_text: Some(word(&r.drive_error, j))
+                .filter(|code| *code != 0)
+                .map(|code| names.error_code(j, code)),
             referenced: ReferenceState::from_code(word(&r.reference_state, j)).is_referenced(),
             reference: ReferenceState::from_code(word(&r.reference_state, j)).word(),
         })
@@ -319,16 +328,19 @@ impl fmt::Display for Status {
         for j in &self.joints {
             writeln!(
                 f,
-                "  {:<18} {:>12.6}  {:>14.6}  {:>21.3}  {:>7.3}  {:>17.1}  {:#06x}{}",
+                "  {:<18} {:>12.6}  {:>14.6}  {:>21.3}  {:>7.3}  {:>17.1}  {}",
                 j.name,
                 j.command_rad,
                 j.measured_rad,
                 j.tracking_error_rad * 1e3,
                 j.tracking_error_rad_max * 1e3,
                 j.feedback_age_s * 1e3,
-                j.drive_status,
-                if j.drive_error == 0 { String::new() } else { format!(" error {:#06x}", j.drive_error) }
+                j.drive_status_text
             )?;
+        }
+        for (joint, error) in self.joints.iter().filter_map(|j| Some((&j.name, j.drive_error_text.as_ref()?)))
+        {
+            writeln!(f, "drive of joint {joint}: {error}")?;
         }
         for b in &self.buses {
             write!(f, "{b}")?;

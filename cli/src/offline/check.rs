@@ -113,6 +113,7 @@ struct ServoLine {
     own: ProtocolLine,
     zero_offset_rad: f64,
     limp_is_safe: bool,
+    limp_risk_acknowledged: bool,
     /// What the drive does when setpoints stop coming.
     reaction: &'static str,
     /// What the feedback knows after power-up.
@@ -131,6 +132,7 @@ struct CheckedSettings {
     period_us: u32,
     priority: u8,
     cpu: Option<usize>,
+    first_speed_percent: f64,
     buses: Vec<BusTable>,
     servos: Vec<ServoLine>,
 }
@@ -146,6 +148,7 @@ impl CheckedSettings {
             own: ProtocolLine(servo.protocol),
             zero_offset_rad: servo.zero_offset_rad,
             limp_is_safe: servo.limp_is_safe,
+            limp_risk_acknowledged: servo.limp_risk_acknowledged,
             reaction: servo.reaction.word(),
             feedback: servo.feedback.word(),
             feedback_range_rad: servo.feedback_range_rad,
@@ -160,6 +163,7 @@ impl CheckedSettings {
             period_us: settings.cycle.period_us,
             priority: settings.cycle.priority,
             cpu: settings.cycle.cpu,
+            first_speed_percent: settings.supervision.first_speed_percent,
             buses: buses.filter_map(|(i, bus)| BusTable::of(settings, i, bus)).collect(),
             servos: settings.servos.iter().map(line).collect(),
         }
@@ -195,6 +199,16 @@ impl fmt::Display for CheckedSettings {
             if !joints.is_empty() {
                 writeln!(f, "    {}: {}: each {}", reaction.word(), joints.join(", "), reaction.sentence())?;
             }
+        }
+        let falls = |s: &&ServoLine| s.limp_risk_acknowledged;
+        let falling: Vec<&str> = self.servos.iter().filter(falls).map(|s| s.joint.as_str()).collect();
+        if !falling.is_empty() {
+            writeln!(
+                f,
+                "  RISK ACKNOWLEDGED: {} FALL then, without a brake; each enable says so and begins at {} % speed",
+                falling.join(", "),
+                self.first_speed_percent
+            )?;
         }
         writeln!(f, "  after power-up, the multi-turn offset of a joint is known:")?;
         for s in &self.servos {

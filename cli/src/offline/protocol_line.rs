@@ -1,7 +1,7 @@
 //! What `check` prints of a servo that is its protocol's own.
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
-use taustream_arm::{DamiaoMode, Protocol};
+use taustream_arm::{DamiaoMode, Protocol, ScaleObject};
 
 /// A protocol's own numbers, under the keys of the settings file in JSON and as a sentence on the screen.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ impl Serialize for ProtocolLine {
             Protocol::Cia402(cia402) => {
                 map.serialize_entry("gear_ratio", &cia402.gear_ratio)?;
                 map.serialize_entry("counts_per_rev", &cia402.counts_per_rev)?;
+                let overruled: Vec<u16> = cia402.overruled.objects().map(ScaleObject::index).collect();
+                map.serialize_entry("overruled_objects", &overruled)?;
             }
             Protocol::Damiao(damiao) => {
                 map.serialize_entry("feedback_id", &damiao.feedback_id)?;
@@ -40,7 +42,11 @@ impl fmt::Display for ProtocolLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
             Protocol::Cia402(cia402) => {
-                write!(f, "gear {}, {} counts/rev", cia402.gear_ratio, cia402.counts_per_rev)
+                write!(f, "gear {}, {} counts/rev", cia402.gear_ratio, cia402.counts_per_rev)?;
+                for object in cia402.overruled.objects() {
+                    write!(f, ", 0x{:04X} ({}) of the drive NOT COMPARED", object.index(), object.name())?;
+                }
+                Ok(())
             }
             Protocol::Damiao(damiao) => {
                 write!(f, "feedback 0x{:03X}, ", damiao.feedback_id)?;

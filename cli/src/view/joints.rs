@@ -44,7 +44,8 @@ impl Column {
 
     fn width(self) -> usize {
         match self {
-            Self::Name | Self::PositionBar | Self::Drive => 15,
+            Self::Name | Self::PositionBar => 15,
+            Self::Drive => 26,
             Self::Commanded | Self::Measured | Self::Velocity => 10,
             Self::Error => 12,
             Self::ErrorBar => 9,
@@ -80,10 +81,11 @@ impl Column {
             Self::PositionBar => row.scaled(|s| position(row.measured_rad, s.position_rad, cells, row.ink)),
             Self::ErrorBar => row.scaled(|s| signed(row.error_rad, s.error_rad_max, cells, row.ink)),
             Self::VelocityBar => row.scaled(|s| signed(row.velocity_rad_s, s.velocity_rad_s, cells, row.ink)),
-            Self::Drive if row.drive_error == 0 => {
-                Span::new(format!("{:#06x}", row.drive_status), Tone::Quiet)
+            // What the error is stands below the table.
+            Self::Drive => {
+                let tone = if row.has_error { Tone::Bad } else { Tone::Quiet };
+                Span::new(row.drive_status.clone(), tone)
             }
-            Self::Drive => Span::new(format!("ERROR {:#06x}", row.drive_error), Tone::Bad),
         }
     }
 
@@ -117,8 +119,8 @@ struct Row<'a> {
     measured_rad: f64,
     error_rad: f64,
     velocity_rad_s: f64,
-    drive_status: u32,
-    drive_error: u32,
+    drive_status: String,
+    has_error: bool,
     scale: Option<&'a JointScale>,
     ink: Ink,
 }
@@ -135,6 +137,7 @@ pub(super) fn table(r: &Report, arm: &ArmName, scale: Option<&Scale>, columns: u
     let shown = shown(columns, scale.is_some());
     let heading: String = shown.iter().map(|c| c.fit(c.heading())).collect();
     let mut lines = vec![Line::of(format!("  {heading}"), Tone::Quiet)];
+    let names = arm.names();
     for joint in 0..r.joints() {
         let at = |array: &[f64]| array.get(joint).copied().unwrap_or(f64::NAN);
         let word = |array: &[u32]| array.get(joint).copied().unwrap_or(0);
@@ -144,8 +147,8 @@ pub(super) fn table(r: &Report, arm: &ArmName, scale: Option<&Scale>, columns: u
             measured_rad: at(&r.measured_rad),
             error_rad: at(&r.tracking_error_rad),
             velocity_rad_s: at(&r.command_velocity_rad_s),
-            drive_status: word(&r.drive_status),
-            drive_error: word(&r.drive_error),
+            drive_status: names.status_word(joint, word(&r.drive_status)),
+            has_error: word(&r.drive_error) != 0,
             scale: scale.and_then(|s| s.joints.get(joint)),
             ink,
         };

@@ -55,6 +55,7 @@ impl Picture {
         lines.extend(self.fault(r, phase).wrapped(columns));
         lines.push(Line::default());
         lines.extend(table(r, &self.arm, self.scale.as_ref(), columns, self.ink));
+        lines.extend(drive_errors(r, &self.arm).map(|error| Line::of(error, Tone::Bad)));
         lines.push(Line::default());
         lines.extend(self.buses(r));
         lines.push(frames(r, before));
@@ -124,6 +125,14 @@ impl Picture {
     }
 }
 
+/// What each drive that has an error says.
+fn drive_errors(r: &Report, arm: &ArmName) -> impl Iterator<Item = String> {
+    let names = arm.names();
+    let codes: Vec<u32> = r.drive_error.iter().copied().take(r.joints()).collect();
+    let errors = codes.into_iter().enumerate().filter(|(_, code)| *code != 0);
+    errors.map(move |(joint, code)| names.drive_error(joint, code))
+}
+
 fn tone_of(phase: Phase) -> Tone {
     match phase {
         Phase::Holding | Phase::Moving => Tone::Good,
@@ -187,8 +196,10 @@ fn timing(r: &Report) -> [Line; 2] {
 pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
     let angle = |q: &f64| if q.is_finite() { format!("{q:+.3}") } else { "-".to_owned() };
     let pose: Vec<String> = r.measured_rad.iter().take(r.joints()).map(angle).collect();
+    // The fault names the drive that is to blame; without one, the drives speak for themselves.
     let fault = if r.fault_reason == 0 {
-        pause_sentence(r).map_or_else(String::new, |text| format!("  {text}"))
+        let said = pause_sentence(r).or_else(|| drive_errors(r, arm).next());
+        said.map_or_else(String::new, |text| format!("  {text}"))
     } else {
         format!("  FAULT: {}", fault_sentence(r, arm))
     };
@@ -211,7 +222,7 @@ mod tests {
     use taustream_messages::{BusFault, Cause, FaultReason};
 
     fn arm() -> ArmName {
-        ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], buses: Vec::new() }
+        ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], ..ArmName::default() }
     }
 
     fn scale() -> Scale {

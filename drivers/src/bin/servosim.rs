@@ -14,7 +14,7 @@ use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
 use taustream_drivers::sim::serve::{StandardInput, serve};
 use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{FaultRequest, LinkedSimulator, ServoSimulator, priority};
+use taustream_drivers::sim::{FaultRequest, LinkedSimulator, ServoSimulator, planted, priority};
 use taustream_drivers::{Nanos, link};
 
 fn main() -> ExitCode {
@@ -39,7 +39,10 @@ fn fail(error: &anyhow::Error, code: u8) -> ExitCode {
 fn prepare(args: &Arguments) -> anyhow::Result<(Settings, LinkedSimulator)> {
     let settings = Settings::load(&taustream_arm::find(Kind::Settings, &args.settings)?)?;
     let start_rad = args.start_rad.as_deref().map(|text| angles(text, &settings)).transpose()?;
-    let setups = drives(&settings, start_rad.as_deref())?;
+    let mut setups = drives(&settings, start_rad.as_deref())?;
+    for text in &args.objects {
+        planted::plant(text, &mut setups).with_context(|| format!("--object {text}"))?;
+    }
     let mut simulator = ServoSimulator::new(setups, settings.buses.len(), args.seed);
     let joints = simulator.joints();
     for text in &args.faults {

@@ -4,6 +4,7 @@
 //! would have written says what it would have written, and the drive's own target rests. Nothing is written here.
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::plan::{Check, NodePlan, Step};
+use crate::bring_up::scale::{Contradiction, ExpectedScale, StatedScale};
 use crate::codec::cia402_words::DriveStep;
 use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX};
 use crate::codec::object::{self, Address};
@@ -14,7 +15,7 @@ use crate::servo::Nanos;
 const REST: Nanos = Nanos(100_000_000);
 
 /// What an answer has brought.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Finding {
     /// More is to be read.
     More,
@@ -22,6 +23,8 @@ pub(crate) enum Finding {
     Holds(i32),
     /// Not ours: why, and the object that says so.
     Foreign(BringUpFault, u32),
+    /// Not as the settings say: it counts otherwise.
+    Differs(Contradiction),
     /// It does not answer.
     NoReply,
 }
@@ -37,13 +40,24 @@ pub(crate) struct Adoption {
     source: usize,
     held: Option<i32>,
     not_before: Nanos,
+    expected: ExpectedScale,
+    stated: StatedScale,
 }
 
 impl Adoption {
     /// A reading for a node of this plan.
     pub(crate) fn new(plan: &NodePlan) -> Self {
         let sources = [object::POSITION_DEMAND, object::POSITION_ACTUAL];
-        Self { steps: plan.verification(), at: 0, sources, source: 0, held: None, not_before: Nanos(0) }
+        Self {
+            steps: plan.verification(),
+            at: 0,
+            sources,
+            source: 0,
+            held: None,
+            not_before: Nanos(0),
+            expected: plan.scale,
+            stated: StatedScale::default(),
+        }
     }
 
     /// Begins again with a drive in this state; `false` for a state in which nothing is held.
@@ -51,6 +65,7 @@ impl Adoption {
     /// Real time: no allocation.
     pub(crate) fn begin(&mut self, state: Option<DriveStep>) -> bool {
         (self.at, self.source, self.held, self.not_before) = (0, 0, None, Nanos(0));
+        self.stated = StatedScale::default();
         // A drive without the demand object holds its last target while it is enabled, and where it stands after a stop.
         let second = match state {
             Some(DriveStep::OperationEnabled) => object::TARGET_POSITION,
@@ -78,7 +93,7 @@ impl Adoption {
         let value = match outcome {
             SdoOutcome::Value(value) => value,
             SdoOutcome::TimedOut => return Finding::NoReply,
-            SdoOutcome::Aborted(code) => return self.missing(code, object),
+            SdoOutcome::Aborted(code) => return self.missing(code, job.address()),
             SdoOutcome::Written => return Finding::More,
         };
         let Some(step) = self.steps.get(self.at) else {
@@ -87,12 +102,21 @@ impl Adoption {
                 None => Finding::Foreign(BringUpFault::WrongWidth, object),
             };
         };
+        if step.check == Check::Scale {
+            return match value.as_unsigned_of_any_width() {
+                Some(number) => self.scale(job.address(), Some(number)),
+                None => Finding::Foreign(BringUpFault::WrongWidth, object),
+            };
+        }
         let fits = value.as_unsigned(step.width).is_some_and(|number| match step.check {
             Check::Equals { value, mask } => number & mask == value & mask,
             Check::Profile402 => number & 0xFFFF == u32::from(object::PROFILE_402),
-            Check::Present | Check::OffersCsp | Check::NotEnergised | Check::BecomesCsp | Check::Position => {
-                true
-            }
+            Check::Present
+            | Check::OffersCsp
+            | Check::NotEnergised
+            | Check::BecomesCsp
+            | Check::Position
+            | Check::Scale => true,
         });
         if !fits {
             return Finding::Foreign(BringUpFault::Foreign, object);
@@ -101,12 +125,21 @@ impl Adoption {
         Finding::More
     }
 
-    fn missing(&mut self, code: u32, object: u32) -> Finding {
+    fn scale(&mut self, address: Address, value: Option<u32>) -> Finding {
+        self.at += 1;
+        match self.stated.take(address, value, &self.expected) {
+            Ok(()) => Finding::More,
+            Err(contradiction) => Finding::Differs(contradiction),
+        }
+    }
+
+    fn missing(&mut self, code: u32, address: Address) -> Finding {
         let absent = matches!(code, ABORT_NO_OBJECT | ABORT_NO_SUBINDEX);
         match self.steps.get(self.at) {
+            Some(step) if absent && step.check == Check::Scale => return self.scale(address, None),
             Some(step) if absent && step.optional => self.at += 1,
             None if absent && self.source + 1 < self.sources.len() => self.source += 1,
-            _ => return Finding::Foreign(BringUpFault::Foreign, object),
+            _ => return Finding::Foreign(BringUpFault::Foreign, address.packed()),
         }
         Finding::More
     }

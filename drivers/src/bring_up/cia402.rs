@@ -5,15 +5,16 @@
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::plan::{Check, HEARTBEAT_LOST_MS, NodePlan, Step};
+use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan, Step};
 use crate::bring_up::power::{Power, Received, TargetSource};
+use crate::bring_up::scale::StatedScale;
 use crate::bring_up::timing::{BringUpCycle, Timeouts};
 use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
-use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_ENERGISED, STATUS_WARNING};
-use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT, EMCY_HEARTBEAT};
+use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_WARNING};
+use crate::codec::emcy::{HEARTBEAT, RESET};
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
-use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
+use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome};
 use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// How long a boot-up may take.
@@ -31,6 +32,8 @@ const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
 const START_TRIES: u8 = 3;
 /// Heartbeats in a row that deny "operational" before it is believed: one may have been queued before the start.
 const DENIALS_MAX: u8 = 2;
+
+pub(super) const SCALE_DIFFERS: u32 = BringUpFault::ScaleDiffers.code();
 
 /// State of the bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,8 +93,8 @@ pub struct Target {
 #[derive(Clone, Debug)]
 pub struct Node {
     pub(super) plan: NodePlan,
-    steps: Vec<Step>,
-    timeouts: Timeouts,
+    pub(super) steps: Vec<Step>,
+    pub(super) timeouts: Timeouts,
     pub(super) stage: NodeStage,
     pub(super) sdo: SdoClient,
     pub(super) adoption: Adoption,
@@ -101,13 +104,18 @@ pub struct Node {
     last_target: DriveTarget,
     pub(super) received: bool,
     pub(super) status: u16,
-    position: Option<i32>,
+    pub(super) position: Option<i32>,
     commanded: Option<i32>,
     tpdo_at: Nanos,
     heartbeat_at: Nanos,
     denials: u8,
     emcy: u16,
+    /// The newest emergency message that was no "error reset", and how many came.
+    emergency: (u16, u32),
     requested_error: bool,
+    pub(super) stated: StatedScale,
+    /// What the drive states of the object that contradicts the settings, and what they say.
+    pub(super) numbers: [f64; 2],
 }
 
 impl Node {
@@ -133,7 +141,10 @@ impl Node {
             heartbeat_at: Nanos(0),
             denials: 0,
             emcy: 0,
+            emergency: (0, 0),
             requested_error: false,
+            stated: StatedScale::default(),
+            numbers: [0.0; 2],
         }
     }
 
@@ -173,7 +184,7 @@ impl Node {
     /// The drive says, or shows by leaving NMT operational, that it has lost its master.
     #[must_use]
     pub fn lost_master(&self) -> bool {
-        self.emcy == EMCY_HEARTBEAT || self.stage == NodeStage::Gone(BringUpFault::LeftOperational)
+        self.emcy == HEARTBEAT || self.stage == NodeStage::Gone(BringUpFault::LeftOperational)
     }
 
     /// Where the drive is.
@@ -215,6 +226,15 @@ impl Node {
             | NodeStage::Reset { .. }
             | NodeStage::Configure { .. }
             | NodeStage::Start { .. } => (emcy, 0),
+        }
+    }
+
+    /// The numbers that belong to a contradiction of the drive's scale; 0 where there is none.
+    #[must_use]
+    pub fn refused_numbers(&self) -> [f64; 2] {
+        match self.error().0 {
+            SCALE_DIFFERS => self.numbers,
+            _ => [0.0; 2],
         }
     }
 
@@ -347,6 +367,15 @@ impl Node {
     pub fn take_emcy(&mut self, emcy: Emcy) {
         self.received = true;
         self.emcy = emcy.code;
+        if emcy.code != RESET {
+            self.emergency = (emcy.code, self.emergency.1.wrapping_add(1));
+        }
+    }
+
+    /// Code of the newest emergency message, "error reset" not counted, and how many came.
+    #[must_use]
+    pub const fn emergency(&self) -> (u16, u32) {
+        self.emergency
     }
 
     /// Takes a heartbeat or boot-up.
@@ -555,68 +584,6 @@ impl Node {
             | NodeStage::Operational { .. }
             | NodeStage::Gone(_)
             | NodeStage::Refused { .. } => {}
-        }
-    }
-
-    fn settle_step(&mut self, now: Nanos, outcome: SdoOutcome, at: (usize, Nanos)) {
-        let (index, since) = at;
-        let Some(step) = self.steps.get(index).copied() else { return };
-        match outcome {
-            SdoOutcome::Written => self.next_step(now, index),
-            SdoOutcome::Aborted(ABORT_NO_OBJECT | ABORT_NO_SUBINDEX) if step.optional => {
-                self.next_step(now, index);
-            }
-            SdoOutcome::Aborted(code) => self.refuse(code, step.job),
-            SdoOutcome::TimedOut => self.refuse(ABORT_TIMEOUT, step.job),
-            SdoOutcome::Value(value) => match self.check_value(now, step, since, value) {
-                Ok(true) => self.next_step(now, index),
-                Ok(false) => {}
-                Err(fault) => self.refuse(fault.code(), step.job),
-            },
-        }
-    }
-
-    fn next_step(&mut self, now: Nanos, index: usize) {
-        self.stage = NodeStage::Configure { step: index + 1, since: now };
-    }
-
-    /// Whether the value lets the plan continue; false asks again, or the stage has changed.
-    fn check_value(
-        &mut self,
-        now: Nanos,
-        step: Step,
-        since: Nanos,
-        value: SdoValue,
-    ) -> Result<bool, BringUpFault> {
-        let Some(number) = value.as_unsigned(step.width) else { return Err(BringUpFault::WrongWidth) };
-        match step.check {
-            Check::Present => Ok(true),
-            Check::Profile402 if number & 0xFFFF == u32::from(object::PROFILE_402) => Ok(true),
-            Check::Profile402 => Err(BringUpFault::NotCia402),
-            Check::OffersCsp if number & object::SUPPORTS_CSP != 0 => Ok(true),
-            Check::OffersCsp => Err(BringUpFault::NoCsp),
-            Check::NotEnergised => {
-                self.status = (number & 0xFFFF) as u16;
-                if self.status & STATUS_ENERGISED == 0 {
-                    return Ok(true);
-                }
-                self.stage = NodeStage::Unowned { next: now, fault: BringUpFault::Foreign, object: 0 };
-                Ok(false)
-            }
-            Check::BecomesCsp if number == u32::from(object::MODE_CSP.cast_unsigned()) => Ok(true),
-            Check::BecomesCsp if self.age(now, since) < self.timeouts.step.0 => Ok(false),
-            Check::BecomesCsp => Err(BringUpFault::ModeNotTaken),
-            Check::Position => {
-                self.position = Some(number.cast_signed());
-                Ok(true)
-            }
-            Check::Equals { value, mask } => {
-                if number & mask == value & mask {
-                    Ok(true)
-                } else {
-                    Err(BringUpFault::Foreign)
-                }
-            }
         }
     }
 }

@@ -97,8 +97,31 @@ pub const fn differs(register: Register, value: [u8; 4]) -> (u32, u32) {
 /// The sentence for one of these codes; `None` for another protocol's.
 #[must_use]
 pub fn explain(code: u32) -> Option<String> {
+    explain_on(code, true)
+}
+
+/// The same, on a link that has a cable or none.
+#[must_use]
+pub fn explain_on(code: u32, has_cable: bool) -> Option<String> {
     if let Some(fault) = DamiaoFault::ALL.into_iter().find(|fault| fault.code() == code) {
-        return Some(fault.sentence().to_owned());
+        let sentence = match fault {
+            DamiaoFault::NoAnswer if !has_cable => {
+                "the motor does not answer; see that its simulated servo runs on this bus, and its node_id and feedback_id \
+                 in the settings"
+            }
+            DamiaoFault::NoReply if !has_cable => {
+                "the motor fell silent; see that its simulated servo still runs"
+            }
+            DamiaoFault::NoAnswer
+            | DamiaoFault::NoRegister
+            | DamiaoFault::OtherMaster
+            | DamiaoFault::EnableTimeout
+            | DamiaoFault::CommandFar
+            | DamiaoFault::DroppedOut
+            | DamiaoFault::NoReply
+            | DamiaoFault::Restarted => fault.sentence(),
+        };
+        return Some(sentence.to_owned());
     }
     let status = u8::try_from(code.checked_sub(BASE)?).ok().filter(|status| *status <= 0xF)?;
     Some(format!("status {status:X}: {}", status_words(status)))

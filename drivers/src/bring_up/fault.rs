@@ -3,7 +3,10 @@
 //! [`crate::ServoStatus::error_code`] holds kinds of codes that do not overlap: emergency codes (up to 0xFFFF), these
 //! (0x1 0000 to 0x1 FFFF), those of Damiao motors (0x2 0000 to 0x2 FFFF), and SDO abort codes (from 0x503 0000).
 use crate::bring_up::damiao_fault as damiao;
-use crate::codec::{error_text, object};
+use crate::bring_up::scale;
+use crate::codec::cia402_words::{DriveStep, STATUS_WARNING};
+use crate::codec::damiao_frames::status_words;
+use crate::codec::{emcy, error_text, object};
 
 /// A finding of the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,11 +46,13 @@ pub enum BringUpFault {
     OtherMaster = 0x0001_0010,
     /// It is energised with a configuration that is not this master's.
     Foreign = 0x0001_0011,
+    /// An object that states its scale, direction or range contradicts the settings.
+    ScaleDiffers = 0x0001_0012,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -65,6 +70,7 @@ impl BringUpFault {
         Self::WrongWidth,
         Self::OtherMaster,
         Self::Foreign,
+        Self::ScaleDiffers,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -102,19 +108,72 @@ impl BringUpFault {
                 "the drive is energised, and not as this arm's settings would have left it; end the program that uses \
                  it, or support the arm and `torque-off`"
             }
+            Self::ScaleDiffers => {
+                "what the drive states about its scale, direction or range contradicts the settings; correct the one that \
+                 is wrong"
+            }
         }
     }
 }
 
+/// What to do about a silent node where there is no cable; `None` where the usual sentence serves.
+const fn unwired(fault: BringUpFault) -> Option<&'static str> {
+    match fault {
+        BringUpFault::NoAnswer => Some(
+            "the drive does not answer; see that its simulated servo runs on this bus, and its node id in the settings",
+        ),
+        BringUpFault::HeartbeatLost => {
+            Some("the drive's heartbeat stopped; see that its simulated servo still runs")
+        }
+        BringUpFault::NoBootUp
+        | BringUpFault::Restarted
+        | BringUpFault::LeftOperational
+        | BringUpFault::NotOperational
+        | BringUpFault::NotCia402
+        | BringUpFault::NoCsp
+        | BringUpFault::ModeNotTaken
+        | BringUpFault::EnableTimeout
+        | BringUpFault::CommandFar
+        | BringUpFault::DroppedOut
+        | BringUpFault::QuickStopped
+        | BringUpFault::NotFollowing
+        | BringUpFault::WrongWidth
+        | BringUpFault::OtherMaster
+        | BringUpFault::Foreign
+        | BringUpFault::ScaleDiffers => None,
+    }
+}
+
+/// A configuration step that was refused, and what proves it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refusal {
+    /// As [`crate::ServoStatus::error_code`].
+    pub code: u32,
+    /// As [`crate::ServoStatus::refused_object`].
+    pub object: u32,
+    /// What the drive states and what the settings say; 0 where there are no such numbers.
+    pub numbers: [f64; 2],
+}
+
 /// Which object was refused and why: "object 0x1600:02: SDO abort 0x06040041 object cannot be mapped into a PDO".
-///
-/// `object` is [`crate::ServoStatus::refused_object`]; 0 when no object is to blame.
 #[must_use]
-pub fn explain_refusal(code: u32, object: u32) -> String {
+pub fn explain_refusal(refusal: &Refusal) -> String {
+    explain_refusal_on(refusal, true)
+}
+
+/// The same, on a link that has a cable or none.
+#[must_use]
+pub fn explain_refusal_on(refusal: &Refusal, has_cable: bool) -> String {
+    let Refusal { code, object, numbers: [stated, expected] } = *refusal;
     if object == 0 {
-        return explain(code);
+        return explain_on(code, has_cable);
     }
     if let Some(sentence) = damiao::explain_refusal(code, object) {
+        return sentence;
+    }
+    if code == BringUpFault::ScaleDiffers.code()
+        && let Some(sentence) = scale::sentence(object, stated, expected)
+    {
         return sentence;
     }
     let (index, sub) = (object >> 8, object & 0xFF);
@@ -130,14 +189,59 @@ pub fn explain_refusal(code: u32, object: u32) -> String {
 /// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.
 #[must_use]
 pub fn explain(code: u32) -> String {
+    explain_on(code, true)
+}
+
+/// The same, on a link that has a cable or none.
+#[must_use]
+pub fn explain_on(code: u32, has_cable: bool) -> String {
     if let Some(fault) = BringUpFault::ALL.into_iter().find(|fault| fault.code() == code) {
-        return fault.sentence().to_owned();
+        let without_cable = unwired(fault).filter(|_| !has_cable);
+        return without_cable.unwrap_or_else(|| fault.sentence()).to_owned();
     }
-    if let Some(sentence) = damiao::explain(code) {
+    if let Some(sentence) = damiao::explain_on(code, has_cable) {
         return sentence;
     }
     match u16::try_from(code) {
-        Ok(emcy) => format!("0x{emcy:04X} {}", error_text::emcy(emcy)),
+        Ok(code) => format!("0x{code:04X} {}", emcy::words(code)),
         Err(_) => format!("SDO abort 0x{code:08X} {}", error_text::sdo_abort(code)),
+    }
+}
+
+/// A drive's status word in words, by the name of its protocol: "0x0218 fault".
+#[must_use]
+pub fn explain_status(protocol: Option<&str>, word: u32) -> String {
+    match protocol {
+        Some("cia402") => {
+            let status = (word & 0xFFFF) as u16;
+            let step = DriveStep::from_status(status).map_or("no state of CiA 402", DriveStep::word);
+            let warning = if status & STATUS_WARNING == 0 { "" } else { ", warning" };
+            format!("0x{status:04X} {step}{warning}")
+        }
+        Some("damiao") => {
+            let status = (word & 0xF) as u8;
+            let words = status_words(status).split(';').next().unwrap_or_default();
+            format!("{status:X} {words}")
+        }
+        Some(_) | None => format!("0x{word:04X}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn status_words_are_told_by_protocol() {
+        for (protocol, word, expected) in [
+            (Some("cia402"), 0x0250, "0x0250 switch on disabled"),
+            (Some("cia402"), 0x12B7, "0x12B7 operation enabled, warning"),
+            (Some("cia402"), 0x0218, "0x0218 fault"),
+            (Some("damiao"), 0x1E_1E01, "1 enabled"),
+            (Some("damiao"), 0x1E_1E09, "9 under-voltage"),
+            (None, 0x0218, "0x0218"),
+        ] {
+            assert_eq!(explain_status(protocol, word), expected);
+        }
     }
 }

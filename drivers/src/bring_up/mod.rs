@@ -3,6 +3,7 @@
 //! State machines without I/O, advanced once a cycle by their protocol's driver.
 pub(crate) mod adopt;
 pub mod cia402;
+mod configure;
 pub mod damiao;
 pub mod damiao_fault;
 pub mod damiao_plan;
@@ -10,7 +11,10 @@ pub mod fault;
 mod observe;
 pub mod plan;
 pub mod power;
+pub mod scale;
 pub mod timing;
 
 pub use cia402::Node;
-pub use fault::{BringUpFault, explain, explain_refusal};
+pub use fault::{
+    BringUpFault, Refusal, explain, explain_on, explain_refusal, explain_refusal_on, explain_status,
+};

@@ -78,6 +78,10 @@ impl Node {
                 self.stage = NodeStage::Held { next: now };
             }
             Finding::Foreign(fault, object) => self.unowned(now, fault, object),
+            Finding::Differs(contradiction) => {
+                self.numbers = [contradiction.stated, contradiction.expected];
+                self.unowned(now, BringUpFault::ScaleDiffers, contradiction.object.packed());
+            }
             Finding::NoReply => {
                 self.received = false;
                 self.observe(now, Some(BringUpFault::NoAnswer));

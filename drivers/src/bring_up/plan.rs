@@ -1,4 +1,5 @@
 //! The configuration of a CSP drive as a list of SDO steps.
+use crate::bring_up::scale::ExpectedScale;
 use crate::codec::canopen::{
     COB_PDO_STEP, COB_RPDO1, COB_TPDO1, MASTER_NODE, PDO_DISABLED, PDO_NO_RTR, PdoEntry,
 };
@@ -39,6 +40,8 @@ pub enum Check {
     BecomesCsp,
     /// It is the position.
     Position,
+    /// It agrees with the settings' scale, direction or range.
+    Scale,
     /// The bits of the mask are those of the value.
     Equals {
         /// What this master would have written.
@@ -76,7 +79,7 @@ pub enum TargetPdo {
 }
 
 /// What one node is configured with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodePlan {
     /// Node id.
     pub node: u8,
@@ -92,6 +95,8 @@ pub struct NodePlan {
     pub heartbeat_lost_ms: u16,
     /// It answers every so many SYNCs, 1 to 240 (transmission type of its TPDO).
     pub feedback_every: u8,
+    /// How the settings say that it counts.
+    pub scale: ExpectedScale,
 }
 
 impl NodePlan {
@@ -156,7 +161,7 @@ impl NodePlan {
                     let value = u32::from(object::MODE_CSP.cast_unsigned());
                     Step { check: Check::Equals { value, mask: u32::MAX }, ..step }
                 }
-                (SdoJob::Read(_), Check::Profile402) => step,
+                (SdoJob::Read(_), Check::Profile402 | Check::Scale) => step,
                 (SdoJob::Read(_), _) => continue,
             };
             match reads.iter_mut().find(|other| other.job == read.job) {
@@ -172,6 +177,9 @@ impl NodePlan {
         steps.read(object::VENDOR_ID, 4, Check::Present);
         steps.read(object::SUPPORTED_MODES, 4, Check::OffersCsp);
         steps.read(object::STATUSWORD, 2, Check::NotEnergised);
+        for address in self.scale.addresses() {
+            steps.read_optional(address, 4, Check::Scale);
+        }
     }
 
     fn supervise(&self, steps: &mut Steps) {
@@ -217,6 +225,9 @@ struct Steps(Vec<Step>);
 impl Steps {
     fn read(&mut self, address: Address, width: usize, check: Check) {
         self.0.push(Step { job: SdoJob::Read(address), check, width, optional: false });
+    }
+    fn read_optional(&mut self, address: Address, width: usize, check: Check) {
+        self.0.push(Step { job: SdoJob::Read(address), check, width, optional: true });
     }
     fn write(&mut self, address: Address, bytes: SdoBytes) {
         self.0.push(Step {

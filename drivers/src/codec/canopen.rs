@@ -170,7 +170,7 @@ impl NmtState {
 /// An emergency message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emcy {
-    /// Error code; 0x0000 is "error reset". [`crate::codec::error_text::emcy`] has the sentence.
+    /// Error code; 0x0000 is "error reset". [`crate::codec::emcy::words`] has the sentence.
     pub code: u16,
     /// Object 0x1001 at that moment.
     pub error_register: u8,

@@ -6,6 +6,7 @@
 use crate::bring_up::cia402::{DriveSetpoint, Node, Target};
 use crate::bring_up::fault;
 use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan, TargetPdo};
+use crate::bring_up::scale::ExpectedScale;
 use crate::bring_up::timing::{self, BringUpCycle, StepTimer, Timeouts};
 use crate::codec::canopen::{
     COB_PDO_STEP, COB_RPDO1, Emcy, MASTER_NODE, NODE_MAX, Nmt, NmtState, decode_sync, node_of, sync,
@@ -122,7 +123,11 @@ impl Cia402Driver {
         let interpolation = crate::codec::cia402_words::interpolation_period(setpoint_us)
             .ok_or(Cia402Error::Period { period_us: setpoint_us })?;
         let on_bus = settings.servos.iter().filter(|servo| servo.bus == bus);
-        let mine = || on_bus.clone().filter_map(|servo| Some((servo, CountScale::of(servo)?)));
+        let joint = |servo: &Servo| settings.robot.joints.get(servo.joint);
+        let mine = || {
+            let expected = |servo| joint(servo).and_then(|joint| ExpectedScale::of(servo, joint));
+            on_bus.clone().filter_map(move |servo| Some((servo, CountScale::of(servo)?, expected(servo)?)))
+        };
         let supervision = &settings.supervision;
         let timeouts = Timeouts {
             step: nanos("drive_timeout_s", supervision.drive_timeout_s)?,
@@ -145,8 +150,8 @@ impl Cia402Driver {
         };
         // Bounded where settings are read; a drive configured with 240 would not answer for as many cycles.
         let feedback_every = u8::try_from(traffic.feedback_every).unwrap_or(u8::MAX).clamp(1, 240);
-        let nodes: Vec<u8> = mine().map(|(servo, _)| servo.node_id).collect();
-        for (at, (servo, scale)) in mine().enumerate() {
+        let nodes: Vec<u8> = mine().map(|(servo, ..)| servo.node_id).collect();
+        for (at, (servo, scale, expected)) in mine().enumerate() {
             let plan = NodePlan {
                 node: servo.node_id,
                 period_us,
@@ -155,6 +160,7 @@ impl Cia402Driver {
                 target: target_pdo(&driver.groups, &nodes, at),
                 heartbeat_lost_ms: settings.cycle.heartbeat_lost_ms,
                 feedback_every,
+                scale: expected,
             };
             driver.add(servo, scale, Node::new(plan, timeouts))?;
         }
@@ -346,6 +352,7 @@ impl ServoDriver for Cia402Driver {
         };
         let node = &drive.node;
         let (error_code, refused_object) = node.error();
+        let (emergency, emergencies) = node.emergency();
         ServoStatus {
             state: node.state(),
             // The position read while configuring is no feedback yet: nothing would tell its age.
@@ -356,8 +363,11 @@ impl ServoDriver for Cia402Driver {
             status_word: u32::from(node.status()),
             error_code,
             refused_object,
+            refused_numbers: node.refused_numbers(),
             warning: node.warns(),
             lost_master: node.lost_master(),
+            emergency: u32::from(emergency),
+            emergencies,
         }
     }
 

@@ -48,6 +48,20 @@ pub const CONTROL_ENABLE: u16 = 0x000F;
 pub const CONTROL_FAULT_RESET: u16 = 0x0080;
 
 impl DriveStep {
+    /// Its name in CiA 402.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::NotReady => "not ready to switch on",
+            Self::SwitchOnDisabled => "switch on disabled",
+            Self::ReadyToSwitchOn => "ready to switch on",
+            Self::SwitchedOn => "switched on",
+            Self::OperationEnabled => "operation enabled",
+            Self::QuickStopActive => "quick stop active",
+            Self::FaultReaction => "fault reaction active",
+            Self::Fault => "fault",
+        }
+    }
     /// The state that a statusword states; `None` for a pattern that the table does not have.
     #[must_use]
     pub fn from_status(status: u16) -> Option<Self> {
@@ -118,7 +132,7 @@ impl CountScale {
     /// Of a servo; none when it speaks another protocol and has no counts.
     #[must_use]
     pub fn of(servo: &Servo) -> Option<Self> {
-        let Cia402 { gear_ratio, counts_per_rev } = *servo.protocol.as_cia402()?;
+        let Cia402 { gear_ratio, counts_per_rev, .. } = *servo.protocol.as_cia402()?;
         Some(Self { sign: servo.sign, gear_ratio, counts_per_rev, zero_offset_rad: servo.zero_offset_rad })
     }
 }

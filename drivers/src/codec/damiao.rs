@@ -212,9 +212,13 @@ impl ServoDriver for DamiaoDriver {
             received: joint.received,
             status_word: joint.motor.status_word(),
             error_code,
+            refused_numbers: [0.0; 2],
             refused_object,
             warning: false,
             lost_master: joint.motor.lost_master(),
+            // Its faults stand in the status of each answer.
+            emergency: 0,
+            emergencies: 0,
         }
     }
 

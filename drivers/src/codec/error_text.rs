@@ -1,6 +1,6 @@
-//! Abort and emergency codes as text.
+//! Abort codes of SDO as text.
 //!
-//! Sources: CiA 301 table "SDO abort codes" and "Emergency error codes", CiA 402-2 "Error codes".
+//! Source: CiA 301 table "SDO abort codes".
 
 /// SDO abort: toggle bit not alternated.
 pub const ABORT_TOGGLE: u32 = 0x0503_0000;
@@ -77,66 +77,5 @@ pub fn sdo_abort(code: u32) -> &'static str {
         ABORT_DEVICE_STATE => "not in the present state of the device",
         ABORT_NO_DATA => "no data there",
         _ => "abort code that CiA 301 does not list",
-    }
-}
-
-/// EMCY: error reset or no error.
-pub const EMCY_RESET: u16 = 0x0000;
-/// EMCY: heartbeat or life guarding lost.
-pub const EMCY_HEARTBEAT: u16 = 0x8130;
-/// EMCY: PDO not processed because of its length.
-pub const EMCY_PDO_LENGTH: u16 = 0x8210;
-/// EMCY: RPDO time-out.
-pub const EMCY_RPDO_TIMEOUT: u16 = 0x8250;
-/// EMCY: following error too large.
-pub const EMCY_FOLLOWING_ERROR: u16 = 0x8611;
-/// EMCY: reference limit.
-pub const EMCY_REFERENCE_LIMIT: u16 = 0x8612;
-
-/// What an emergency code says; a code that is not listed gets the sentence of its class.
-#[must_use]
-pub fn emcy(code: u16) -> &'static str {
-    match code {
-        EMCY_RESET => "error reset",
-        0x1000 => "generic error",
-        0x2310 => "over-current at the output",
-        0x2320 => "short circuit at the output",
-        0x3210 => "over-voltage of the DC link",
-        0x3220 => "under-voltage of the DC link",
-        0x4210 => "device too hot",
-        0x4310 => "drive too hot",
-        0x7121 => "motor blocked",
-        0x7305 => "encoder signal faulty",
-        0x7500 => "communication faulty",
-        0x8110 => "CAN overrun, messages lost",
-        0x8120 => "CAN error passive",
-        EMCY_HEARTBEAT => "master heartbeat lost",
-        0x8140 => "recovered from bus-off",
-        EMCY_PDO_LENGTH => "PDO ignored, too short",
-        0x8220 => "PDO too long",
-        EMCY_RPDO_TIMEOUT => "setpoints (RPDO) stopped coming",
-        EMCY_FOLLOWING_ERROR => "following error too large",
-        EMCY_REFERENCE_LIMIT => "reference limit reached",
-        0x8700 => "SYNC faulty",
-        _ => emcy_class(code),
-    }
-}
-
-fn emcy_class(code: u16) -> &'static str {
-    match code >> 8 {
-        0x00 => "error reset",
-        0x10 => "generic error",
-        0x20..=0x2F => "current fault",
-        0x30..=0x3F => "voltage fault",
-        0x40..=0x4F => "temperature fault",
-        0x50..=0x5F => "fault of the device hardware",
-        0x60..=0x6F => "fault of the device software",
-        0x70..=0x7F => "fault of an additional module",
-        0x80..=0x81 => "communication fault",
-        0x82..=0x8F => "supervision fault",
-        0x90..=0x9F => "external fault",
-        0xF0..=0xFE => "fault of an additional function",
-        0xFF => "vendor-specific fault",
-        _ => "fault of a class that CiA 301 does not list",
     }
 }

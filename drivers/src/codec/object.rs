@@ -116,6 +116,24 @@ objects! {
     SOFT_LIMIT_MIN = 0x607D:1;
     /// Software position limit, greatest, i32, counts.
     SOFT_LIMIT_MAX = 0x607D:2;
+    /// Position range limit, least, i32, counts: the position wraps there.
+    POSITION_RANGE_MIN = 0x607B:1;
+    /// Position range limit, greatest, i32, counts.
+    POSITION_RANGE_MAX = 0x607B:2;
+    /// Polarity, u8: bit 7 turns the direction of positions round, bit 6 that of velocities.
+    POLARITY = 0x607E:0;
+    /// Position encoder resolution, increments, u32.
+    ENCODER_INCREMENTS = 0x608F:1;
+    /// Position encoder resolution, in so many motor revolutions, u32.
+    ENCODER_REVOLUTIONS = 0x608F:2;
+    /// Gear ratio, motor revolutions, u32.
+    GEAR_MOTOR_REVOLUTIONS = 0x6091:1;
+    /// Gear ratio, in so many shaft revolutions, u32.
+    GEAR_SHAFT_REVOLUTIONS = 0x6091:2;
+    /// Feed constant, position units, u32.
+    FEED = 0x6092:1;
+    /// Feed constant, in so many shaft revolutions, u32.
+    FEED_SHAFT_REVOLUTIONS = 0x6092:2;
     /// Quick stop deceleration, u32.
     QUICK_STOP_DECELERATION = 0x6085:0;
     /// Position offset, i32, counts.

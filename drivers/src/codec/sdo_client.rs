@@ -72,6 +72,12 @@ impl SdoValue {
         Some(u32::from_le_bytes(number))
     }
 
+    /// The value of an unsigned object of one to four bytes, whatever its width.
+    #[must_use]
+    pub fn as_unsigned_of_any_width(&self) -> Option<u32> {
+        self.as_unsigned(self.len).filter(|_| self.len > 0)
+    }
+
     fn append(&mut self, bytes: &[u8]) -> bool {
         let Some(room) = self.bytes.get_mut(self.len..self.len + bytes.len()) else { return false };
         room.copy_from_slice(bytes);

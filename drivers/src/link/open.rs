@@ -86,7 +86,8 @@ pub enum OpenError {
     },
     /// No CAN sockets in this kernel, and the bus is real.
     #[error(
-        "this kernel has no CAN sockets, which bus {bus} on {interface} needs; load them: modprobe can_raw"
+        "this kernel has no CAN sockets, which bus {bus} on {interface} needs; load them: modprobe can_raw; or, for simulated \
+         servos alone, join streamer and taustream-servosim without CAN: start both with --link local"
     )]
     NoCan {
         /// The bus.

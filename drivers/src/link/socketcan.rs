@@ -193,7 +193,10 @@ fn check(bus: &Bus) -> Result<(), OpenError> {
     if !interface_info::exists(&interface) {
         let remedy = match bus.kind {
             BusKind::Virtual => {
-                format!("create it: ip link add dev {interface} type vcan && ip link set {interface} up")
+                format!(
+                    "create it: ip link add dev {interface} type vcan && ip link set {interface} up; or do without it: start \
+                     streamer and taustream-servosim with --link local"
+                )
             }
             BusKind::Classic { .. } | BusKind::Fd { .. } => {
                 "is its adapter plugged in? (list interfaces: ip link show type can)".into()

@@ -15,6 +15,9 @@ A fault is  joint=NAME|NUMBER,kind=KIND[,value=V][,after=start|enable|moving][,a
   restart   its supply dips and it reboots
 Lines on the standard input do the same while it runs:  fault SPEC | clear | clear joint=NAME | status
 
+An object is  joint=NAME|NUMBER,object=0xINDEX:SUB,value=NUMBER|absent  (all joints without joint=). A drive whose gear ratio
+(0x6091), feed constant (0x6092) or polarity (0x607E) is changed counts as it says. [simulator] takes the same texts as a list: objects.
+
 Examples:
   taustream-servosim --settings vcan6 --start-rad \"0,-1.57,1.57,-1.57,-1.57,0\"
   taustream-servosim --settings vcan6 --link local --fault joint=elbow,kind=silence,after=moving,at_s=0.5
@@ -39,6 +42,9 @@ pub struct Arguments {
     /// Inject a fault; may be repeated (see below).
     #[arg(long = "fault", value_name = "SPEC")]
     pub faults: Vec<String>,
+    /// Another value of an object of a CiA 402 drive: "joint=3,object=0x6091:01,value=50"; may be given several times.
+    #[arg(long = "object", value_name = "SPEC")]
+    pub objects: Vec<String>,
     /// Seed of the lost frames.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

@@ -3,6 +3,7 @@
 //! What ties objects together (PDO rules, device states) is `drive_objects`' business.
 //! Source: CiA 301 section 7.2.4.3.17 (abort codes).
 use super::objects::{Access, Kind, Spec, objects};
+use super::planted::PlantedObject;
 use crate::codec::Address;
 use crate::codec::error_text;
 
@@ -67,6 +68,24 @@ impl Dictionary {
             }
             if let Some(spec) = self.specs.get_mut(at) {
                 spec.default = value;
+            }
+        }
+    }
+
+    /// Gives an object another value as shipped, or takes it away; false when there is none, or it cannot hold that.
+    pub(crate) fn plant(&mut self, object: PlantedObject) -> bool {
+        let Some(at) = self.find(object.address) else { return false };
+        match object.value {
+            Some(value) if self.specs.get(at).is_some_and(|spec| narrow(value, spec.kind) == value) => {
+                self.ship(object.address, value);
+                true
+            }
+            Some(_) => false,
+            None => {
+                self.specs.remove(at);
+                self.values.remove(at);
+                self.stored.remove(at);
+                true
             }
         }
     }

@@ -15,7 +15,7 @@ use super::plant::PlantParameters;
 use super::power::{Power, PowerState};
 use super::sdo_server::SdoServer;
 use crate::codec::canopen::{NmtCommand, decode_sync};
-use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, error_text};
+use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, emcy};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use taustream_arm::Reaction;
@@ -66,6 +66,8 @@ pub struct DriveParameters {
 #[derive(Clone, Debug)]
 pub struct Drive {
     pub(super) parameters: DriveParameters,
+    /// The parameters before its objects were changed.
+    pub(super) shipped_parameters: DriveParameters,
     pub(super) dictionary: Dictionary,
     pub(super) sdo: SdoServer,
     pub(super) pdos: Pdos,
@@ -128,6 +130,7 @@ impl Drive {
             warning: false,
             refuse_writes: 0,
             parameters,
+            shipped_parameters: parameters,
         }
     }
 
@@ -305,7 +308,7 @@ impl Drive {
                 self.pdos.apply_now(n, |address, value| dictionary.take(address, value));
                 self.commanded(now, out);
             }
-            Received::TooShort(true) => self.report(error_text::EMCY_PDO_LENGTH, out),
+            Received::TooShort(true) => self.report(emcy::PDO_LENGTH, out),
         }
     }
 

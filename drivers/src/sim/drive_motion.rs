@@ -2,7 +2,7 @@
 use super::drive::Drive;
 use super::power::{Action, Options, PowerState, Slowing};
 use crate::codec::object::MODE_CSP;
-use crate::codec::{NmtState, error_text};
+use crate::codec::{NmtState, emcy};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use taustream_arm::Reaction;
@@ -145,8 +145,8 @@ impl Drive {
             self.settle(now);
         }
         if self.consumers.lost(now).is_some() {
-            self.report(error_text::EMCY_HEARTBEAT, out);
-            self.lose_connection(error_text::EMCY_HEARTBEAT, out);
+            self.report(emcy::HEARTBEAT, out);
+            self.lose_connection(emcy::HEARTBEAT, out);
             // 0x1029: what a lost heartbeat does to the communication state.
             match (self.nmt.state(), self.dictionary.get(0x1029, 1)) {
                 (NmtState::Operational, 0) => self.nmt.set(NmtState::PreOperational),
@@ -217,11 +217,11 @@ impl Drive {
         match self.dictionary.get(0x2000, 2) {
             0 => {
                 self.held = true;
-                self.report(error_text::EMCY_RPDO_TIMEOUT, out);
+                self.report(emcy::RPDO_TIMEOUT, out);
             }
-            1 => self.fail(error_text::EMCY_RPDO_TIMEOUT, out),
+            1 => self.fail(emcy::RPDO_TIMEOUT, out),
             _ => {
-                self.report(error_text::EMCY_RPDO_TIMEOUT, out);
+                self.report(emcy::RPDO_TIMEOUT, out);
                 let coast = Options { fault_reaction: 0, ..self.options() };
                 let action = self.power.fault(&coast);
                 self.perform(action);
@@ -241,7 +241,7 @@ impl Drive {
         }
         let since = *self.astray.get_or_insert(now);
         if now.since_s(since) > whole(self.dictionary.get(0x6066, 0)) * 1e-3 {
-            self.fail(error_text::EMCY_FOLLOWING_ERROR, out);
+            self.fail(emcy::FOLLOWING_ERROR, out);
         }
     }
 

@@ -4,12 +4,12 @@ use super::drive::{Drive, DriveParameters};
 use super::drive_motion::{counts, reaction_code};
 use super::objects::{Access, CONSUMERS, HISTORY};
 use super::pdo::{self, Pdos};
+use super::planted::{PlantedObject, as_ratio};
 use super::power::PowerState;
 use super::sdo_server::Objects;
 use crate::codec::object::{RPDO_COMMUNICATION, TPDO_MAPPING};
 use crate::codec::{Address, error_text};
 use crate::frame::CanFrame;
-use std::f64::consts::TAU;
 
 /// "save", least significant byte first.
 const SAVE: i64 = 0x6576_6173;
@@ -54,14 +54,6 @@ impl Objects for Session<'_> {
     }
 }
 
-impl DriveParameters {
-    /// Encoder counts a radian of the link, with the sign of the motor's direction.
-    #[must_use]
-    pub fn counts_per_rad(&self) -> f64 {
-        self.sign * self.gear_ratio * self.counts_per_rev / TAU
-    }
-}
-
 impl Drive {
     /// The dictionary with the values that this drive is shipped with.
     pub(super) fn shipped(parameters: &DriveParameters) -> Dictionary {
@@ -71,8 +63,6 @@ impl Drive {
             register((angle_rad - parameters.zero_offset_rad) * per_rad, i32::MIN, i32::MAX)
         });
         let window = parameters.following_window_rad * per_rad.abs();
-        // Fractions of a revolution are given over a thousand revolutions.
-        let thousand = |value: f64| register(value * 1000.0, 1, i32::MAX);
         for (index, sub, value) in [
             (0x2000, 1, i64::from(parameters.watchdog_ms)),
             (0x2000, 2, reaction_code(parameters.reaction)),
@@ -83,12 +73,20 @@ impl Drive {
             (0x607D, 2, limits[0].max(limits[1])),
             (0x6084, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6085, 0, register(parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
-            (0x608F, 1, thousand(parameters.counts_per_rev)),
-            (0x608F, 2, 1000),
-            (0x6091, 1, thousand(parameters.gear_ratio)),
-            (0x6091, 2, 1000),
         ] {
             dictionary.ship(Address::new(index, sub), value);
+        }
+        for (index, value) in [
+            (0x608F, parameters.counts_per_rev),
+            (0x6091, parameters.gear_ratio),
+            (0x6092, parameters.counts_per_rev * parameters.gear_ratio),
+        ] {
+            for (at, sub) in [1, 2].into_iter().enumerate() {
+                let part = as_ratio(value).and_then(|ratio| ratio.get(at).copied());
+                // A drive that cannot state a number does not have the object.
+                let _has_it =
+                    dictionary.plant(PlantedObject { address: Address::new(index, sub), value: part });
+            }
         }
         dictionary
     }

@@ -2,7 +2,7 @@
 //!
 //! It decides and moves nothing: each call returns what the motor control has to do.
 //! Source: CiA 402-2, power drive system state machine, transitions 0 to 16; option codes 0x605A to 0x605E.
-use crate::codec::error_text;
+use crate::codec::emcy;
 
 /// State of the power drive system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -331,5 +331,5 @@ pub(crate) fn register_bits(code: u16) -> u8 {
         0xFF => 0b1000_0000,
         _ => 0,
     };
-    if code == error_text::EMCY_RESET { 0 } else { class | 1 }
+    if code == emcy::RESET { 0 } else { class | 1 }
 }

@@ -3,6 +3,7 @@ use super::disturbance::Disturbance;
 use super::drive::{Drive, DriveParameters};
 use super::motor::{Motor, MotorParameters};
 use super::plant::PlantParameters;
+use super::planted::PlantedObject;
 use super::power::PowerState;
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
@@ -43,11 +44,15 @@ pub enum SimulatedServo {
 }
 
 impl SimulatedServo {
-    /// A servo that powers up at the first call of [`Self::advance`].
+    /// A servo that powers up at the first call of [`Self::advance`]; of a drive, these objects are changed.
     #[must_use]
-    pub fn new(parameters: ServoParameters) -> Self {
+    pub fn new(parameters: ServoParameters, objects: &[PlantedObject]) -> Self {
         match parameters {
-            ServoParameters::Cia402(drive) => Self::Cia402(Box::new(Drive::new(drive))),
+            ServoParameters::Cia402(parameters) => {
+                let mut drive = Drive::new(parameters);
+                objects.iter().for_each(|object| drive.plant(*object));
+                Self::Cia402(Box::new(drive))
+            }
             ServoParameters::Damiao(motor) => Self::Damiao(Box::new(Motor::new(motor))),
         }
     }

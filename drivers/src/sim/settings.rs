@@ -6,12 +6,13 @@ use super::controller::LoopParameters;
 use super::drive::DriveParameters;
 use super::motor::MotorParameters;
 use super::plant::PlantParameters;
+use super::planted::{self, PlantedObject};
 use super::servo::ServoParameters;
 use crate::codec::damiao::wire_of;
 use crate::codec::damiao_frames::Wire;
 use std::cell::RefCell;
 use std::path::Path;
-use taustream_arm::{Cia402, Damiao, Fault, Faults, Protocol, Servo, Settings};
+use taustream_arm::{Cia402, Damiao, DamiaoMode, Fault, Faults, Protocol, Servo, Settings};
 use taustream_motion::JointLimits;
 use toml::{Table, Value};
 
@@ -24,6 +25,8 @@ pub struct DriveSetup {
     pub bus: usize,
     /// The servo.
     pub parameters: ServoParameters,
+    /// Objects of its drive that hold something else than the parameters make.
+    pub objects: Vec<PlantedObject>,
 }
 
 /// Drives of all joints, base to tip, as the settings describe them. `start_rad` replaces the section's key.
@@ -38,6 +41,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let mut setups: Vec<DriveSetup> =
         settings.servos.iter().map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
+    section.plant_objects(&mut setups);
     section.unknown_keys();
     let faults = section.faults.into_inner();
     if !faults.is_empty() {
@@ -67,7 +71,8 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
 const QUEUE_FRAMES: u32 = 64;
 
 /// Every key, for unknown ones to be found, and for the nearest known key to be named.
-const KEYS: [&str; 32] = [
+const KEYS: [&str; 33] = [
+    "objects",
     "bus_queue_frames",
     "dummy_mapping",
     "start_rad",
@@ -102,6 +107,43 @@ const KEYS: [&str; 32] = [
     "continuous_feedback_ms",
 ];
 
+/// What a joint is by default.
+#[derive(Clone, Copy)]
+struct Load {
+    inertia_kg_m2: f64,
+    viscous_nm_s_rad: f64,
+    coulomb_nm: f64,
+    gravity_nm: f64,
+}
+
+/// A joint of an arm of some 20 kg, as a geared drive moves it.
+const LARGE: Load = Load { inertia_kg_m2: 1.0, viscous_nm_s_rad: 1.0, coulomb_nm: 1.0, gravity_nm: 10.0 };
+
+/// A joint that a motor can carry and its gains can hold: damped by 0.7 as a spring, so light that the motor accelerates it as
+/// the limits allow, and out of its place by a tenth of the tracking error that stops the arm, at most.
+fn load_for(damiao: &Damiao, acceleration_rad_s2: f64, tracking_rad: f64) -> Load {
+    const DAMPING_RATIO: f64 = 0.7;
+    let torque_nm = damiao.torque_range_nm;
+    let moved_kg_m2 = 0.3 * torque_nm / acceleration_rad_s2.max(1e-3);
+    let (damped_kg_m2, held_nm, damping_nm_s_rad) = match damiao.mode {
+        DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } => (
+            damping_nm_s_rad.powi(2) / (4.0 * DAMPING_RATIO.powi(2) * stiffness_nm_rad),
+            0.1 * tracking_rad * stiffness_nm_rad,
+            damping_nm_s_rad,
+        ),
+        DamiaoMode::PosVel => (f64::INFINITY, f64::INFINITY, f64::INFINITY),
+    };
+    let inertia_kg_m2 = damped_kg_m2.min(moved_kg_m2).clamp(1e-4, LARGE.inertia_kg_m2);
+    // It falls while the gains rise: no faster than a long link.
+    let falling_nm = 20.0 * inertia_kg_m2;
+    Load {
+        inertia_kg_m2,
+        viscous_nm_s_rad: LARGE.viscous_nm_s_rad.min(0.1 * damping_nm_s_rad).min(0.01 * torque_nm),
+        coulomb_nm: LARGE.coulomb_nm.min(0.01 * torque_nm).min(held_nm),
+        gravity_nm: LARGE.gravity_nm.min(0.05 * torque_nm).min(held_nm).min(falling_nm),
+    }
+}
+
 /// The section while it is being read.
 struct Section<'a> {
     table: &'a Table,
@@ -116,7 +158,7 @@ impl Section<'_> {
         let limits = joint.map(|joint| joint.limits).unwrap_or_default();
         let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
         let at = servo.joint;
-        let plant = self.plant(at, servo, &limits);
+        let plant = self.plant(at, servo, &limits, settings.supervision.tracking_error_rad_max);
         let parameters = match servo.protocol {
             Protocol::Cia402(cia402) => {
                 let watchdog_ms = settings.cycle.drive_watchdog_ms;
@@ -127,7 +169,7 @@ impl Section<'_> {
                 ServoParameters::Damiao(self.motor(servo, &damiao, (plant, &limits), wire))
             }
         };
-        DriveSetup { joint: name, bus: servo.bus, parameters }
+        DriveSetup { joint: name, bus: servo.bus, parameters, objects: Vec::new() }
     }
 
     fn start_rad(&self, at: usize, limits: &JointLimits) -> f64 {
@@ -211,11 +253,15 @@ impl Section<'_> {
     }
 
     /// Mechanics; torque and speed that the motor has by default suffice for the joint's stop limits.
-    fn plant(&self, at: usize, servo: &Servo, limits: &JointLimits) -> PlantParameters {
-        let inertia_kg_m2 = self.number("inertia_kg_m2", at, 1.0, 1e-4..=1e4);
-        let viscous_nm_s_rad = self.number("viscous_nm_s_rad", at, 1.0, 0.0..=1e4);
-        let coulomb_nm = self.number("coulomb_nm", at, 1.0, 0.0..=1e4);
-        let gravity_nm = self.number("gravity_nm", at, 10.0, -1e4..=1e4);
+    fn plant(&self, at: usize, servo: &Servo, limits: &JointLimits, tracking_rad: f64) -> PlantParameters {
+        let load = match servo.protocol {
+            Protocol::Cia402(_) => LARGE,
+            Protocol::Damiao(damiao) => load_for(&damiao, limits.stop.acceleration_rad_s2, tracking_rad),
+        };
+        let inertia_kg_m2 = self.number("inertia_kg_m2", at, load.inertia_kg_m2, 1e-4..=1e4);
+        let viscous_nm_s_rad = self.number("viscous_nm_s_rad", at, load.viscous_nm_s_rad, 0.0..=1e4);
+        let coulomb_nm = self.number("coulomb_nm", at, load.coulomb_nm, 0.0..=1e4);
+        let gravity_nm = self.number("gravity_nm", at, load.gravity_nm, -1e4..=1e4);
         let speed_rad_s = limits.motion.velocity_rad_s.max(1e-3);
         let load_nm = gravity_nm.abs() + coulomb_nm + viscous_nm_s_rad * speed_rad_s;
         let enough_nm = 1.5 * (load_nm + inertia_kg_m2 * limits.stop.acceleration_rad_s2);
@@ -240,6 +286,27 @@ impl Section<'_> {
             integral_time_s: self.number("integral_time_ms", at, 20.0, 5.0..=1000.0) * 1e-3,
             torque_lag_s: self.number("torque_lag_ms", at, 0.3, 0.0..=0.5) * 1e-3,
             extrapolation_s: self.number("extrapolation_ms", at, 0.0, 0.0..=1000.0) * 1e-3,
+        }
+    }
+
+    /// Objects of drives that hold something else than the parameters make.
+    fn plant_objects(&self, setups: &mut [DriveSetup]) {
+        let texts = match self.table.get("objects") {
+            None => return,
+            Some(Value::Array(texts)) => texts,
+            Some(other) => {
+                let expected = "a list of texts, for example [\"joint=3,object=0x6091:01,value=50\"]";
+                return self.fault("objects", &other.to_string(), expected);
+            }
+        };
+        for (at, value) in texts.iter().enumerate() {
+            let planted = match value.as_str() {
+                Some(text) => planted::plant(text, setups).map_err(|error| error.to_string()),
+                None => Err("a text, for example \"joint=3,object=0x6091:01,value=50\"".to_owned()),
+            };
+            if let Err(expected) = planted {
+                self.fault(&format!("objects[{at}]"), &value.to_string(), &expected);
+            }
         }
     }
 

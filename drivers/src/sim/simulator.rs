@@ -65,7 +65,7 @@ impl ServoSimulator {
         let units = setups.into_iter().map(|setup| Unit {
             joint: setup.joint,
             bus: setup.bus,
-            drive: SimulatedServo::new(setup.parameters),
+            drive: SimulatedServo::new(setup.parameters, &setup.objects),
             enabled: None,
             moving: None,
             silent: false,

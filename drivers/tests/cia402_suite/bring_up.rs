@@ -1,6 +1,6 @@
 //! Bring-up of drives: what is asked, what is refused, and what an energised drive keeps.
 use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, SWITCH_ON_DISABLED, frame, hex, settings};
-use taustream_arm::Reaction;
+use taustream_arm::{Overruled, Protocol, Reaction, ScaleObject};
 use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
@@ -12,6 +12,17 @@ const BRING_UP_OF_NODE_1: &str = "
 601 40 18 10 01 00 00 00 00
 601 40 02 65 00 00 00 00 00
 601 40 41 60 00 00 00 00 00
+601 40 8F 60 01 00 00 00 00
+601 40 8F 60 02 00 00 00 00
+601 40 91 60 01 00 00 00 00
+601 40 91 60 02 00 00 00 00
+601 40 92 60 01 00 00 00 00
+601 40 92 60 02 00 00 00 00
+601 40 7E 60 00 00 00 00 00
+601 40 7D 60 01 00 00 00 00
+601 40 7D 60 02 00 00 00 00
+601 40 7B 60 01 00 00 00 00
+601 40 7B 60 02 00 00 00 00
 601 2B 17 10 00 64 00 00 00
 601 23 16 10 01 5E 01 7F 00
 601 2B 07 60 00 03 00 00 00
@@ -173,7 +184,7 @@ fn bring_up_of_a_drive_that_answers_for_another_object_is_refused_naming_the_ask
         let status = bench.status(0);
         let packed = u32::from(object.0) << 8 | u32::from(object.1);
         assert_eq!((status.error_code, status.refused_object), (0x0504_0000, packed));
-        let words = explain_refusal(status.error_code, status.refused_object);
+        let words = explain_refusal(&status.refusal());
         assert!(words.starts_with(&format!("object 0x{:04X}:{:02}: ", object.0, object.1)), "{words}");
         assert!(words.contains("no SDO answer in time"), "{words}");
     }
@@ -293,7 +304,7 @@ fn observing_finds_an_energised_drive_and_leaves_it_untouched() {
         let only_read = |bench: &Bench| bench.drives[0].seen.iter().all(|f| hex(f).starts_with("601 40 "));
         assert!(bench.drives[0].seen.len() > 10, "it is watched");
         assert!(only_read(&bench), "only read");
-        let words = explain_refusal(bench.status(0).error_code, bench.status(0).refused_object);
+        let words = explain_refusal(&bench.status(0).refusal());
         assert!(words.starts_with("object 0x") && words.contains("torque-off"), "{words}");
 
         // The target that the others follow does not reach it.
@@ -333,4 +344,50 @@ fn observing_starts_a_node_in_nmt_stopped_without_a_reset() {
     bench.step();
     assert!(bench.sent.iter().any(|f| hex(f) == "000 80 01"));
     bench.until(DriveState::Disabled, 3_000);
+}
+
+/// Goal: a drive whose objects say another scale, direction or range than the settings is never energised, and says so by
+/// object and both numbers; drives without such objects, and those that agree, come up.
+/// Method: the arm of these settings counts 131072 a motor revolution behind 101 revolutions.
+#[test]
+fn bring_up_of_a_drive_that_counts_otherwise_is_refused_by_object_and_numbers() {
+    let cases: [(&[(u16, u8, u32)], &str, [f64; 2]); 6] = [
+        (&[(0x608F, 1, 65_536), (0x608F, 2, 1)], "0x608F", [65_536.0, 131_072.0]),
+        (&[(0x6091, 1, 202), (0x6091, 2, 4)], "0x6091", [50.5, 101.0]),
+        (&[(0x6092, 1, 360_000), (0x6092, 2, 1)], "0x6092", [360_000.0, 13_238_272.0]),
+        (&[(0x6091, 1, 101), (0x6091, 2, 0)], "0x6091", [f64::INFINITY, 101.0]),
+        (&[(0x607E, 0, 0xC0)], "0x607E", [192.0, 0.0]),
+        (&[(0x607D, 1, 0x8000_0000), (0x607D, 2, 1000)], "0x607D:02", [1000.0, f64::NAN]),
+    ];
+    for (objects, name, [stated, expected]) in cases {
+        let mut bench = Bench::new(2);
+        for (index, sub, value) in objects {
+            let width = if *index == 0x607E { 1 } else { 4 };
+            bench.drives[1].objects.insert((*index, *sub), (width, *value));
+        }
+        bench.steps(2_000);
+        assert_eq!(bench.states(), [DriveState::Disabled, DriveState::Refused], "{name}");
+        let status = bench.status(1);
+        let [said, wanted] = status.refused_numbers;
+        assert!(said.total_cmp(&stated).is_eq(), "{name}: {said}");
+        assert!(expected.is_nan() || wanted.total_cmp(&expected).is_eq(), "{name}: {wanted}");
+        let words = explain_refusal(&status.refusal());
+        assert!(words.contains(name) && words.contains("overruled_objects = ["), "{words}");
+        bench.drive_target = DriveTarget::Enabled;
+        bench.steps(500);
+        assert!(bench.drives[1].control & 0x08 == 0, "{name}: the refused drive was told to enable");
+    }
+}
+
+/// An object that is overruled is not even read.
+#[test]
+fn bring_up_with_an_overruled_object_takes_the_drive() {
+    let mut settings = settings(1);
+    let Protocol::Cia402(cia402) = &mut settings.servos[0].protocol else { unreachable!() };
+    cia402.overruled = Overruled::NONE.with(ScaleObject::GearRatio);
+    let mut bench = Bench::with(settings);
+    bench.drives[0].objects.insert((0x6091, 1), (4, 1));
+    bench.drives[0].objects.insert((0x6091, 2), (4, 1));
+    bench.until(DriveState::Disabled, 2_000);
+    assert!(bench.drives[0].seen.iter().all(|frame| !hex(frame).contains("91 60")));
 }

@@ -2,9 +2,9 @@
 use super::{SeededRng, frame, hex};
 use taustream_drivers::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState, PdoEntry, decode_sync, sync};
 use taustream_drivers::codec::cia402::{DriveStep, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo};
-use taustream_drivers::codec::error_text;
 use taustream_drivers::codec::object::{self, Address};
 use taustream_drivers::codec::sdo::{SdoBytes, SdoRequest, SdoResponse, SegmentBytes};
+use taustream_drivers::codec::{emcy, words};
 use taustream_drivers::{CanFrame, CanId};
 
 #[test]
@@ -148,7 +148,7 @@ fn words_exist_for_every_code_of_the_tables() {
         0x8120, 0x8130, 0x8140, 0x8210, 0x8220, 0x8250, 0x8611, 0x8612,
     ];
     for code in emergencies {
-        assert!(!error_text::emcy(code).contains("does not list"), "{code:#06x}");
+        assert!(!emcy::words(code).contains("does not list"), "{code:#06x}");
     }
 }
 

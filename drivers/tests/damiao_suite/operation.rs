@@ -1,5 +1,6 @@
 //! Energising, following, letting go.
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
+use taustream_arm::Settings;
 use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::{DriveState, DriveTarget, JointCommand, ServoDriver, ZeroRefused};
@@ -299,5 +300,27 @@ fn commands_of_another_master_are_noticed_in_operation() {
             arm.step();
             assert_eq!(arm.driver.other_master(), None, "{command:?} to a motor of somebody else");
         }
+    }
+}
+
+/// Goal: whoever leaves the section of the simulator out gets joints that the motors can carry: the first enable holds, far
+/// inside what stops an arm.
+#[test]
+fn motors_of_settings_without_a_simulator_section_are_enabled_and_hold() {
+    for settings in [edited(&[]), pos_vel()] {
+        let settings = Settings { simulator: None, ..settings };
+        let limit_rad = settings.supervision.tracking_error_rad_max;
+        let mut arm = Arm::enabled(settings);
+        let mut worst_rad = 0.0_f64;
+        for _ in 0..2_000 {
+            arm.step();
+            for joint in 0..JOINTS {
+                let status = arm.status(joint);
+                assert_eq!(status.state, DriveState::Enabled, "joint {joint}: {}", arm.why(joint));
+                worst_rad = worst_rad.max((status.position_rad - arm.commands[joint].position_rad).abs());
+            }
+        }
+        println!("largest distance from the command {worst_rad:.6} rad");
+        assert!(worst_rad < 0.5 * limit_rad, "{worst_rad} rad from the command");
     }
 }

@@ -20,7 +20,7 @@ fn settings(reaction: Reaction) -> Settings {
 }
 
 /// An arm that was moving when its master was killed `ms` ago.
-fn orphaned(reaction: Reaction, ms: u64) -> Arm {
+pub(super) fn orphaned(reaction: Reaction, ms: u64) -> Arm {
     let mut arm = Arm::with(settings(reaction));
     arm.enable();
     arm.move_and_measure(0.26);
@@ -29,7 +29,7 @@ fn orphaned(reaction: Reaction, ms: u64) -> Arm {
     arm
 }
 
-fn restart_as(arm: &mut Arm, settings: &Settings) {
+pub(super) fn restart_as(arm: &mut Arm, settings: &Settings) {
     arm.driver = Cia402Driver::new(settings, 0).unwrap();
     for command in &mut arm.commands {
         command.position_rad = 0.0;
@@ -164,7 +164,7 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
         }
         assert_eq!(arm.states(), [DriveState::EnergisedUnowned; 6], "{object}");
         let status = arm.status(3);
-        let words = explain_refusal(status.error_code, status.refused_object);
+        let words = explain_refusal(&status.refusal());
         assert!(words.contains(object) && words.contains("torque-off"), "{words}");
         assert_still(&arm, &rest, object);
         for _ in 0..500 {

@@ -7,3 +7,4 @@ mod motion;
 mod network;
 mod power;
 mod process;
+mod scale;

@@ -318,3 +318,46 @@ fn drive_that_lost_its_master_in_a_stall_of_the_loop_is_not_blamed() {
         }
     }
 }
+
+/// Goal: a drive's fault shows what tripped: its statusword then, and its code even when that comes later.
+#[test]
+fn drive_fault_keeps_the_statusword_that_tripped_and_gets_its_code_later() {
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.run(600);
+    harness.script(|w| w.forced[2] = Some(DriveState::Fault));
+    harness.run_until(Phase::FastStopping, 40);
+    let names = Names::of(&harness.settings);
+    let said = names.fault(&harness.cause().unwrap());
+    assert!(said.contains("no error code yet; status 0x1237"), "{said}");
+    harness.script(|w| w.error_code = 0x8611);
+    harness.run(1);
+    let said = names.fault(&harness.cause().unwrap());
+    assert!(said.contains("0x8611 following error too large (status 0x1237"), "{said}");
+    // The first code is the one that tripped.
+    harness.script(|w| w.error_code = 0x3220);
+    harness.run_until(Phase::Fault, 1_500);
+    assert!(names.fault(&harness.cause().unwrap()).contains("0x8611"));
+}
+
+/// Goal: what healthy drives report is noted, new codes soon, the same again at most once a second, and nothing stops.
+#[test]
+fn emergency_messages_of_healthy_drives_are_noted_at_a_bounded_rate() {
+    let mut harness = CycleHarness::new();
+    harness.run(100);
+    assert_eq!(harness.emergencies, []);
+    harness.script(|w| w.emergency = (0x8130, 1));
+    harness.run(1);
+    let first: Vec<(usize, u32, u32)> = (0..6).map(|joint| (joint, 0x8130, 1)).collect();
+    assert_eq!(harness.emergencies, first);
+    harness.emergencies.clear();
+    for count in 2..=500 {
+        harness.script(|w| w.emergency = (0x8130, count));
+        harness.run(1);
+    }
+    assert_eq!(harness.emergencies, []);
+    harness.run(600);
+    let again: Vec<(usize, u32, u32)> = (0..6).map(|joint| (joint, 0x8130, 499)).collect();
+    assert_eq!(harness.emergencies, again);
+    assert_eq!(harness.phase(), Phase::Disabled);
+}

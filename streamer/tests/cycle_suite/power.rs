@@ -14,7 +14,15 @@ fn enable_is_refused_with_the_reason_while_the_arm_is_not_fit() {
     harness.script(|w| w.forced[5] = Some(DriveState::Configuring));
     harness.run(5);
     let why = harness.ask(Command::Enable).why;
-    assert_eq!(why, AnswerReason::NotConfigured { joint: 5, state: DriveState::Configuring });
+    assert!(
+        matches!(why, AnswerReason::NotConfigured { joint: 5, state: DriveState::Configuring, .. }),
+        "{why:?}"
+    );
+    // What the drive's driver has found is said at once, before it becomes a fault.
+    harness.script(|w| w.error_code = 0x0001_0010);
+    let said = harness.ask(Command::Enable).why.sentence(&Names::of(&harness.settings));
+    assert!(said.contains("joint 6 `wrist_3`") && said.contains("another master sends SYNC"), "{said}");
+    harness.script(|w| w.error_code = 0);
     harness.script(|w| w.forced[5] = None);
     harness.run(5);
     assert_eq!(harness.ask(Command::Enable).why, AnswerReason::SpeedUnknown);
@@ -94,6 +102,8 @@ fn drive_that_refuses_its_configuration_is_a_fault_that_names_object_and_code() 
     harness.run_until(Phase::Fault, 20);
     let cause = harness.cause().unwrap();
     assert_eq!((cause.reason, cause.joint), (FaultReason::ConfigurationRefused, Some(2)));
+    let said = harness.ask(Command::Enable).why.sentence(&Names::default());
+    assert!(said.contains("SDO abort 0x06040041") && said.contains("`clear-fault`"), "{said}");
     let text = Names::default().fault(&cause);
     assert!(text.contains("joint 3: object 0x1600:02: SDO abort 0x06040041"), "{text}");
     assert!(text.contains("cannot be mapped"), "{text}");
@@ -178,4 +188,46 @@ fn speed_floods_never_keep_a_stop_from_stopping() {
     harness.run_until(Phase::Holding, 1_500);
     assert_on_path(&harness, &trajectory);
     assert_within_stop_limits(&harness);
+}
+
+/// Goal: a drive that counts otherwise than the settings say is a fault that shows object and both numbers, wherever it is
+/// shown, and nothing is energised.
+#[test]
+fn drive_that_counts_otherwise_is_a_fault_with_both_numbers() {
+    let mut harness = CycleHarness::new();
+    harness.script(|w| {
+        w.forced[2] = Some(DriveState::Refused);
+        (w.error_code, w.refused_object) = (0x0001_0012, 0x60_9101);
+        w.refused_numbers = [50.5, 101.0];
+    });
+    harness.run_until(Phase::Fault, 20);
+    let text = Names::of(&harness.settings).fault(&harness.cause().unwrap());
+    for words in
+        ["joint 3 `elbow`", "0x6091", "50.5", "101", "2.000000 times", "overruled_objects = [0x6091]"]
+    {
+        assert!(text.contains(words), "no {words} in: {text}");
+    }
+    assert_eq!(harness.world.lock().unwrap().drive_target, Some(DriveTarget::Disabled));
+}
+
+/// Goal: an arm whose joints fall when commands stop says so at each enable and begins slowly each time.
+#[test]
+fn acknowledged_risk_is_named_by_each_enable_which_begins_slowly() {
+    let mut settings = crate::harness::shipped_settings();
+    settings.supervision.first_speed_percent = 20.0;
+    settings.servos[1].limp_risk_acknowledged = true;
+    let names = Names::of(&settings);
+    let mut rig = CycleHarness::with(settings);
+    for _ in 0..2 {
+        rig.run_until(Phase::Disabled, 200);
+        rig.run(60);
+        let answer = rig.ask(Command::Enable);
+        let said = answer.why.sentence(&names);
+        assert!(answer.accepted && said.contains("shoulder_lift") && said.contains("KEEP CLEAR"), "{said}");
+        assert!(said.len() <= 240, "cut off in the answer: {said}");
+        rig.run_until(Phase::Holding, 60);
+        assert!((rig.core.supervisor().speed() - 0.2).abs() < 1e-12);
+        rig.accept(Command::Speed { percent: 100.0 });
+        rig.accept(Command::Disable);
+    }
 }

@@ -137,7 +137,7 @@ fn unowned_drive_is_named_with_what_differs_and_what_to_do() {
         assert!(sentence.contains(words), "{words} in: {sentence}");
     }
     assert_eq!(harness.ask(Command::ClearFault).why, AnswerReason::Unowned { joint: 1 });
-    assert!(matches!(harness.ask(Command::Enable).why, AnswerReason::ClearFirst));
+    assert!(matches!(harness.ask(Command::Enable).why, AnswerReason::ClearFirst { .. }));
     harness.run(50);
     assert_eq!(drive_target(&harness), Some(DriveTarget::Disabled), "only an operator de-energises");
     // Whoever used it has ended without torque: the others, which hold, are adopted beside it.

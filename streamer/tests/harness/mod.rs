@@ -32,6 +32,9 @@ pub struct World {
     pub forced: [Option<DriveState>; MAX_JOINTS],
     pub error_code: u32,
     pub refused_object: u32,
+    pub refused_numbers: [f64; 2],
+    /// Code and number of emergency messages of every drive.
+    pub emergency: (u32, u32),
     pub warning: Option<usize>,
     /// The drive that says it has lost its master.
     pub lost_master: Option<usize>,
@@ -158,8 +161,11 @@ impl ServoDriver for FakeDriver {
             status_word: 0x1237,
             error_code: world.error_code,
             refused_object: world.refused_object,
+            refused_numbers: world.refused_numbers,
             warning: world.warning == Some(joint),
             lost_master: world.lost_master == Some(joint),
+            emergency: world.emergency.0,
+            emergencies: world.emergency.1,
         }
     }
     fn clear_faults(&mut self) {
@@ -263,6 +269,8 @@ pub struct CycleHarness {
     pub report: Option<Report>,
     /// Notes of error frames.
     pub error_notes: u32,
+    /// Joint, code and count of each note of emergency messages.
+    pub emergencies: Vec<(usize, u32, u32)>,
     generation: u64,
     last: Next,
 }
@@ -293,6 +301,8 @@ impl CycleHarness {
             forced: [None; MAX_JOINTS],
             error_code: 0,
             refused_object: 0,
+            refused_numbers: [0.0; 2],
+            emergency: (0, 0),
             warning: None,
             lost_master: None,
             silent: None,
@@ -347,6 +357,7 @@ impl CycleHarness {
             phases: Vec::new(),
             report: None,
             error_notes: 0,
+            emergencies: Vec::new(),
             generation: 0,
             last: Next::Go,
         }
@@ -379,6 +390,9 @@ impl CycleHarness {
         }
         while let Ok(note) = self.readers.notes.pop() {
             self.error_notes += u32::from(matches!(note, Note::BusError { .. }));
+            if let Note::Emergency { joint, code, count } = note {
+                self.emergencies.push((joint, code, count));
+            }
         }
         self.last
     }

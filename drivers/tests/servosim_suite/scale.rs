@@ -1,0 +1,102 @@
+//! Drives that count otherwise than the settings say: what they would do, and that they are refused.
+use super::adopt::{orphaned, restart_as};
+use super::arm::{Arm, shipped};
+use taustream_arm::{Overruled, Protocol, Reaction, ScaleObject, Settings};
+use taustream_drivers::bring_up::explain_refusal;
+use taustream_drivers::{DriveState, DriveTarget};
+use toml::Value;
+
+/// The shipped arm whose elbow's drive has these objects.
+fn with_objects(texts: &[&str]) -> Settings {
+    let mut settings = shipped();
+    let list = texts.iter().map(|text| Value::String(format!("joint=elbow,{text}"))).collect();
+    settings.simulator.get_or_insert_default().insert("objects".to_owned(), Value::Array(list));
+    settings
+}
+
+/// Goal: each object that contradicts refuses that drive before anything is energised, and no other.
+#[test]
+fn planted_contradictions_are_refused_at_the_one_joint_that_has_them() {
+    let cases: [(&[&str], &str); 8] = [
+        (&["object=0x608F:01,value=65536"], "0x608F (position encoder resolution) of the drive says 65536"),
+        (&["object=0x608F:02,value=2"], "0x608F (position encoder resolution) of the drive says 65536"),
+        (&["object=0x6091:01,value=50"], "0x6091 (gear ratio) of the drive says 50"),
+        (&["object=0x6091:02,value=0"], "a zero in it"),
+        (&["object=0x6092:01,value=1000000"], "0x6092 (feed constant) of the drive says 1000000"),
+        (&["object=0x607E,value=0x80"], "0x607E (polarity) of the drive is 128"),
+        (
+            &["object=0x607D:02,value=1000"],
+            "0x607D:02 (software position limit, highest) of the drive is 1000",
+        ),
+        (&["object=0x607B:01,value=-65536", "object=0x607B:02,value=65535"], "0x607B:01"),
+    ];
+    for (objects, words) in cases {
+        let mut arm = Arm::with(with_objects(objects));
+        for _ in 0..3_000 {
+            arm.cycle(DriveTarget::Disabled);
+        }
+        let mut expected = [DriveState::Disabled; 6];
+        expected[2] = DriveState::Refused;
+        assert_eq!(arm.states(), expected, "{objects:?}");
+        let said = explain_refusal(&arm.status(2).refusal());
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+/// Goal: drives that do not have the objects come up as they always did.
+#[test]
+fn drives_without_the_objects_come_up() {
+    let gone: Vec<String> = ["0x608F", "0x6091", "0x6092", "0x607D", "0x607B"]
+        .iter()
+        .flat_map(|index| [1, 2].map(|sub| format!("object={index}:{sub:02},value=absent")))
+        .chain(["object=0x607E,value=absent".to_owned()])
+        .collect();
+    let gone: Vec<&str> = gone.iter().map(String::as_str).collect();
+    let mut arm = Arm::with(with_objects(&gone));
+    arm.enable();
+}
+
+/// Goal: what the comparison is for. A gear that the drive has otherwise, overruled against better knowledge, moves the
+/// joint by another angle, and its feedback agrees with the command all the same.
+#[test]
+fn overruled_gear_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
+    let mut settings = with_objects(&["object=0x6091:01,value=202", "object=0x607D:01,value=absent"]);
+    let Protocol::Cia402(cia402) = &mut settings.servos[2].protocol else { unreachable!() };
+    for object in [ScaleObject::GearRatio, ScaleObject::FeedConstant, ScaleObject::SoftLimit] {
+        cia402.overruled = cia402.overruled.with(object);
+    }
+    assert_ne!(cia402.overruled, Overruled::NONE);
+    let mut arm = Arm::with(settings);
+    arm.enable();
+    let before_rad = arm.simulator.drive(2).unwrap().position_rad();
+    for _ in 0..400 {
+        arm.commands[2].position_rad += 0.5e-3;
+        arm.cycle(DriveTarget::Enabled);
+    }
+    for _ in 0..200 {
+        arm.cycle(DriveTarget::Enabled);
+    }
+    let moved_rad = arm.simulator.drive(2).unwrap().position_rad() - before_rad;
+    let error_rad = (arm.status(2).position_rad - arm.commands[2].position_rad).abs();
+    assert!(error_rad < 0.005, "feedback differs by {error_rad} rad");
+    // Half the units a motor revolution: 0.2 rad commanded are 0.4 rad of the link.
+    assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
+}
+
+/// Goal: an energised drive that counts otherwise is not taken over.
+#[test]
+fn energised_drive_that_counts_otherwise_is_not_adopted() {
+    let mut arm = orphaned(Reaction::Hold, 40);
+    // The next master has other settings for the same drives.
+    let mut other = arm.settings.clone();
+    let Protocol::Cia402(cia402) = &mut other.servos[2].protocol else { unreachable!() };
+    cia402.gear_ratio = 50.0;
+    restart_as(&mut arm, &other);
+    for _ in 0..3_000 {
+        arm.cycle(DriveTarget::Disabled);
+    }
+    let status = arm.status(2);
+    assert_eq!(status.state, DriveState::EnergisedUnowned);
+    let said = explain_refusal(&status.refusal());
+    assert!(said.contains("0x6091") && said.contains("101") && said.contains("50"), "{said}");
+}
