@@ -144,7 +144,7 @@ fn replan_start_with_no_exit_nearby_keeps_the_reduced_margin_throughout_and_says
     }
     let scene = at(far);
     let plan = replan(&robot, &scene, &start, &goal).unwrap_or_else(|e| panic!("{far} m: {e}"));
-    let words = "margin 0.0495 m all the way: the start is nearer to ball than 0.6500 m; ";
+    let words = "margin 0.0495 m along the whole motion: the start is nearer to ball than 0.6500 m; ";
     assert!(plan.how.starts_with(words), "{}", plan.how);
     for i in 0..=1_000 {
         let t_s = plan.trajectory.duration_s() * f64::from(i) / 1_000.0;

@@ -279,7 +279,7 @@ mod tests {
             ),
             (
                 Cause::bus(0, BusFault::QueueFull, 3.0, 3.0),
-                "bus fault on bus `arm` (can3): transmit queue full (ENOBUFS) for 3 cycles in a row; see that the drives \
+                "bus fault on bus `arm` (can3): transmit queue full (ENOBUFS) for 3 consecutive cycles; see that the drives \
                  are powered, the cable is whole, both ends are terminated and the bit rate is theirs",
             ),
             (
