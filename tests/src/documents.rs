@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Commands of the source tree, and the step of `cargo xtask test` that covers each of them.
-const CHECKOUT_LINES: [(&str, &str); 6] = [
+const CHECKOUT_LINES: [(&str, &str); 7] = [
     ("cargo xtask demo", "the demo as an ordinary user"),
     ("cargo xtask test", "this run"),
     ("cargo build --release && export PATH=\"$PWD/target/release:$PATH\"", "programs"),
     ("cargo xtask install", "the installed services under systemd"),
     ("cargo xtask uninstall", "the installed services under systemd"),
+    ("sudo systemctl enable --now systemd-networkd", "the installed services under systemd"),
     ("sudo cp /usr/share/taustream/network/", "the installed services under systemd"),
 ];
 

@@ -4,7 +4,7 @@ use taustream_drivers::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState, PdoEntr
 use taustream_drivers::codec::cia402::{DriveStep, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo};
 use taustream_drivers::codec::object::{self, Address};
 use taustream_drivers::codec::sdo::{SdoBytes, SdoRequest, SdoResponse, SegmentBytes};
-use taustream_drivers::codec::{emcy, words};
+use taustream_drivers::codec::{emcy, error_text};
 use taustream_drivers::{CanFrame, CanId};
 
 #[test]

@@ -103,8 +103,13 @@ fn unhurried_config(root: &Path, output: &Path) -> Result<PathBuf> {
     for entry in fs::read_dir(config.join("settings"))? {
         let path = entry?.path();
         let text = fs::read_to_string(&path)?;
+        // An arm of its own: services of one name and user are one arm, whatever their runtime directory.
+        let own = format!("\nname = \"documents-{}\"", std::process::id());
         let slow: Vec<String> = text.lines().map(unhurried).collect();
-        fs::write(&path, slow.join("\n"))?;
+        let slow = slow.join("\n");
+        let name =
+            slow.lines().find(|line| line.starts_with("name = ")).context("settings without a name")?;
+        fs::write(&path, slow.replacen(&format!("\n{name}"), &own, 1))?;
     }
     Ok(config)
 }
@@ -119,10 +124,6 @@ fn unhurried(line: &str) -> String {
         ("drive_timeout_s", "30.0"),
     ];
     let key = line.split('=').next().unwrap_or("").trim();
-    if line.starts_with("name = ") {
-        // An arm of its own: services of one name and user are one arm, whatever their runtime directory.
-        return format!("name = \"documents-{}\"", std::process::id());
-    }
     let wide = WIDE.iter().find(|(name, _)| *name == key);
     wide.map_or_else(|| line.to_owned(), |(name, value)| format!("{name} = {value}"))
 }
