@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn overruled_objects_are_told_apart() {
+    fn overruled_objects_are_distinguished() {
         for object in ScaleObject::ALL {
             let only = Overruled::NONE.with(object);
             let fixed_joints: Vec<ScaleObject> = only.objects().collect();

@@ -65,7 +65,7 @@ fn kinds() -> Vec<Kind> {
         },
         Kind {
             title: "Settings files",
-            about: "`config/settings`: one arm's robot, scene, buses and servos. Nothing that moves an arm has a default.",
+            about: "`config/settings`: one arm's robot, scene, buses and servos. Keys that affect motion have no default.",
             samples: vec![
                 shipped("config/settings/vcan6.toml", &[]),
                 shipped("config/settings/damiao6.toml", &[]),

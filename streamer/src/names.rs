@@ -102,7 +102,7 @@ impl Names {
         explain_refusal_on(refusal, self.joint_has_cable(joint))
     }
 
-    /// A drive's status word in words: "0x0218 fault".
+    /// A drive's status word as text: "0x0218 fault".
     #[must_use]
     pub fn status_word(&self, joint: usize, word: u32) -> String {
         explain_status(self.servos.get(joint).map(|servo| servo.protocol), word)

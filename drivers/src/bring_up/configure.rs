@@ -52,7 +52,7 @@ impl Node {
         }
     }
 
-    /// Whether the value lets the plan go on; false asks again, or the stage has changed.
+    /// Whether the value lets the plan continue; false asks again, or the stage has changed.
     fn check_value(
         &mut self,
         now: Nanos,

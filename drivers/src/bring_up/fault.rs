@@ -208,7 +208,7 @@ pub fn explain_on(code: u32, has_cable: bool) -> String {
     }
 }
 
-/// A drive's status word in words, by the name of its protocol: "0x0218 fault".
+/// A drive's status word as text, by the name of its protocol: "0x0218 fault".
 #[must_use]
 pub fn explain_status(protocol: Option<&str>, word: u32) -> String {
     match protocol {
@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn status_words_are_told_by_protocol() {
+    fn status_words_are_explained_by_protocol() {
         for (protocol, word, expected) in [
             (Some("cia402"), 0x0250, "0x0250 switch on disabled"),
             (Some("cia402"), 0x12B7, "0x12B7 operation enabled, warning"),

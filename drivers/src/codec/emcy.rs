@@ -1,4 +1,4 @@
-//! Emergency codes in words (CANopen EMCY, object 0x603F).
+//! Emergency codes as text (CANopen EMCY, object 0x603F).
 //!
 //! A code is a tree of hexadecimal digits: `0x2331` is phase U of `0x2330` earth leakage of `0x2300` current at the output
 //! of `0x2000` current. A code that is not listed gets the words of the nearest one above it.
@@ -175,9 +175,9 @@ mod tests {
         }
     }
 
-    /// Goal: what is not listed is told by what stands above it, never by a neighbour.
+    /// Goal: an unlisted code is explained by its class, never by a neighbour.
     #[test]
-    fn codes_are_told_as_the_standards_name_them() {
+    fn codes_are_named_as_in_the_standards() {
         for (code, expected) in [
             (0x7320, "position sensor fault"),
             (0x7305, "incremental encoder 1 faulty"),

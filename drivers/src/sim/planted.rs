@@ -22,7 +22,7 @@ pub struct PlantedObject {
 /// Why an object cannot be planted.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlantError {
-    /// A piece without an equals sign, an unknown key, or one that stands twice.
+    /// A piece without an equals sign, an unknown key, or one that appears twice.
     #[error(
         "{0:?} is no part of an object: expected joint= (all joints without it), object=0xINDEX:SUB, value=NUMBER|absent"
     )]

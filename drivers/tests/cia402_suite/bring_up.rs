@@ -375,7 +375,7 @@ fn bring_up_of_a_drive_that_counts_otherwise_is_refused_by_object_and_numbers() 
         assert!(words.contains(name) && words.contains("overruled_objects = ["), "{words}");
         bench.drive_target = DriveTarget::Enabled;
         bench.steps(500);
-        assert!(bench.drives[1].control & 0x08 == 0, "{name}: the refused drive was told to enable");
+        assert!(bench.drives[1].control & 0x08 == 0, "{name}: the refused drive was commanded to enable");
     }
 }
 
