@@ -35,6 +35,9 @@ pub enum StartError {
 pub struct Threads {
     stop: Arc<AtomicBool>,
     all: Vec<JoinHandle<()>>,
+    /// Ends first: it would take the closing of the others' ports for a loss.
+    watch: Option<JoinHandle<()>>,
+    watch_stop: Arc<AtomicBool>,
 }
 
 impl Threads {
@@ -71,7 +74,8 @@ impl Threads {
         let mut publisher = Publisher::new(settings, around)?;
 
         let (mut watch, ends) = PortWatch::new(&arm, runtime, 2);
-        let mut threads = Self { stop: Arc::default(), all: Vec::new() };
+        let mut threads =
+            Self { stop: Arc::default(), all: Vec::new(), watch: None, watch_stop: Arc::default() };
         let mut ends = ends.into_iter();
         if let (Some(first), Some(second)) = (ends.next(), ends.next()) {
             let stop = Arc::clone(&threads.stop);
@@ -91,7 +95,7 @@ impl Threads {
         let stop = Arc::clone(&threads.stop);
         let manager = Manager::from_environment();
         threads.spawn("stop", 512 << 10, move || socket.serve(&files_in, manager, &stop))?;
-        threads.all.push(watch.start(files, Arc::clone(&threads.stop))?);
+        threads.watch = Some(watch.start(files, Arc::clone(&threads.watch_stop))?);
         Ok(threads)
     }
 
@@ -102,7 +106,12 @@ impl Threads {
 
     /// Ends all of them, after they have written what is left.
     pub fn finish(self) {
+        self.watch_stop.store(true, Ordering::Release);
+        let watch_panicked = self.watch.is_some_and(|watch| watch.join().is_err());
         self.stop.store(true, Ordering::Release);
+        if watch_panicked {
+            error!("the thread ports has panicked");
+        }
         for thread in self.all {
             let name = thread.thread().name().unwrap_or("without name").to_owned();
             if thread.join().is_err() {
