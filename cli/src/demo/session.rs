@@ -24,8 +24,8 @@ use taustream_motion::{JointArray, Setpoint};
 const DEADLINE_MS: u32 = 4000;
 /// Longest wait for drives that are found, configured, energised or switched off.
 const DRIVES_S_MAX: f64 = 20.0;
-/// Faults that the demo recovers from; more are no accident.
-const FAULTS_MAX: usize = 2;
+/// Faults that the demo recovers from: a computer without real-time rights that is busy stalls again and again.
+const FAULTS_MAX: usize = 20;
 /// Longest wait for rest after a stop.
 const REST_S_MAX: f64 = 5.0;
 
@@ -81,7 +81,9 @@ impl<'a> Session<'a> {
 
     /// Enables, then plans and executes one move after the other.
     pub(crate) fn go_through_goals(&mut self, demo: &DemoFile) -> Result<(), Failure> {
-        self.enable()?;
+        while let Err(why) = self.enable() {
+            self.recover(why)?;
+        }
         execute(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
         for (i, goal_rad) in demo.goals_rad.iter().enumerate() {
             self.seen.borrow_mut().view.begin_move(i + 1);
@@ -123,30 +125,46 @@ impl<'a> Session<'a> {
         if phase != Phase::Paused || !stalled || *resumed_at == report.stalls {
             return Ok(());
         }
+        match execute(&self.client, self.arm, Command::Resume, 0.0) {
+            // Asked again at the next report, unless that says that the arm has stopped.
+            Err(Failure::Refused(_)) => return Ok(()),
+            done => done?,
+        }
         *resumed_at = report.stalls;
         let why = pause_sentence(report).unwrap_or_default();
-        note(format_args!("PAUSED: {why}. Resuming .."));
-        match execute(&self.client, self.arm, Command::Resume, 0.0) {
-            // It has stopped in the meantime: the next report says why.
-            Err(Failure::Refused(_)) => Ok(()),
-            done => done.inspect(|()| self.pauses.borrow_mut().push(why)),
-        }
+        note(format_args!("RESUMED: {why}"));
+        self.pauses.borrow_mut().push(why);
+        Ok(())
     }
 
     /// A computer that is busy with other things may hold the simulated servos up until the streamer stops the arm. Then
     /// the demo does what an operator would, says so, and counts it; every other failure is handed back.
     fn recover(&mut self, why: Failure) -> Result<(), Failure> {
+        self.check_time()?;
         let (report, phase) = self.client.report()?;
         let in_fault = matches!(phase, Phase::Fault | Phase::FastStopping | Phase::Braking);
-        if !in_fault || self.faults.len() >= FAULTS_MAX || matches!(why, Failure::Interrupted(_)) {
+        let cleared = matches!(phase, Phase::Disabled | Phase::Locked) && !self.faults.is_empty();
+        let gives_up = self.faults.len() >= FAULTS_MAX || matches!(why, Failure::Interrupted(_));
+        if gives_up || !(in_fault || cleared) {
             return Err(why);
         }
-        let fault = fault_sentence(&report, self.arm);
-        note(format_args!("FAULT: {fault}; the arm was stopped. Clearing, enabling, planning again .."));
-        self.faults.push(fault);
-        self.wait_for(Phase::Fault, "come to rest")?;
-        execute(&self.client, self.arm, Command::ClearFault, REST_S_MAX)?;
-        self.enable()
+        if in_fault {
+            let fault = fault_sentence(&report, self.arm);
+            note(format_args!("FAULT: {fault}; the arm was stopped. Clearing, enabling, planning again .."));
+            self.faults.push(fault);
+            self.wait_for(Phase::Fault, "come to rest")?;
+        }
+        let clears = || {
+            if in_fault { execute(&self.client, self.arm, Command::ClearFault, REST_S_MAX) } else { Ok(()) }
+        };
+        match clears().and_then(|()| self.enable()) {
+            // Another fault on the way: the next request is refused for it, and comes back here.
+            Err(again @ (Failure::Failed(_) | Failure::Refused(_))) => {
+                note(format_args!("  {again}"));
+                Ok(())
+            }
+            done => done,
+        }
     }
 
     fn enable(&self) -> Result<(), Failure> {
