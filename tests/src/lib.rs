@@ -7,7 +7,7 @@
 //!
 //! [`booted`] boots a whole Debian ([`debian`]) with systemd in that machine, and [`services`] tries the installed services
 //! there.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod booted;
 pub mod bus_scenarios;
@@ -27,5 +27,6 @@ pub mod scenarios;
 mod scratch;
 pub mod services;
 pub mod setpoints;
+pub mod slice;
 pub mod test_bench;
 pub mod traffic;

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use taustream_tests::booted::Booted;
 use taustream_tests::services::{checks, files, stall};
-use taustream_tests::{debian, machine};
+use taustream_tests::{debian, machine, slice};
 
 /// Tries the installed services under a real systemd.
 #[derive(Debug, Parser)]
@@ -83,6 +83,8 @@ fn perform(what: What) -> Result<usize> {
             }
             let controller = cache.join("controller");
             files::lay_out(&controller, &stage)?;
+            // Inherited by the machine.
+            slice::shorten();
             let booted = Booted { image: &image, files: &[&stage, &controller], output: &output, limit_s };
             let status = booted.run(&["/opt/services", "check", &only], &stop)?;
             println!("booted, tried and ended in {:.0} s", since.elapsed().as_secs_f64());

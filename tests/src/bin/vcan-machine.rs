@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use taustream_tests::machine::Machine;
+use taustream_tests::slice;
 
 /// The machine itself failed, as opposed to the command.
 const FAILED: u8 = 125;
@@ -72,6 +73,8 @@ fn main() -> anyhow::Result<ExitCode> {
     for directory in arguments.writable {
         machine = machine.writable(directory);
     }
+    // Inherited by what it starts.
+    slice::shorten();
     match machine.run(&arguments.command, &stop) {
         Ok(status) => Ok(ExitCode::from(status)),
         Err(error) => {
