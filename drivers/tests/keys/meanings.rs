@@ -191,6 +191,14 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: servo[].after_stall",
         "How the motion goes on after a stall that the drives do not bridge; `go-on` for MIT motors, else `freeze`.",
     ),
+    (
+        "Settings files: servo[].limp_risk_acknowledged",
+        "true: the joint falls when commands stop, its servo cannot hold, and its owner knows it; false.",
+    ),
+    (
+        "Settings files: servo[].overruled_objects",
+        "CiA 402: objects of the drive that are not compared with these settings, for example `[0x6091]`; none.",
+    ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
@@ -246,6 +254,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Watchdog on setpoints, 0 for none; `cycle.drive_watchdog_ms`.",
     ),
     ("Settings files: simulator.boot_ms", "Time from power-up to the first message; 20."),
+    (
+        "Settings files: simulator.objects",
+        "Other values of objects of the drives, for example `[\"joint=3,object=0x6091:01,value=50\"]`; none.",
+    ),
     ("Settings files: simulator.step_us", "Step of the simulated mechanics, us; 250."),
     (
         "Settings files: simulator.motor_position_range_rad",
