@@ -305,7 +305,7 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
     let gap = table.integer_or("tolerated_gap_periods", default::TOLERATED_GAP_PERIODS, 1, 100);
     let stall = table.integer_or("stall_resume_ms", default::STALL_RESUME_MS, 0, 10_000);
     let watchdog = table.integer("drive_watchdog_ms", 1, 10_000);
-    let heartbeat = table.has("heartbeat_lost_ms").then(|| table.integer("heartbeat_lost_ms", 1, 60_000));
+    let heartbeat = table.integer_if_there("heartbeat_lost_ms", 1, 60_000);
     let priority = table.integer_or("priority", default::PRIORITY, 1, 99);
     let cpu = table.integer_if_there("cpu", 0, 1023);
     let report_rate_hz = table.number_or("report_rate_hz", default::REPORT_RATE_HZ, &RATE_HZ);
@@ -315,10 +315,9 @@ fn read_cycle(mut table: Table<'_>) -> Option<CycleSettings> {
         tolerated_gap_periods: u32::try_from(gap?).ok()?,
         stall_resume_ms: u32::try_from(stall?).ok()?,
         drive_watchdog_ms: u32::try_from(watchdog?).ok()?,
-        heartbeat_lost_ms: u16::try_from(match heartbeat {
-            Some(heartbeat) => heartbeat?,
-            None => watchdog?.saturating_add(default::HEARTBEAT_BEYOND_WATCHDOG_MS),
-        })
+        heartbeat_lost_ms: u16::try_from(
+            heartbeat?.unwrap_or(watchdog?.saturating_add(default::HEARTBEAT_BEYOND_WATCHDOG_MS)),
+        )
         .ok()?,
         priority: u8::try_from(priority?).ok()?,
         cpu: cpu?.and_then(|cpu| usize::try_from(cpu).ok()),

@@ -42,10 +42,11 @@ const WORDS: &str = "\"freeze\" or \"go-on\": what follows a stall of the stream
 
 /// Reads `after_stall`.
 pub(crate) fn read(table: &mut Table<'_>, protocol: Option<&Protocol>) -> Option<AfterStall> {
-    if !table.has("after_stall") {
+    let word = table.text_if_there("after_stall", WORDS);
+    if !table.had("after_stall") {
         return protocol.map(AfterStall::by_default);
     }
-    let word = table.text("after_stall", WORDS)?;
+    let word = word?;
     let found = AfterStall::ALL.into_iter().find(|policy| policy.word() == word);
     if found.is_none() {
         table.fault("after_stall", &shown(&word), WORDS);
