@@ -214,8 +214,7 @@ fn read_servo(
     let reaction = trust::read_reaction(table);
     let limp_is_safe = table.flag("limp_is_safe");
     let after_stall = stall::read(table, protocol.as_ref());
-    let limp_risk_acknowledged =
-        if table.has("limp_risk_acknowledged") { table.flag("limp_risk_acknowledged") } else { Some(false) };
+    let limp_risk_acknowledged = table.flag_or("limp_risk_acknowledged", false);
     Some(Servo {
         joint: joint?,
         bus: bus?,
