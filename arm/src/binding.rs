@@ -149,7 +149,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
             top.fault(
                 "servo",
                 "missing",
-                &format!("one table [[servo]] with joint = {:?} (joint {i} of the robot)", joint.name),
+                &format!("one table [[servo]] with joint = {:?} (joint {} of the robot)", joint.name, i + 1),
             );
         }
     }

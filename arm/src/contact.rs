@@ -5,8 +5,8 @@
 //! is seeded and of our own making, so that an arm has the same list on every machine and in every version.
 use crate::body::{Body, Posed, to_parry};
 use crate::rng::SeededRng;
-use crate::robot::LinkShape;
-use std::collections::BTreeMap;
+use crate::robot::{LinkShape, Robot};
+use std::collections::{BTreeMap, BTreeSet};
 use taustream_motion::chain::Chain;
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
@@ -79,16 +79,60 @@ fn always_touching(
         placed.extend(solid.iter().filter_map(|s| Some(s.body.placed(frames.get(s.frame)?))));
         let touch =
             |(i, j): &(usize, usize)| match (solid.get(*i), placed.get(*i), solid.get(*j), placed.get(*j)) {
-                (Some(a), Some(a_at), Some(b), Some(b_at)) => {
-                    let apart_m = (a_at.centre - b_at.centre).length() - a.body.bound_m() - b.body.bound_m();
-                    apart_m <= 0.0 && a.body.distance_m(a_at, &b.body, b_at) <= 0.0
-                }
+                (Some(a), Some(a_at), Some(b), Some(b_at)) => are_touching((a, a_at), (b, b_at)),
                 _ => false,
             };
         // Pairs that have parted once are out; most are out after a few poses, so the rest costs little.
         pairs.retain(|_, shapes| shapes.iter().any(touch));
     }
     pairs.into_keys().collect()
+}
+
+/// Poses that [`Robot::often_touching`] looks at.
+const LOOKS: u32 = 400;
+/// Share of them from which a pair is worth a look: such an arm can hardly be planned for.
+const OFTEN: f64 = 0.5;
+
+impl Robot {
+    /// Pairs of links that may not touch, and do so in at least half of 400 seeded random poses, with that share: either their shapes
+    /// are too wide, or they belong into `allowed_contacts`. Costs far more than reading the robot.
+    #[must_use]
+    pub fn often_touching(&self) -> Vec<(LinkPair, f64)> {
+        let build = |shape: &LinkShape| {
+            let body = Body::new(&shape.shape, &shape.pose)?;
+            Some(Solid { link: shape.link, frame: shape.frame.min(self.joints.len()), body })
+        };
+        let solid: Vec<Solid> = self.shapes.iter().filter_map(build).collect();
+        let limits: Vec<JointLimits> = self.joints.iter().map(|joint| joint.limits).collect();
+        let mut touches: BTreeMap<LinkPair, u32> = BTreeMap::new();
+        let mut rng = SeededRng::new(SEED, 1);
+        for _ in 0..LOOKS {
+            let frames = self.chain.frames(&uniform_pose(&mut rng, &limits)).map(|frame| to_parry(&frame));
+            let placed: Vec<(&Solid, Posed)> =
+                solid.iter().filter_map(|s| Some((s, s.body.placed(frames.get(s.frame)?)))).collect();
+            let mut now: BTreeSet<LinkPair> = BTreeSet::new();
+            for (i, (a, a_at)) in placed.iter().enumerate() {
+                for (b, b_at) in placed.iter().skip(i + 1) {
+                    let pair = (a.link.min(b.link), a.link.max(b.link));
+                    let may_part =
+                        a.frame != b.frame && !self.may_touch(a.link, b.link) && !now.contains(&pair);
+                    if may_part && are_touching((a, a_at), (b, b_at)) {
+                        now.insert(pair);
+                    }
+                }
+            }
+            for pair in now {
+                *touches.entry(pair).or_default() += 1;
+            }
+        }
+        let share = |(pair, count): (LinkPair, u32)| (pair, f64::from(count) / f64::from(LOOKS));
+        touches.into_iter().map(share).filter(|(_, share)| *share >= OFTEN).collect()
+    }
+}
+
+fn are_touching((a, a_at): (&Solid, &Posed), (b, b_at): (&Solid, &Posed)) -> bool {
+    let apart_m = (a_at.centre - b_at.centre).length() - a.body.bound_m() - b.body.bound_m();
+    apart_m <= 0.0 && a.body.distance_m(a_at, &b.body, b_at) <= 0.0
 }
 
 fn uniform_pose(rng: &mut SeededRng, limits: &[JointLimits]) -> [f64; MAX_JOINTS] {

@@ -1,12 +1,15 @@
 //! What a robot file says, key by key, before anything is derived from it.
 //!
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
+use crate::capsule::Capsule;
 use crate::document::{Node, Value, shown};
 use crate::mass::{self, Weight};
+use crate::modelled::{self, Listed};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::link_name;
-use crate::rows::{self, Row};
-use crate::urdf::{self, JointInfo, UrdfArm};
+use crate::rows::{self, Row, RowKind};
+use crate::urdf::{self, JointInfo, StatedLimits, UrdfArm};
+use std::f64::consts::TAU;
 use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 
 /// One joint of the arm.
@@ -34,6 +37,10 @@ pub(crate) struct Description {
     pub(crate) geometry: Geometry,
     /// Link pairs, lower index first, sorted, each once.
     pub(crate) allowed_contacts: Vec<(usize, usize)>,
+    /// Of the base, in its frame; none beside a URDF.
+    pub(crate) base_capsules: Vec<Capsule>,
+    /// Links that are acknowledged to have no shape.
+    pub(crate) unmodelled_links: Vec<String>,
     /// What the tip carries, in its frame.
     pub(crate) payload: Option<Weight>,
     /// Gravity in the base's frame.
@@ -48,6 +55,9 @@ const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
 const ACCELERATION_RAD_S2: Bounds = Bounds::above(0.0, 1e4, "rad/s^2");
 const JERK_RAD_S3: Bounds = Bounds::above(0.0, 1e7, "rad/s^3");
 
+/// Two revolutions.
+const DEGREES_FROM_RAD: f64 = 2.0 * TAU;
+
 /// Stop limits where the file gives none, as multiples of the motion limits.
 const STOP_ACCELERATION_RATIO: f64 = 2.0;
 const STOP_JERK_RATIO: f64 = 4.0;
@@ -59,15 +69,62 @@ impl Description {
         let name = top.name("name");
         let mut notices = Vec::new();
         let from_urdf = top.has("urdf");
-        let read = if from_urdf { read_urdf(&mut top, &mut notices) } else { read_rows(&mut top) };
+        let listed = modelled::read(&mut top);
+        let base_capsules =
+            if from_urdf { Some(Vec::new()) } else { Capsule::read_list(&mut top, "base_capsules") };
+        let read = if from_urdf {
+            read_urdf(&mut top, &listed, &mut notices)
+        } else {
+            read_rows(&mut top, &mut notices)
+        };
         let allowed_contacts = read_contacts(&mut top, read.links.as_deref());
         let payload = read_payload(&mut top);
         let gravity_m_s2 = Weight::read_gravity(&mut top);
         top.done();
         let (joints, geometry) = read.whole?;
         let (name, payload, gravity_m_s2) = (name?, payload?, gravity_m_s2?);
-        let described = Self { name, joints, geometry, allowed_contacts, payload, gravity_m_s2, notices };
+        let described = Self {
+            name,
+            joints,
+            geometry,
+            allowed_contacts,
+            base_capsules: base_capsules?,
+            unmodelled_links: listed.iter().map(|listed| listed.name.clone()).collect(),
+            payload,
+            gravity_m_s2,
+            notices,
+        };
+        modelled::check(fault_list, &listed, &read.links.unwrap_or_default(), |link| {
+            described.has_shape(link)
+        });
         fault_list.is_clean().then_some(described)
+    }
+}
+
+impl Description {
+    /// True when a link has a shape; one with a part that could not be read counts as having none.
+    fn has_shape(&self, link: usize) -> bool {
+        match &self.geometry {
+            Geometry::Urdf(arm) => {
+                arm.parts.iter().any(|part| part.link == link) && !arm.skipped.contains(&link)
+            }
+            Geometry::Rows(rows) => {
+                // A modified row's own capsule lies before its joint.
+                let along = |row: &Row| match row.kind {
+                    RowKind::Standard => 0,
+                    RowKind::Modified => 1,
+                };
+                let by_radius = |(i, row): (usize, &Row)| {
+                    let is_last = link == rows.len() && i + 1 == link;
+                    row.link_radius_m > 0.0 && (i + 1 == link + along(row) || is_last)
+                };
+                let own = link
+                    .checked_sub(1)
+                    .and_then(|i| rows.get(i))
+                    .map_or(&self.base_capsules, |row| &row.capsules);
+                !own.is_empty() || rows.iter().enumerate().any(by_radius)
+            }
+        }
     }
 }
 
@@ -78,7 +135,7 @@ struct Read {
     whole: Option<(Vec<Joint>, Geometry)>,
 }
 
-fn read_rows(top: &mut Table<'_>) -> Read {
+fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
     // Asked for, so that it is listed among the known keys.
     top.take("urdf");
     for key in urdf::KEYS.iter().skip(1) {
@@ -96,7 +153,7 @@ fn read_rows(top: &mut Table<'_>) -> Read {
         // Every key is read before the first `?`, so that one fault does not hide the next.
         let name = table.name("name");
         let row = rows::read(&mut table);
-        let limits = read_limits(&mut table, &Known::Nothing, &mut Vec::new());
+        let limits = read_limits(&mut table, &Known::Nothing, notices);
         table.done();
         read.push(name.zip(limits).zip(row).map(|((name, limits), row)| (Joint { name, limits }, row)));
     }
@@ -115,8 +172,8 @@ fn read_rows(top: &mut Table<'_>) -> Read {
 }
 
 /// The URDF gives the joints and their order; the tables give what a URDF does not know.
-fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
-    let arm = UrdfArm::read(top);
+fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) -> Read {
+    let arm = UrdfArm::read(top, listed);
     let joint_info = arm.as_ref().map(UrdfArm::joints);
     let mut limits: Vec<Option<JointLimits>> = vec![None; joint_info.as_ref().map_or(0, Vec::len)];
     let mut names: Vec<Option<String>> = Vec::new();
@@ -150,7 +207,7 @@ fn read_urdf(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
     let Some((arm, joint_info)) = arm.zip(joint_info) else { return Read { links, whole: None } };
     for joint in joint_info.iter().filter(|joint| !names.iter().flatten().any(|name| *name == joint.name)) {
         let expected = format!(
-            "one table [[joint]] with name = {}: a URDF has no accelerations and jerks, and they have no default",
+            "one table [[joint]] with name = {}: limits that the URDF does not state have no default",
             shown(&joint.name)
         );
         top.fault("joint", "missing", &expected);
@@ -175,12 +232,15 @@ enum Known<'a> {
 
 fn read_limits(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<JointLimits> {
     let position_rad = read_position(table, known);
-    let motion = table.table("motion", "a table of velocity_rad_s, acceleration_rad_s2, jerk_rad_s3");
-    let motion = motion.and_then(|motion| read_motion(motion, known, notices));
+    let motion = read_motion(table, known, notices);
     let stop = match table.table_if_there("stop") {
         Some(stop) => read_stop(stop, motion.as_ref()),
         None => motion.map(default_stop),
     };
+    say_degrees(table, position_rad, notices);
+    if let (Some(stop), Known::Urdf(joint_info)) = (&stop, known) {
+        say_stops_beyond(joint_info, stop, notices);
+    }
     Some(JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? })
 }
 
@@ -233,36 +293,131 @@ fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
     }
 }
 
-/// No default for acceleration and jerk: what plans may ask of a joint is the owner's word, not ours.
-fn read_motion(mut table: Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
-    let stated = if let Known::Urdf(joint_info) = known { joint_info.velocity_rad_s } else { None };
-    let velocity_rad_s = match stated.filter(|v| VELOCITY_RAD_S.hold(*v)) {
-        Some(stated) if !table.has("velocity_rad_s") => {
-            table.take("velocity_rad_s");
-            Some(stated)
-        }
-        _ if matches!(known, Known::Something) && !table.has("velocity_rad_s") => {
-            table.take("velocity_rad_s");
-            None
-        }
-        _ => table.number("velocity_rad_s", &VELOCITY_RAD_S),
-    };
-    if let (Some(given), Some(stated), Known::Urdf(joint_info)) = (velocity_rad_s, stated, known)
-        && given > stated
-    {
-        let name = shown(&joint_info.name);
-        notices.push(format!(
-            "joint {name}: motion.velocity_rad_s = {given} is above the URDF's limit of {stated} rad/s"
-        ));
+/// The three motion limits, each from the table or else from the URDF. Nothing that moves metal has another default.
+fn read_motion(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
+    const EXPECTED: &str = "a table of velocity_rad_s, acceleration_rad_s2, jerk_rad_s3";
+    let stated =
+        if let Known::Urdf(joint_info) = known { joint_info.limits } else { StatedLimits::default() };
+    let whole =
+        [stated.velocity, stated.acceleration, stated.jerk].iter().all(|v| v.is_some_and(|v| v > 0.0));
+    if whole && !table.has("motion") {
+        table.take("motion");
+        return from_urdf(table, &stated);
     }
-    let acceleration_rad_s2 = table.number("acceleration_rad_s2", &ACCELERATION_RAD_S2);
-    let jerk_rad_s3 = table.number("jerk_rad_s3", &JERK_RAD_S3);
-    table.done();
+    let mut motion = table.table("motion", EXPECTED)?;
+    let mut limit = |key, (attribute, unit), stated, bounds: &Bounds| {
+        let read = read_limit(&mut motion, known, (key, attribute, stated), bounds);
+        let (given, stated, Known::Urdf(joint_info)) = (read?, stated.filter(|v| *v > 0.0), known) else {
+            return read;
+        };
+        if stated.is_some_and(|stated| given > stated) {
+            let (name, stated) = (shown(&joint_info.name), stated.unwrap_or(0.0));
+            notices.push(format!(
+                "joint {name}: motion.{key} = {given} is above the URDF's limit of {stated} {unit}"
+            ));
+        }
+        Some(given)
+    };
+    let velocity_rad_s = limit("velocity_rad_s", ("velocity", "rad/s"), stated.velocity, &VELOCITY_RAD_S);
+    let acceleration_rad_s2 =
+        limit("acceleration_rad_s2", ("acceleration", "rad/s2"), stated.acceleration, &ACCELERATION_RAD_S2);
+    let jerk_rad_s3 = limit("jerk_rad_s3", ("jerk", "rad/s3"), stated.jerk, &JERK_RAD_S3);
+    motion.done();
     Some(LimitSet {
         velocity_rad_s: velocity_rad_s?,
         acceleration_rad_s2: acceleration_rad_s2?,
         jerk_rad_s3: jerk_rad_s3?,
     })
+}
+
+/// All motion limits by the URDF, whose numbers must be inside the bounds of the file's.
+fn from_urdf(table: &Table<'_>, stated: &StatedLimits) -> Option<LimitSet> {
+    let checked = |attribute: &str, value: Option<f64>, bounds: &Bounds| {
+        let value = value?;
+        if bounds.hold(value) {
+            return Some(value);
+        }
+        let expected =
+            format!("{} as limit.{attribute} of the URDF; give motion limits here", bounds.words());
+        table.fault("motion", &format!("{value} by the URDF"), &expected);
+        None
+    };
+    let velocity_rad_s = checked("velocity", stated.velocity, &VELOCITY_RAD_S);
+    let acceleration_rad_s2 = checked("acceleration", stated.acceleration, &ACCELERATION_RAD_S2);
+    let jerk_rad_s3 = checked("jerk", stated.jerk, &JERK_RAD_S3);
+    Some(LimitSet {
+        velocity_rad_s: velocity_rad_s?,
+        acceleration_rad_s2: acceleration_rad_s2?,
+        jerk_rad_s3: jerk_rad_s3?,
+    })
+}
+
+/// One motion limit: the file's, or else what the URDF states above 0.
+fn read_limit(
+    motion: &mut Table<'_>,
+    known: &Known<'_>,
+    (key, attribute, stated): (&'static str, &str, Option<f64>),
+    bounds: &Bounds,
+) -> Option<f64> {
+    if motion.has(key) {
+        return motion.number(key, bounds);
+    }
+    match (known, stated) {
+        (Known::Nothing, _) => return motion.number(key, bounds),
+        (Known::Urdf(_), Some(stated)) if bounds.hold(stated) => {
+            motion.take(key);
+            return Some(stated);
+        }
+        (Known::Something, _) => {
+            motion.take(key);
+            return None;
+        }
+        (Known::Urdf(_), _) => {}
+    }
+    motion.take(key);
+    let value = match stated {
+        Some(stated) => format!("missing, and the URDF's limit.{attribute} is {stated}"),
+        None => format!("missing, and the URDF states no limit.{attribute}"),
+    };
+    let zero = if stated == Some(0.0) { " (0 in a URDF means that nobody knew it)" } else { "" };
+    motion.fault(key, &value, &format!("{}; state it here{zero}", bounds.words()));
+    None
+}
+
+/// A range of more than two revolutions to a side is rare, and one of degrees is common.
+fn say_degrees(table: &Table<'_>, position_rad: Option<[f64; 2]>, notices: &mut Vec<String>) {
+    let Some([low, high]) = position_rad.filter(|range| range.iter().any(|rad| rad.abs() > DEGREES_FROM_RAD))
+    else {
+        return;
+    };
+    notices.push(format!(
+        "{} = [{low}, {high}] are {:.1} and {:.1} revolutions: LOOKS LIKE DEGREES; in rad these would be [{:.4}, {:.4}]",
+        table.path_of("position_rad"),
+        low / TAU,
+        high / TAU,
+        low.to_radians(),
+        high.to_radians()
+    ));
+}
+
+/// A stop may use more than a motion; where the URDF states less, that is said.
+fn say_stops_beyond(joint_info: &JointInfo, stop: &LimitSet, notices: &mut Vec<String>) {
+    let beyond = |what: &str, stop: f64, stated: Option<f64>| {
+        let stated = stated.filter(|stated| *stated > 0.0 && stop > *stated)?;
+        Some(format!("stop.{what} = {stop} is above the URDF's {stated}"))
+    };
+    let said = [
+        beyond("acceleration_rad_s2", stop.acceleration_rad_s2, joint_info.limits.acceleration),
+        beyond("jerk_rad_s3", stop.jerk_rad_s3, joint_info.limits.jerk),
+    ];
+    let said: Vec<String> = said.into_iter().flatten().collect();
+    if !said.is_empty() {
+        notices.push(format!(
+            "joint {}: {}; only pauses and stops use it",
+            shown(&joint_info.name),
+            said.join(", ")
+        ));
+    }
 }
 
 /// The design's ratios: where `a_m + v_m |sigma'| <= a_s`, they leave one whole motion acceleration for slowing down.

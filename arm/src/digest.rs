@@ -34,9 +34,13 @@
 //! | then, only when rows have masses or there is a payload: | |
 //! | u8 | 1 when rows have masses, otherwise 0; with 1, per joint f64 mass and 3 x f64 centre of its link |
 //! | u8 | 1 when there is a payload, otherwise 0; with 1, f64 mass and 3 x f64 centre |
+//! | then, only when base or rows have capsules: | |
+//! | u8 | 2 |
+//! | base, then per joint: | u32 number of capsules; per capsule 3 x f64 `from_m`, 3 x f64 `to_m`, f64 `radius_m` |
 //!
 //! A string is its length in bytes as u32, then its UTF-8 bytes. An origin is x, y, z, roll, pitch, yaw as 6 x f64. An f64 is its
 //! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
+use crate::capsule::Capsule;
 use crate::description::{Description, Geometry, Joint};
 use crate::mass::Weight;
 use crate::rows::{Row, RowKind};
@@ -57,8 +61,18 @@ pub(crate) fn of_bytes(bytes: &[u8]) -> [u8; 32] {
 fn bytes(description: &Description) -> Vec<u8> {
     // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
     // Gravity and moments of inertia weigh proven motions against each other, and change none.
-    let Description { name, joints, geometry, allowed_contacts, payload, gravity_m_s2: _, notices: _ } =
-        description;
+    // A link that is acknowledged to have no shape has none either way.
+    let Description {
+        name,
+        joints,
+        geometry,
+        allowed_contacts,
+        base_capsules,
+        unmodelled_links: _,
+        payload,
+        gravity_m_s2: _,
+        notices: _,
+    } = description;
     let mut out = HEADER.to_vec();
     put_text(&mut out, name);
     put_count(&mut out, joints.len());
@@ -81,7 +95,24 @@ fn bytes(description: &Description) -> Vec<u8> {
         }
     }
     put_weights(&mut out, geometry, payload.as_ref());
+    put_capsules(&mut out, geometry, base_capsules);
     out
+}
+
+/// The capsules of base and links; nothing at all when there are none, as with weights.
+fn put_capsules(out: &mut Vec<u8>, geometry: &Geometry, base: &[Capsule]) {
+    let Geometry::Rows(rows) = geometry else { return };
+    if base.is_empty() && rows.iter().all(|row| row.capsules.is_empty()) {
+        return;
+    }
+    out.push(2);
+    for capsules in std::iter::once(base).chain(rows.iter().map(|row| row.capsules.as_slice())) {
+        put_count(out, capsules.len());
+        for Capsule { from_m, to_m, radius_m } in capsules {
+            from_m.iter().chain(to_m).for_each(|number| put_number(out, *number));
+            put_number(out, *radius_m);
+        }
+    }
 }
 
 /// What links and payload weigh; nothing at all when nothing is stated, so that a description that states none keeps
@@ -118,8 +149,8 @@ fn put_joint(out: &mut Vec<u8>, Joint { name, limits }: &Joint) {
 }
 
 fn put_row(out: &mut Vec<u8>, row: &Row) {
-    // Weights come after all rows.
-    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, weight: _ } = row;
+    // Weights and capsules come after all rows.
+    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, capsules: _, weight: _ } = row;
     out.push(match kind {
         RowKind::Standard => 0,
         RowKind::Modified => 1,
@@ -210,6 +241,19 @@ mod tests {
             payload("0.0"),
         ];
         for text in heavier {
+            let edited = digest(&text);
+            assert!(!seen.contains(&edited), "{text}");
+            seen.push(edited);
+        }
+        let capsules = |radius: &str, to: &str| {
+            let own = format!(
+                "link_capsules = [{{ from_m = [0, 0, 0], to_m = [0, 0, {to}], radius_m = {radius} }}]"
+            );
+            TEXT.replacen("link_radius_m = 0.0\n", &format!("{own}\n"), 1)
+        };
+        let based =
+            format!("base_capsules = [{{ from_m = [0, 0, 0], to_m = [0, 0, 0], radius_m = 0.1 }}]\n{TEXT}");
+        for text in [capsules("0.1", "0.2"), capsules("0.11", "0.2"), capsules("0.1", "0.25"), based] {
             let edited = digest(&text);
             assert!(!seen.contains(&edited), "{text}");
             seen.push(edited);

@@ -117,14 +117,27 @@ pub(crate) fn read_text(file: &Path, what: &str) -> Result<String, Faults> {
     read_text_of(file, TEXT_BYTES_MAX, what)
 }
 
-/// Reads a text file of at most `bytes_max` bytes.
+/// Reads a text file of at most `bytes_max` bytes; a byte order mark is dropped.
 pub(crate) fn read_text_of(file: &Path, bytes_max: u64, what: &str) -> Result<String, Faults> {
     let bytes = read_file(file, bytes_max, what)?;
-    String::from_utf8(bytes).map_err(|e| {
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        let expected = format!("{what} in UTF-8; save it in that encoding");
+        return Err(Faults(vec![Fault::new(file, "", "UTF-16 text by its byte order mark", &expected)]));
+    }
+    let text = String::from_utf8(bytes).map(|text| match without_mark(&text) {
+        bare if bare.len() == text.len() => text,
+        bare => bare.to_owned(),
+    });
+    text.map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         let line = e.as_bytes().iter().take(at).filter(|b| **b == b'\n').count() + 1;
         Faults(vec![Fault { line: Some(line), ..Fault::new(file, "", "not UTF-8 text", what) }])
     })
+}
+
+/// A text without the byte order mark that some programs write in front of it.
+pub(crate) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// A path of a file, as another file names it: relative to that file's folder.
@@ -134,6 +147,7 @@ pub(crate) fn beside(file: &Path, named: &str) -> PathBuf {
 
 /// Reads a TOML text. The syntax fault names the line.
 pub(crate) fn parse_toml(file: &Path, text: &str) -> Result<Node, Faults> {
+    let text = without_mark(text);
     let lines = Lines::of(text);
     match DeTable::parse(text) {
         Ok(table) => Ok(Node { value: from_table(table.get_ref(), &lines), line: None }),
@@ -193,6 +207,7 @@ fn from_value(value: &DeValue<'_>, lines: &Lines) -> Value {
 
 /// Reads a JSON text. The syntax fault names line, column and the key that was being read.
 pub(crate) fn parse_json(file: &Path, text: &str) -> Result<Node, Faults> {
+    let text = without_mark(text);
     let trail = PathTrail::default();
     let mut source = serde_json::Deserializer::from_str(text);
     let read =

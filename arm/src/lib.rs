@@ -7,6 +7,7 @@
 mod binding;
 pub mod body;
 pub mod bus_load;
+mod capsule;
 pub mod closed_form;
 mod consistency;
 mod contact;
@@ -24,6 +25,7 @@ pub mod log;
 pub mod lookup;
 pub mod mass;
 mod mesh;
+mod modelled;
 pub mod motion_table;
 pub mod path_file;
 pub mod protocol;

@@ -1,11 +1,12 @@
 //! A robot: its chain, limits and collision shapes.
+use crate::capsule::{Capsule, segment_shape};
 use crate::description::{Description, Geometry};
 use crate::mass::LinkMass;
 use crate::reader::FaultList;
 use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
-use crate::{contact, digest, document};
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use crate::{contact, digest, document, modelled};
+use nalgebra::{Point3, Vector3};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
@@ -54,6 +55,10 @@ pub struct Robot {
     pub gravity_m_s2: Vector3<f64>,
     /// Names of the links without a shape: nothing keeps them from being hit.
     pub bare_links: Vec<String>,
+    /// Links that the robot file acknowledges to have no shape: proofs leave them out, and every summary names them.
+    pub unmodelled_links: Vec<String>,
+    /// Links that move, have no shape, and are not acknowledged: see [`Self::require_modelled`].
+    pub unlisted_links: Vec<String>,
     /// The URDF's link whose frame is the base, and the one whose frame is the tip; none for rows.
     pub ends: Option<[String; 2]>,
     /// What was left out of a URDF or deserves a look, as text.
@@ -86,7 +91,7 @@ impl Robot {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let expected = format!(
                 "a robot file in TOML, which names it: urdf = {name:?}, tip_link = \"..\", and one [[joint]] a joint with its \
-                 limits, because a URDF has no accelerations and jerks"
+                 limits, which most URDF files state in part only"
             );
             fault_list.add(Some(1), "", "an XML file", &expected);
             return fault_list.close(None);
@@ -110,6 +115,9 @@ impl Robot {
             fault_list.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
         });
         let tip = (chain.joints(), Pose::identity());
+        let outside = modelled::masses_outside(&parts.links, &parts.shapes, &parts.masses);
+        let listed = |name: &String| description.unmodelled_links.contains(name);
+        let unlisted_links = parts.moving_bare.iter().filter(|name| !listed(name)).cloned().collect();
         let payload = description.payload.map(|weight| LinkMass::placed(&weight, parts.tip_link, tip));
         let joints = description.joints.iter();
         Some(Self {
@@ -121,8 +129,10 @@ impl Robot {
             masses: parts.masses.into_iter().chain(payload).collect(),
             gravity_m_s2: Vector3::from(description.gravity_m_s2),
             bare_links: parts.bare_links,
+            unmodelled_links: description.unmodelled_links.clone(),
+            unlisted_links,
             ends: parts.ends,
-            notices: [parts.notices, description.notices.clone()].concat(),
+            notices: [parts.notices, description.notices.clone(), outside].concat(),
             allowed_by_file: description.allowed_contacts.clone(),
             allowed_by_srdf: parts.allowed,
             allowed_by_rule: allowed_by_rule.ok()?,
@@ -172,6 +182,8 @@ struct Parts {
     /// The link that carries the payload.
     tip_link: usize,
     bare_links: Vec<String>,
+    /// Those of them that move and are more than frames.
+    moving_bare: Vec<String>,
     ends: Option<[String; 2]>,
     neighbours: Vec<(usize, usize)>,
     allowed: Vec<(usize, usize)>,
@@ -181,7 +193,7 @@ struct Parts {
 impl Parts {
     fn of(description: &Description) -> Self {
         match &description.geometry {
-            Geometry::Rows(rows) => Self::of_rows(rows),
+            Geometry::Rows(rows) => Self::of_rows(rows, &description.base_capsules),
             Geometry::Urdf(arm) => Self {
                 chain: arm.chain(),
                 links: arm.links(),
@@ -189,6 +201,7 @@ impl Parts {
                 masses: arm.masses(),
                 tip_link: arm.tip,
                 bare_links: arm.bare_links(),
+                moving_bare: arm.moving_bare_links(),
                 ends: arm.ends(),
                 neighbours: arm.neighbours(),
                 allowed: arm.allowed.clone(),
@@ -196,14 +209,21 @@ impl Parts {
             },
         }
     }
-    fn of_rows(rows: &[Row]) -> Self {
-        let shapes: Vec<LinkShape> =
-            rows.iter().enumerate().filter_map(|(i, row)| link_shape(i + 1, row)).collect();
+    fn of_rows(rows: &[Row], base: &[Capsule]) -> Self {
+        let numbered = || rows.iter().enumerate().map(|(i, row)| (i + 1, row));
+        let shapes: Vec<LinkShape> = base
+            .iter()
+            .map(|capsule| capsule.shape(0))
+            .chain(numbered().filter_map(|(i, row)| link_shape(i, row)))
+            .chain(numbered().flat_map(|(i, row)| row.capsules.iter().map(move |capsule| capsule.shape(i))))
+            .chain(numbered().next_back().and_then(|(i, row)| end_ball(i, row)))
+            .collect();
         let links: Vec<String> = (0..=rows.len()).map(link_name).collect();
         let is_bare = |link: &usize| shapes.iter().all(|shape| shape.link != *link);
         Self {
             chain: rows.iter().map(chain_joint).collect(),
             bare_links: (0..links.len()).filter(is_bare).map(link_name).collect(),
+            moving_bare: (1..links.len()).filter(is_bare).map(link_name).collect(),
             links,
             shapes,
             masses: rows.iter().enumerate().filter_map(|(i, row)| link_mass(i + 1, row)).collect(),
@@ -245,19 +265,13 @@ fn link_shape(joint: usize, row: &Row) -> Option<LinkShape> {
         // Frame i as frame i-1 sees it: Rx(alpha) Tx(a) Tz(d), applied to the origin.
         RowKind::Modified => (joint - 1, Vector3::new(row.a_m, -row.d_m * sin, row.d_m * cos)),
     };
-    let length_m = other_end.norm();
-    let radius_m = row.link_radius_m;
-    let shape =
-        if length_m > 0.0 { Shape::Capsule { radius_m, length_m } } else { Shape::Sphere { radius_m } };
-    let pose = Pose::from_parts(Translation3::from(other_end * 0.5), turn_z_to(&other_end));
-    Some(LinkShape { link: frame, frame, pose, shape })
+    Some(segment_shape(frame, (Vector3::zeros(), other_end), row.link_radius_m))
 }
 
-/// A rotation that takes local z to a direction; none is needed for a zero vector.
-fn turn_z_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
-    // There is no unique axis when the direction is opposite to z; any half turn about x or y will do.
-    UnitQuaternion::rotation_between(&Vector3::z(), direction)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+/// The last link of modified rows, behind all of their capsules: the end of the last capsule, which lies before its joint.
+fn end_ball(joint: usize, row: &Row) -> Option<LinkShape> {
+    let is_bare = row.kind == RowKind::Modified && row.link_radius_m > 0.0;
+    is_bare.then(|| segment_shape(joint, (Vector3::zeros(), Vector3::zeros()), row.link_radius_m))
 }
 
 impl LinkShape {
@@ -308,7 +322,9 @@ mod tests {
                 (0..6).for_each(|i| pose[i] = (f64::from(seed) * 1.3 + i as f64).sin() * 3.0);
                 let frames = robot.chain.frames(&pose);
                 assert!(robot.shapes.len() >= 4, "seed {seed}: nearly every row has a length");
-                for (i, shape) in robot.shapes.iter().enumerate() {
+                // The last link of modified rows is a ball.
+                let capsules = robot.shapes.iter().filter(|shape| kind == "dh" || shape.link < 6);
+                for (i, shape) in capsules.enumerate() {
                     let row = if kind == "dh" { shape.link } else { shape.link + 1 };
                     let (ends, _) = shape.segment().unwrap();
                     let ends = ends.map(|end| frames[shape.frame] * end);

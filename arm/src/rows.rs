@@ -1,4 +1,5 @@
 //! Denavit-Hartenberg rows: geometry as a robot file states it itself.
+use crate::capsule::Capsule;
 use crate::mass::{self, Weight};
 use crate::reader::{Bounds, FaultList, Table};
 use std::f64::consts::TAU;
@@ -12,7 +13,7 @@ pub(crate) enum RowKind {
     Modified,
 }
 
-/// One row, and the radius of the capsule along it.
+/// One row, and the shape of its link: the radius of a capsule along the row, or capsules of its own.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
     pub(crate) kind: RowKind,
@@ -20,7 +21,10 @@ pub(crate) struct Row {
     pub(crate) alpha_rad: f64,
     pub(crate) d_m: f64,
     pub(crate) theta_offset_rad: f64,
+    /// Of the capsule along the row; 0 for none.
     pub(crate) link_radius_m: f64,
+    /// Of the link behind the joint, in the row's frame.
+    pub(crate) capsules: Vec<Capsule>,
     /// Of the link behind the joint.
     pub(crate) weight: Option<Weight>,
 }
@@ -33,11 +37,25 @@ const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
 /// Takes the row of a joint's table.
 pub(crate) fn read(table: &mut Table<'_>) -> Option<Row> {
     let row = read_row(table);
-    let link_radius_m = table.number("link_radius_m", &RADIUS_M);
+    let shape = read_shape(table);
     let weight = Weight::read(table, mass::LINK);
     let (kind, [a_m, alpha_rad, d_m, theta_offset_rad]) = row?;
-    let (link_radius_m, weight) = (link_radius_m?, weight?);
-    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, weight })
+    let ((link_radius_m, capsules), weight) = (shape?, weight?);
+    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, capsules, weight })
+}
+
+/// Either a radius along the row or capsules.
+fn read_shape(table: &mut Table<'_>) -> Option<(f64, Vec<Capsule>)> {
+    if !table.has("link_capsules") {
+        table.take("link_capsules");
+        return table.number("link_radius_m", &RADIUS_M).map(|radius_m| (radius_m, Vec::new()));
+    }
+    let capsules = Capsule::read_list(table, "link_capsules");
+    if table.take("link_radius_m").is_some() {
+        table.fault("link_radius_m", "given beside link_capsules", "one of the two");
+        return None;
+    }
+    capsules.map(|capsules| (0.0, capsules))
 }
 
 /// The row of exactly one of the two conventions.

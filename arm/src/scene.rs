@@ -156,11 +156,12 @@ fn read_shape(table: &mut Table<'_>, kind: &str) -> Option<Shape> {
 }
 
 fn read_mesh(table: &mut Table<'_>) -> Option<Shape> {
-    let file = table.text("file", "the path of an .stl or .obj file, relative to this file");
+    let file = table.text("file", "the path of an .stl, .obj or .dae file, relative to this file");
+    let is_stated = table.has("scale");
     let scale = table.number_or("scale", 1.0, &SCALE);
-    let (file, scale) = (file?, scale?);
+    let (file, factor) = (file?, scale?);
     let path = document::beside(table.fault_list().file(), &file);
-    match mesh::load(&path, scale) {
+    match mesh::load(&path, mesh::Scale { factor, is_stated }) {
         Ok(mesh) => Some(Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }),
         Err((value, expected)) => {
             table.fault("file", &value, &expected);

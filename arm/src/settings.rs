@@ -275,6 +275,9 @@ impl Settings {
             supervision: supervision?,
             simulator,
         };
+        if let Err(faults) = settings.robot.require_modelled() {
+            fault_list.merge(faults);
+        }
         consistency::check_jump(fault_list, &settings);
         consistency::check_damiao(fault_list, &settings);
         consistency::check_traffic(fault_list, &settings);

@@ -136,6 +136,21 @@ const CASES: &[Case] = &[
     ("two.urdf", "velocity=\"3\"", "velocity=\"-3\"", &["joint one.limit.velocity = -3.0"]),
     (
         "two.urdf",
+        "velocity=\"3\"",
+        "velocity=\"0\"",
+        &["joint[0].motion.velocity_rad_s = missing, and the URDF's limit.velocity is 0", "nobody knew it"],
+    ),
+    ("two.urdf", " velocity=\"3\"", "", &["missing, and the URDF states no limit.velocity", "state it here"]),
+    (
+        "two.toml",
+        "acceleration_rad_s2 = 10, ",
+        "",
+        &["joint[0].motion.acceleration_rad_s2 = missing, and the URDF states no limit.acceleration"],
+    ),
+    ("two.urdf", "effort=\"9\"", "jerk=\"-1\"", &["joint one.limit.jerk = -1.0"]),
+    ("two.urdf", "effort=\"9\"", "deceleration=\"fast\"", &["joint one.limit.deceleration = \"fast\""]),
+    (
+        "two.urdf",
         "<axis xyz=\"0 0 1\"/>",
         "<axis xyz=\"0 0 0\"/>",
         &["joint one.axis.xyz = [0.0, 0.0, 0.0]", "not all 0"],
@@ -217,10 +232,10 @@ const CASES: &[Case] = &[
     ("two.urdf", "hand.stl", "none.stl", &["mesh.filename = \"none.stl\"", "looked at"]),
     ("two.urdf", "hand.stl", "package://nobody/hand.stl", &["package://nobody/hand.stl", "package_dirs"]),
     ("two.urdf", "hand.stl", "https://host/hand.stl", &["nothing is fetched"]),
-    ("two.urdf", "hand.stl", "two.srdf", &["is neither .stl nor .obj", "assimp"]),
+    ("two.urdf", "hand.stl", "two.srdf", &["is none of .stl, .obj and .dae", "assimp"]),
     ("two.urdf", "scale=\"1 1 1\"", "scale=\"9999 1 1\"", &["hand.stl has corner", "after scaling"]),
     ("hand.stl", "solid t", "sordid t", &["two.urdf:16", "hand.stl is 382 bytes long"]),
-    ("hand.stl", "vertex 0 0 0.1", "vertex 0 0 nan", &["hand.stl is not STL"]),
+    ("hand.stl", "vertex 0 0 0.1", "vertex 0 0 nan", &["hand.stl line 13"]),
     // The SRDF.
     (
         "two.srdf",

@@ -146,10 +146,11 @@ fn ignored_parts_of_a_urdf_are_reported() {
         "shell.obj counts as its convex hull",
         "link \"camera_cover\" has visual but no collision geometry",
         "joint \"turn\": motion.velocity_rad_s = 2.25 is above the URDF's limit of 2 rad/s",
+        "link hand: its centre of mass (0.0341, -0.0010, -0.1172) m lies 0.0150 m OUTSIDE of its collision shapes",
     ] {
         assert!(all.contains(words), "{words:?} is missing in:\n{all}");
     }
-    assert_eq!(robot.notices.len(), 6, "{all}");
+    assert_eq!(robot.notices.len(), 7, "{all}");
     assert_eq!(robot.bare_links, ["world", "bracket_frame", "tool0", "camera_cover"]);
 }
 
@@ -299,4 +300,66 @@ fn mbm() -> Option<PathBuf> {
         folder.display()
     );
     None
+}
+
+/// An arm of two joints by a URDF 1.2.
+#[expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+fn two_joints(limit: &str, table: &str) -> Result<Robot, taustream_arm::Faults> {
+    let folder = std::env::temp_dir().join(format!(
+        "taustream-urdf-limits-{}-{:x}",
+        std::process::id(),
+        limit.len() * 1000 + table.len()
+    ));
+    fs::create_dir_all(&folder).unwrap();
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0 0 0.3\"/>\
+             <axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" {limit}/></joint><link name=\"{child}\"><collision><geometry>\
+             <sphere radius=\"0.05\"/></geometry></collision></link>"
+        )
+    };
+    let urdf = format!(
+        "<robot name=\"two\" version=\"1.2\"><link name=\"l0\"/>{}{}</robot>",
+        joint("j1", "l0", "l1"),
+        joint("j2", "l1", "l2")
+    );
+    fs::write(folder.join("two.urdf"), urdf).unwrap();
+    let text = format!(
+        "name = \"two\"\nurdf = \"two.urdf\"\ntip_link = \"l2\"\n[[joint]]\nname = \"j1\"\n{table}\n[[joint]]\nname = \"j2\"\n{table}\n"
+    );
+    let read = Robot::from_toml(&folder.join("two.toml"), &text);
+    fs::remove_dir_all(&folder).unwrap();
+    read
+}
+
+#[test]
+fn limits_of_urdf_1_2_are_used_where_the_file_gives_none_and_said_where_it_gives_more() {
+    let stated = "velocity=\"1.5\" acceleration=\"4\" deceleration=\"3\" jerk=\"30\"";
+    let robot = two_joints(stated, "").unwrap_or_else(|faults| panic!("{faults}"));
+    let motion = robot.joints[1].limits.motion;
+    let limits = [motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3];
+    assert_eq!(limits.map(f64::to_bits), [1.5, 3.0, 30.0].map(f64::to_bits), "{limits:?}");
+    let words = robot.notices.join("\n");
+    assert!(
+        words.contains("stop.acceleration_rad_s2 = 6 is above the URDF's 3, stop.jerk_rad_s3 = 120"),
+        "{words}"
+    );
+
+    let given = "motion = { acceleration_rad_s2 = 8.0, jerk_rad_s3 = 80.0 }";
+    let robot = two_joints(stated, given).unwrap_or_else(|faults| panic!("{faults}"));
+    let words = robot.notices.join("\n");
+    for part in [
+        "joint \"j1\": motion.acceleration_rad_s2 = 8 is above the URDF's limit of 3 rad/s2",
+        "joint \"j2\": motion.jerk_rad_s3 = 80 is above the URDF's limit of 30 rad/s3",
+    ] {
+        assert!(words.contains(part), "{part:?} is missing in {words}");
+    }
+    let lower = "motion = { acceleration_rad_s2 = 1.0, jerk_rad_s3 = 7.0 }";
+    let robot = two_joints(stated, lower).unwrap_or_else(|faults| panic!("{faults}"));
+    assert_eq!(robot.notices, Vec::<String>::new());
+
+    let faults = two_joints("velocity=\"1\" acceleration=\"0\" jerk=\"1e9\"", "").unwrap_err().to_string();
+    assert!(faults.contains("joint[0].motion = missing"), "{faults}");
+    let faults = two_joints("velocity=\"1\" acceleration=\"9\" jerk=\"1e9\"", "").unwrap_err().to_string();
+    assert!(faults.contains("limit.jerk of the URDF"), "{faults}");
 }

@@ -122,6 +122,13 @@ pub(crate) fn robot(given: &Path) -> Result<Robot, Failure> {
     Ok(Robot::load(&find(Kind::Robot, given)?)?)
 }
 
+/// A robot to plan for or to prove something of: each of its links that move has a shape, or is acknowledged to have none.
+pub(crate) fn modelled_robot(given: &Path) -> Result<Robot, Failure> {
+    let robot = robot(given)?;
+    robot.require_modelled()?;
+    Ok(robot)
+}
+
 /// A scene by path or shipped name.
 pub(crate) fn scene(given: &Path) -> Result<Scene, Failure> {
     Ok(Scene::load(&find(Kind::Scene, given)?)?)
@@ -187,6 +194,8 @@ pub(crate) enum AnyFile {
     Scene(PathBuf),
     /// A trajectory.
     Trajectory(PathBuf),
+    /// Nothing stands in it, which could be meant for any kind.
+    Empty(PathBuf),
 }
 
 /// Finds a file by path or shipped name, and tells its kind by what stands in it.
@@ -218,6 +227,7 @@ fn kind_of(path: &Path) -> AnyFile {
         Some(t) if ["robot", "bus", "servo", "cycle"].iter().any(|k| t.contains_key(*k)) => {
             AnyFile::Settings(owned)
         }
+        Some(t) if t.is_empty() => AnyFile::Empty(owned),
         Some(_) => AnyFile::Scene(owned),
         None => AnyFile::Settings(owned),
     }

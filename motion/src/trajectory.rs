@@ -31,7 +31,7 @@ pub enum TrajectoryError {
         strokes: usize,
     },
     /// The base pose is not finite, or an unused joint of it is not zero.
-    #[error("base_rad of joint {joint} is {value_rad}; it must be finite, and zero beyond the arm's joints")]
+    #[error("base_rad of joint {} is {value_rad}; it must be finite, and zero beyond the arm's joints", joint + 1)]
     Base {
         /// Zero-based index of the joint.
         joint: usize,

@@ -343,10 +343,11 @@ mod tests {
     }
 
     fn ends_m(world: &World, q: &JointArray, body: usize) -> [nalgebra::Vector3<f64>; 2] {
-        // The ends of a link's capsule are the origins of its two frames.
-        let frames = world.robot.chain.frames(q);
-        let frame = world.links[body].frame;
-        [frames[frame - 1].translation.vector, frames[frame].translation.vector]
+        // Bodies come in the order of the shapes, which are capsules.
+        let shape = &world.robot.shapes[body];
+        let frame = world.robot.chain.frames(q)[shape.frame];
+        let (ends, _) = shape.segment().expect("a capsule");
+        ends.map(|end| (frame * end).coords)
     }
 
     /// Goal: no point of a link moves further than `moves_m` says, alone and against another link.
@@ -371,7 +372,8 @@ mod tests {
             }
             world.place(&q, &mut snapshot);
             world.moves_m(&snapshot, &turn, &mut moves_m);
-            for (body, bounds_m) in moves_m.iter().enumerate() {
+            let moving = |(body, _): &(usize, &[f64; MAX_JOINTS + 1])| world.links[*body].frame > 0;
+            for (body, bounds_m) in moves_m.iter().enumerate().filter(moving) {
                 for (before, after) in ends_m(&world, &q, body).iter().zip(ends_m(&world, &there, body)) {
                     let moved_m = (after - before).norm();
                     let bound_m = bounds_m[0];
@@ -383,10 +385,9 @@ mod tests {
                     let radius_m: f64 = turn.iter().map(|t| t * 0.06).sum();
                     broken_when_shrunk += u32::from(moved_m > 0.9 * (bound_m - radius_m));
                 }
-                let frame = world.links[body].frame;
                 let relative = |q: &JointArray| {
-                    let frames = world.robot.chain.frames(q);
-                    (frames[1].inverse() * frames[frame]).translation.vector
+                    let [end, _] = ends_m(&world, q, body);
+                    (world.robot.chain.frames(q)[1].inverse() * nalgebra::Point3::from(end)).coords
                 };
                 let moved_m = (relative(&there) - relative(&q)).norm();
                 let bound_m = bounds_m[1];

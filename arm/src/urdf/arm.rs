@@ -2,12 +2,13 @@
 //!
 //! Links are gathered by the frame that they are rigid with: frame 0 is the base link, frame i the link behind the i-th
 //! joint of the arm, and the last frame the tip link. Joints off the chain do not move.
-use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid};
+use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid, StatedLimits};
 use super::tree::Tree;
 use super::xml::{self, Context, Element};
 use super::{package, srdf};
 use crate::document::{self, Value, shown};
 use crate::mass::{LinkMass, Weight};
+use crate::modelled::Listed;
 use crate::reader::{FaultList, Table};
 use crate::robot::LinkShape;
 use crate::scene::{self, Shape};
@@ -27,8 +28,8 @@ pub(crate) struct JointInfo {
     pub(crate) name: String,
     /// Range; none for continuous joints, and where the file states none.
     pub(crate) position_rad: Option<[f64; 2]>,
-    /// Above 0; none where the file states none.
-    pub(crate) velocity_rad_s: Option<f64>,
+    /// In rad and s.
+    pub(crate) limits: StatedLimits,
 }
 
 /// A solid part with its mesh read.
@@ -64,6 +65,8 @@ pub(crate) struct UrdfArm {
     pub(crate) moving: Vec<usize>,
     pub(crate) fixed_joints: Vec<FixedJoint>,
     pub(crate) parts: Vec<SolidPart>,
+    /// Links that are acknowledged to have no shape, some of whose meshes could not be read.
+    pub(crate) skipped: Vec<usize>,
     /// Pairs that may touch by the SRDF, lower index first, in rising order.
     pub(crate) allowed: Vec<(usize, usize)>,
     /// What was left out, as text.
@@ -81,7 +84,7 @@ struct Keys {
 
 impl UrdfArm {
     /// Takes its keys from a robot file and reads what they name; faults go into the table's book.
-    pub(crate) fn read(top: &mut Table<'_>) -> Option<Self> {
+    pub(crate) fn read(top: &mut Table<'_>, listed: &[Listed]) -> Option<Self> {
         let keys = read_keys(top)?;
         let own = FaultList::new(&keys.urdf);
         let model = read_model(&own);
@@ -94,7 +97,7 @@ impl UrdfArm {
             }
         };
         let own = FaultList::new(&keys.urdf);
-        let parts = read_parts(&own, &model, &keys);
+        let parts = read_parts(&own, &model, (&keys, listed));
         let faults = own.close(Some(())).err();
         faults.into_iter().for_each(|faults| top.fault_list().merge(faults));
         let allowed =
@@ -107,11 +110,12 @@ impl UrdfArm {
         let (base, tip) = (base?, tip?);
         let path = path(top, &model, &tree, (base, tip))?;
         let moving = moving(top, &model, &path)?;
-        let (parts, mut notices) = parts?;
+        let (parts, skipped, mut notices) = parts?;
         let fixed_joints = fixed_joints(&model, &moving, &mut notices);
         say_bare_links(&model, &mut notices);
         say_odd_moments(&model, &mut notices);
-        let arm = Self { model, tree, base, tip, path, moving, fixed_joints, parts, allowed, notices };
+        let arm =
+            Self { model, tree, base, tip, path, moving, fixed_joints, parts, skipped, allowed, notices };
         top.fault_list().is_clean().then_some(arm)
     }
     /// What the file says about the arm's joints, base to tip.
@@ -119,7 +123,7 @@ impl UrdfArm {
         let joint_info = |joint: &Joint| JointInfo {
             name: joint.name.clone(),
             position_rad: if joint.kind == Kind::Continuous { None } else { joint.position },
-            velocity_rad_s: joint.velocity,
+            limits: joint.limits,
         };
         self.moving.iter().filter_map(|joint| self.model.joints.get(*joint)).map(joint_info).collect()
     }
@@ -135,6 +139,30 @@ impl UrdfArm {
     /// Names of the links that have no collision geometry.
     pub(crate) fn bare_links(&self) -> Vec<String> {
         self.model.links.iter().filter(|link| link.parts.is_empty()).map(|link| link.name.clone()).collect()
+    }
+    /// Names of the links that move and have no shape: those that can be seen or have a mass, and the first link behind each
+    /// joint of the arm when nothing that is rigid with it has one.
+    pub(crate) fn moving_bare_links(&self) -> Vec<String> {
+        let placed = self.placed();
+        let frame = |link: usize| placed.get(link).map_or(0, |(frame, _)| *frame);
+        let is_bare = |link: usize| self.parts.iter().all(|part| part.link != link);
+        let is_frame_bare = |of: usize| self.parts.iter().all(|part| frame(part.link) != of);
+        let is_first = |link: usize| {
+            self.tree
+                .joint_before
+                .get(link)
+                .copied()
+                .flatten()
+                .is_some_and(|joint| self.moving.contains(&joint))
+        };
+        let links = self.model.links.iter().enumerate();
+        let unmodelled = links.filter(|(index, link)| {
+            let is_body = link.is_visible || link.inertial.is_some_and(|inertial| inertial.mass_kg > 0.0);
+            let alone = is_first(*index) && is_frame_bare(frame(*index));
+            let skipped = self.skipped.contains(index);
+            frame(*index) > 0 && (skipped || (is_bare(*index) && (is_body || alone)))
+        });
+        unmodelled.map(|(_, link)| link.name.clone()).collect()
     }
     /// The chain; fixed joints are part of what stands before the next joint that moves, or behind the last.
     pub(crate) fn chain(&self) -> Vec<ChainJoint> {
@@ -317,41 +345,52 @@ fn read_model(fault_list: &FaultList) -> Option<Model> {
     Model::read(&context, &Element::robot(&context, &document)?)
 }
 
-/// The parts with their meshes, and what is to be said about them.
-fn read_parts(fault_list: &FaultList, model: &Model, keys: &Keys) -> Option<(Vec<SolidPart>, Vec<String>)> {
-    let mut read: BTreeMap<(PathBuf, [u64; 3]), Option<MeshPart>> = BTreeMap::new();
-    let (mut parts, mut notices) = (Vec::new(), Vec::new());
-    for (link, part) in
-        model.links.iter().enumerate().flat_map(|(i, link)| link.parts.iter().map(move |p| (i, p)))
-    {
-        let refuse = |value: &str, expected: &str| {
-            fault_list.add(part.line, &format!("{}.geometry.mesh.filename", part.path), value, expected);
-        };
+/// The parts with their meshes, the links that are acknowledged to lack some, and what is to be said about them.
+fn read_parts(
+    fault_list: &FaultList,
+    model: &Model,
+    (keys, listed): (&Keys, &[Listed]),
+) -> Option<(Vec<SolidPart>, Vec<usize>, Vec<String>)> {
+    let mut read: BTreeMap<(PathBuf, [u64; 3]), Result<MeshPart, mesh::Refusal>> = BTreeMap::new();
+    let (mut parts, mut skipped, mut notices) = (Vec::new(), Vec::new(), Vec::new());
+    let all =
+        model.links.iter().enumerate().flat_map(|(i, link)| link.parts.iter().map(move |p| (i, link, p)));
+    for (link, of, part) in all {
         let (shape, mesh) = match &part.solid {
             Solid::Primitive(shape) => (shape.clone(), None),
             Solid::Mesh { named, scale } => {
-                let file = match package::find(&keys.urdf, &keys.package_dirs, named) {
-                    Ok(file) => file,
-                    Err(expected) => {
-                        refuse(&shown(named), &expected);
+                let file = package::find(&keys.urdf, &keys.package_dirs, named);
+                let made = file.map_err(|expected| (shown(named), expected)).and_then(|file| {
+                    let key = (file.clone(), scale.map(f64::to_bits));
+                    read.entry(key).or_insert_with(|| MeshPart::load(&file, *scale)).clone()
+                });
+                match made {
+                    Ok(made) => {
+                        notices.push(format!("{}: {}", part.path, made.words));
+                        (made.shape, Some((made.digest, *scale)))
+                    }
+                    Err((value, expected)) if listed.iter().any(|listed| listed.name == of.name) => {
+                        notices.push(format!("{}: not read ({value}: expected {expected})", part.path));
+                        skipped.push(link);
                         continue;
                     }
-                };
-                let made = read.entry((file.clone(), scale.map(f64::to_bits))).or_insert_with(|| {
-                    let made = MeshPart::load(&file, *scale);
-                    made.map_err(|(value, expected)| refuse(&value, &expected)).ok()
-                });
-                let Some(made) = made else { continue };
-                notices.push(format!("{}: {}", part.path, made.words));
-                (made.shape.clone(), Some((made.digest, *scale)))
+                    Err((value, expected)) => {
+                        let expected =
+                            format!("{expected}; or unmodelled_links = [{:?}] in the robot file", of.name);
+                        let key = format!("{}.geometry.mesh.filename", part.path);
+                        fault_list.add(part.line, &key, &value, &expected);
+                        continue;
+                    }
+                }
             }
         };
         parts.push(SolidPart { link, origin: part.origin, shape, mesh });
     }
-    fault_list.is_clean().then_some((parts, notices))
+    fault_list.is_clean().then_some((parts, skipped, notices))
 }
 
 /// A mesh as a hull.
+#[derive(Clone)]
 struct MeshPart {
     shape: Shape,
     digest: [u8; 32],
@@ -370,8 +409,9 @@ impl MeshPart {
             (value, "a mesh with an inside: at least 4 corners that do not lie in one plane".to_owned())
         })?;
         let what = if hull.is_box { "the box around it" } else { "its convex hull" };
+        let remarks: String = cloud.remarks.iter().map(|remark| format!("; {remark}")).collect();
         let words = format!(
-            "mesh {} counts as {what} ({} of {} corners, widened by {:.2} mm)",
+            "mesh {} counts as {what} ({} of {} corners, widened by {:.2} mm){remarks}",
             file.display(),
             hull.vertices_m.len(),
             cloud.points_m.len(),

@@ -12,8 +12,19 @@ impl UrdfArm {
     pub(crate) fn put(&self, out: &mut Vec<u8>) {
         // Taken apart, so that a new field cannot be forgotten here without the compiler saying so. Path and moving
         // joints follow from the rest, notices mean nothing.
-        let Self { model, tree: _, base, tip, path: _, moving: _, fixed_joints, parts, allowed, notices: _ } =
-            self;
+        let Self {
+            model,
+            tree: _,
+            base,
+            tip,
+            path: _,
+            moving: _,
+            fixed_joints,
+            parts,
+            skipped: _,
+            allowed,
+            notices: _,
+        } = self;
         let Model { name: _, links, joints } = model;
         put_count(out, *base);
         put_count(out, *tip);
@@ -59,8 +70,7 @@ fn put_link(out: &mut Vec<u8>, link: &Link) {
 
 fn put_joint(out: &mut Vec<u8>, joint: &Joint) {
     // Limits are the robot file's, which may only narrow these; a joint that follows another is held.
-    let Joint { name, line: _, kind, parent, child, origin, axis, position: _, velocity: _, mimic: _ } =
-        joint;
+    let Joint { name, line: _, kind, parent, child, origin, axis, position: _, limits: _, mimic: _ } = joint;
     put_text(out, name);
     out.push(match kind {
         Kind::Fixed => 0,

@@ -16,6 +16,7 @@ mod model;
 mod package;
 mod srdf;
 mod tree;
-mod xml;
+pub(crate) mod xml;
 
 pub(crate) use arm::{JointInfo, KEYS, UrdfArm};
+pub(crate) use model::StatedLimits;

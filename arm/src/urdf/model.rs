@@ -97,9 +97,19 @@ pub(crate) struct Joint {
     pub(crate) axis: [f64; 3],
     /// Lowest and highest position (rad or m), inside the soft limits where the file states such.
     pub(crate) position: Option<[f64; 2]>,
-    /// Above 0.
-    pub(crate) velocity: Option<f64>,
+    pub(crate) limits: StatedLimits,
     pub(crate) mimic: Option<Mimic>,
+}
+
+/// The rates that a `<limit>` states. Each may be 0, which is what generators write when they know none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct StatedLimits {
+    /// rad/s or m/s.
+    pub(crate) velocity: Option<f64>,
+    /// rad/s^2 or m/s^2: the lower one of `acceleration` and `deceleration` (URDF 1.2).
+    pub(crate) acceleration: Option<f64>,
+    /// rad/s^3 or m/s^3 (URDF 1.2).
+    pub(crate) jerk: Option<f64>,
 }
 
 /// Another joint decides where this one is.
@@ -128,6 +138,8 @@ const SCALE: Bounds = Bounds::within(-1e4, 1e4, "");
 const AXIS: Bounds = Bounds::within(-1e6, 1e6, "");
 const POSITION: Bounds = Bounds::within(-1e9, 1e9, "rad or m");
 const VELOCITY: Bounds = Bounds::within(0.0, 1e9, "rad/s or m/s");
+const ACCELERATION: Bounds = Bounds::within(0.0, 1e9, "rad/s^2 or m/s^2");
+const JERK: Bounds = Bounds::within(0.0, 1e12, "rad/s^3 or m/s^3");
 
 impl Model {
     /// Reads the whole file; complete only when no fault was noted.
@@ -272,7 +284,7 @@ fn read_joint(
     let origin = read_origin(element);
     let axis = read_axis(element, kind);
     let position = read_position(element);
-    let velocity = read_velocity(element);
+    let limits = read_limits(element);
     let mimic = element.child("mimic").map(|mimic| {
         let joint = mimic.name("joint");
         let offset = mimic.number_or("offset", 0.0, &POSITION);
@@ -287,7 +299,7 @@ fn read_joint(
         origin: origin?,
         axis: axis?,
         position: position?,
-        velocity: velocity?,
+        limits: limits?,
         mimic: match mimic {
             Some(read) => Some(read?),
             None => None,
@@ -360,10 +372,20 @@ fn read_position(element: &Element<'_, '_, '_>) -> Option<Option<[f64; 2]>> {
     Some((lower < upper).then_some([lower, upper]))
 }
 
-/// As [`read_position`]; a velocity of 0 is what generators write when they know none.
-#[expect(clippy::option_option, reason = "a missing velocity and a faulty one are distinguished")]
-fn read_velocity(element: &Element<'_, '_, '_>) -> Option<Option<f64>> {
-    let Some(limit) = element.child("limit").filter(|limit| limit.has("velocity")) else { return Some(None) };
-    let velocity = limit.number("velocity", &VELOCITY)?;
-    Some((velocity > 0.0).then_some(velocity))
+/// What the file states of a joint's rates.
+fn read_limits(element: &Element<'_, '_, '_>) -> Option<StatedLimits> {
+    let Some(limit) = element.child("limit") else { return Some(StatedLimits::default()) };
+    // Every one is looked at, so that two bad ones are two faults.
+    let read = |attribute: &str, bounds: &Bounds| {
+        if limit.has(attribute) { limit.number(attribute, bounds).map(Some) } else { Some(None) }
+    };
+    let velocity = read("velocity", &VELOCITY);
+    let acceleration = read("acceleration", &ACCELERATION);
+    let deceleration = read("deceleration", &ACCELERATION);
+    let jerk = read("jerk", &JERK);
+    let slower = match (acceleration?, deceleration?) {
+        (Some(up), Some(down)) => Some(up.min(down)),
+        (up, down) => up.or(down),
+    };
+    Some(StatedLimits { velocity: velocity?, acceleration: slower, jerk: jerk? })
 }

@@ -17,10 +17,9 @@ const DEPTH_MAX: usize = 64;
 const NAME_BYTES_MAX: usize = 128;
 const XACRO: &str = "http://www.ros.org/wiki/xacro";
 
-/// Reads a text file of bounded length; a byte order mark is dropped.
+/// Reads a text file of bounded length.
 pub(crate) fn read(file: &Path, what: &str) -> Result<String, Faults> {
-    let text = document::read_text_of(file, BYTES_MAX, what)?;
-    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+    document::read_text_of(file, BYTES_MAX, what)
 }
 
 /// Parses a text; document type declarations, and with them entities, are refused.

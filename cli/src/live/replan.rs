@@ -4,6 +4,7 @@ use super::follow::{Executed, follow, say_pauses};
 use crate::args::ReplanArgs;
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
+use crate::offline::verify::Unmodelled;
 use crate::output::Form;
 use crate::words::receipt_sentence;
 use serde::Serialize;
@@ -38,13 +39,14 @@ struct Answer {
     arm: String,
     #[serde(flatten)]
     planned: Planned,
+    unmodelled_links: Vec<String>,
     #[serde(flatten)]
     executed: Option<Executed>,
 }
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.planned)?;
+        write!(f, "{}{}", Unmodelled(&self.unmodelled_links), self.planned)?;
         if let Some(e) = &self.executed {
             write!(f, "\n{e}")?;
         }
@@ -114,7 +116,8 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     } else {
         None
     };
-    form.print(&Answer { arm: arm.name, planned, executed })
+    let unmodelled_links = settings.robot.unmodelled_links;
+    form.print(&Answer { arm: arm.name, planned, unmodelled_links, executed })
 }
 
 /// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the

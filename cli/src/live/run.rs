@@ -5,6 +5,7 @@ use super::replan::accepted;
 use crate::args::RunArgs;
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
+use crate::offline::verify::Unmodelled;
 use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
@@ -27,6 +28,7 @@ struct Answer {
     generation: u64,
     duration_s: f64,
     clearance_m: f64,
+    unmodelled_links: Vec<String>,
     accepted: bool,
     from_s: f64,
     tick: u64,
@@ -41,6 +43,7 @@ impl fmt::Display for Answer {
             "verified      {}: {:.3} s, clearance {:.4} m",
             self.trajectory, self.duration_s, self.clearance_m
         )?;
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         write!(
             f,
             "receipt       accepted: trajectory {} (generation {}) from {:.3} s on, at cycle {}",
@@ -87,6 +90,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
         generation: sent.generation,
         duration_s: proof.duration_s,
         clearance_m: proof.clearance_m,
+        unmodelled_links: settings.robot.unmodelled_links.clone(),
         accepted: true,
         from_s,
         tick,

@@ -18,6 +18,11 @@ pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
         arm::AnyFile::Settings(path) => check_settings(form, &path),
         arm::AnyFile::Robot(path) => form.print(&CheckedRobot::of(&Robot::load(&path)?)),
         arm::AnyFile::Scene(path) => form.print(&CheckedScene::of(&Scene::load(&path)?)),
+        arm::AnyFile::Empty(path) => {
+            let why = "is empty, which says nothing about settings or a robot; a scene without obstacles says so by its margin: \
+                       margin_m = 0.02";
+            Err(Failure::Unfit { path, why: why.to_owned() })
+        }
         arm::AnyFile::Trajectory(path) => {
             form.print(&CheckedTrajectory::of(&path, &TrajectoryFile::load(&path)?))
         }

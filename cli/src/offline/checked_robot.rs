@@ -61,6 +61,19 @@ fn kind_of(shape: &Shape) -> &'static str {
     }
 }
 
+/// A pair of links that touches in most random poses, and their share.
+#[derive(Debug, Serialize)]
+struct OftenTouching {
+    links: [String; 2],
+    share: f64,
+}
+
+fn often_touching(robot: &Robot) -> Vec<OftenTouching> {
+    let name = |link: usize| robot.links.get(link).cloned().unwrap_or_default();
+    let pairs = robot.often_touching().into_iter();
+    pairs.map(|((a, b), share)| OftenTouching { links: [name(a), name(b)], share }).collect()
+}
+
 /// A robot that is sound.
 #[derive(Debug, Serialize)]
 pub(super) struct CheckedRobot {
@@ -75,6 +88,10 @@ pub(super) struct CheckedRobot {
     links: Vec<LinkLine>,
     /// Nothing keeps these from being hit.
     links_without_shape: Vec<String>,
+    /// Those of them that the robot file acknowledges; summaries of plans and proofs name them.
+    unmodelled_links: Vec<String>,
+    /// Those that move and are not acknowledged: nothing is planned or run for this robot.
+    refused_links: Vec<String>,
     /// What was left out of a URDF, or deserves a look.
     notices: Vec<String>,
     /// Of the links that state a mass, and of the payload; null when none does.
@@ -82,6 +99,8 @@ pub(super) struct CheckedRobot {
     may_touch_by_rule: Vec<[String; 2]>,
     may_touch_by_file: Vec<[String; 2]>,
     may_touch_by_srdf: Vec<[String; 2]>,
+    /// Pairs that may not touch and do so in most random poses.
+    often_touching: Vec<OftenTouching>,
     /// How long a pause or stop from full speed takes.
     pause_s: f64,
 }
@@ -112,11 +131,14 @@ impl CheckedRobot {
             shapes: robot.shapes.len(),
             links: LinkLine::all(robot),
             links_without_shape: robot.bare_links.clone(),
+            unmodelled_links: robot.unmodelled_links.clone(),
+            refused_links: robot.unlisted_links.clone(),
             notices: robot.notices.clone(),
             mass_kg: (!robot.masses.is_empty()).then(|| robot.masses.iter().map(|mass| mass.mass_kg).sum()),
             may_touch_by_rule: names(&robot.allowed_by_rule),
             may_touch_by_file: names(&robot.allowed_by_file),
             may_touch_by_srdf: names(&robot.allowed_by_srdf),
+            often_touching: often_touching(robot),
             pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
         }
     }
@@ -158,6 +180,14 @@ impl fmt::Display for CheckedRobot {
         )?;
         contacts(f, "links that MAY TOUCH by the robot file", &self.may_touch_by_file)?;
         contacts(f, "links that MAY TOUCH by the SRDF", &self.may_touch_by_srdf)?;
+        for OftenTouching { links: [a, b], share } in &self.often_touching {
+            writeln!(
+                f,
+                "  {a} and {b} touch in {:.0} % of random poses, so that few plans will succeed. Tighten their shapes, or, if the real ones \
+                 cannot meet: allowed_contacts = [[{a:?}, {b:?}]]",
+                100.0 * share
+            )?;
+        }
         write!(
             f,
             "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
@@ -188,6 +218,22 @@ impl CheckedRobot {
         }
         if !self.links_without_shape.is_empty() {
             writeln!(f, "  links WITHOUT collision geometry: {}", self.links_without_shape.join(", "))?;
+        }
+        if !self.unmodelled_links.is_empty() {
+            writeln!(
+                f,
+                "  links that the file lists in unmodelled_links: {}",
+                self.unmodelled_links.join(", ")
+            )?;
+        }
+        if !self.refused_links.is_empty() {
+            let names: Vec<String> = self.refused_links.iter().map(|name| format!("{name:?}")).collect();
+            let names = names.join(", ");
+            writeln!(
+                f,
+                "  REFUSED by plan, verify, run and the services: these links move and have no shape: {names}. Give them shapes, or \
+                 acknowledge it: unmodelled_links = [{names}]"
+            )?;
         }
         for notice in &self.notices {
             writeln!(f, "  note: {notice}")?;

@@ -1,5 +1,5 @@
 //! `taustream import`: a motion made elsewhere as a verified trajectory file.
-use super::verify::{PeakTable, PeakUse, clearance_words, peak_use};
+use super::verify::{PeakTable, PeakUse, Unmodelled, clearance_words, peak_use};
 use crate::args::ImportArgs;
 use crate::arm;
 use crate::failure::Failure;
@@ -43,6 +43,7 @@ struct Summary {
     clearance_m: f64,
     clearance_at_s: f64,
     clearance_between: [String; 2],
+    unmodelled_links: Vec<String>,
     peak_use: Vec<PeakUse>,
 }
 
@@ -70,6 +71,7 @@ impl fmt::Display for Summary {
         }
         let [a, b] = &self.clearance_between;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         write!(f, "{}", PeakTable(&self.peak_use))?;
         match &self.file {
             Some(file) => write!(f, "written to    {file}"),
@@ -86,7 +88,7 @@ struct Source {
 
 /// Imports, and writes file and summary.
 pub(crate) fn run(form: Form, args: &ImportArgs) -> Result<(), Failure> {
-    let robot = arm::robot(&args.robot)?;
+    let robot = arm::modelled_robot(&args.robot)?;
     let scene = arm::scene(&args.scene)?;
     let (imported, source) = match &args.table {
         Some(table) => from_table(args, table, &robot, &scene)?,
@@ -237,6 +239,7 @@ fn summarise(robot: &Robot, imported: &Imported, source: Source, args: &ImportAr
         clearance_m: imported.proof.clearance_m,
         clearance_at_s: imported.proof.clearance_at_s,
         clearance_between: [a, b],
+        unmodelled_links: robot.unmodelled_links.clone(),
         peak_use: peak_use(robot, &imported.proof.peaks),
     }
 }

@@ -1,5 +1,5 @@
 //! `taustream plan`: from two poses, or a pose and a position, to a verified trajectory file.
-use super::verify::{PeakTable, PeakUse, clearance_words, peak_use};
+use super::verify::{PeakTable, PeakUse, Unmodelled, clearance_words, peak_use};
 use crate::angles::Position;
 use crate::args::PlanArgs;
 use crate::arm;
@@ -34,6 +34,7 @@ struct Summary {
     clearance_m: f64,
     clearance_at_s: f64,
     clearance_between: [String; 2],
+    unmodelled_links: Vec<String>,
     peak_use: Vec<PeakUse>,
     goal_rad: Vec<f64>,
     /// Where the tip was to go, when a position was requested.
@@ -51,6 +52,7 @@ impl fmt::Display for Summary {
         }
         let [a, b] = &self.clearance_between;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
             writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off, in the pose")?;
             let angles: Vec<String> = self.goal_rad.iter().map(|q| format!("{q:.6}")).collect();
@@ -66,7 +68,7 @@ impl fmt::Display for Summary {
 
 /// Plans, and writes file and summary.
 pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
-    let robot = arm::robot(&args.robot)?;
+    let robot = arm::modelled_robot(&args.robot)?;
     let scene = arm::scene(&args.scene)?;
     let start_rad = args.start.pose_of(&robot, "--start")?;
     let options = PlanOptions {
@@ -174,6 +176,7 @@ fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &P
         clearance_m: found.proof.clearance_m,
         clearance_at_s: found.proof.clearance_at_s,
         clearance_between: [a, b],
+        unmodelled_links: robot.unmodelled_links.clone(),
         peak_use: peak_use(robot, &found.proof.peaks),
         goal_rad,
         target_m: position.map(|(target_m, _)| target_m),

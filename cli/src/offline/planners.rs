@@ -62,7 +62,7 @@ fn extent(args: &PlannersArgs) -> (usize, u32) {
 
 fn contest(form: Form, args: &PlannersArgs) -> Result<Contest, Failure> {
     let entrants = args.entrants().map_err(Failure::Usage)?;
-    let robot = arm::robot(&args.robot)?;
+    let robot = arm::modelled_robot(&args.robot)?;
     let (count, deadline_ms) = extent(args);
     let mut kinds = Vec::new();
     for path in &args.scene {

@@ -24,6 +24,7 @@ struct Answer {
     clearance_m: f64,
     clearance_at_s: f64,
     clearance_between: [String; 2],
+    unmodelled_links: Vec<String>,
     continuity: &'static str,
     peak_use: Vec<PeakUse>,
 }
@@ -34,6 +35,7 @@ impl fmt::Display for Answer {
         writeln!(f, "verified      {} for robot {}", self.trajectory, self.robot)?;
         writeln!(f, "duration      {:.3} s, {}", self.duration_s, counted(self.strokes, "stroke"))?;
         writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         writeln!(f, "continuity    {}", self.continuity)?;
         write!(f, "{}", PeakTable(&self.peak_use))
     }
@@ -41,7 +43,7 @@ impl fmt::Display for Answer {
 
 /// Verifies and prints the proof.
 pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
-    let robot = arm::robot(&args.robot)?;
+    let robot = arm::modelled_robot(&args.robot)?;
     let scene = arm::scene(&args.scene)?;
     let file = arm::trajectory_for(&args.trajectory, &robot)?;
     let proof = verify(&robot, &scene, &file.trajectory)
@@ -56,9 +58,22 @@ pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
         clearance_m: proof.clearance_m,
         clearance_at_s: proof.clearance_at_s,
         clearance_between: [a, b],
+        unmodelled_links: robot.unmodelled_links.clone(),
         continuity: CONTINUITY,
         peak_use: peak_use(&robot, &proof.peaks),
     })
+}
+
+/// A line that names the links without a shape, where there are some.
+pub(crate) struct Unmodelled<'a>(pub(crate) &'a [String]);
+
+impl fmt::Display for Unmodelled<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "UNMODELLED    {}: no shape, so NOTHING keeps them from being hit", self.0.join(", "))
+    }
 }
 
 /// How much of its motion limits one joint uses at most; peaks are proven upper bounds.

@@ -35,15 +35,16 @@ pub enum Cia402Error {
         buses: usize,
     },
     /// More joints than an arm may have, or a joint index beyond it.
-    #[error("joint {joint} of the servos is beyond the {MAX_JOINTS} joints that an arm may have")]
+    #[error("joint {} of the servos is beyond the {MAX_JOINTS} joints that an arm may have", joint + 1)]
     JointBeyond {
         /// Index of the joint.
         joint: usize,
     },
     /// A node id that no drive may have.
     #[error(
-        "joint {joint} has node id {node_id}; drives on a CANopen bus have 1 to 126 (127 is this master): give the \
-         drive another id"
+        "joint {} has node id {node_id}; drives on a CANopen bus have 1 to 126 (127 is this master): give the \
+         drive another id",
+        joint + 1
     )]
     NodeId {
         /// Index of the joint.
@@ -52,7 +53,7 @@ pub enum Cia402Error {
         node_id: u8,
     },
     /// Two joints on one node.
-    #[error("joint {joint} has node id {node_id} like joint {other}; give one of the drives another id")]
+    #[error("joint {} has node id {node_id} like joint {}; give one of the drives another id", joint + 1, other + 1)]
     NodeTwice {
         /// Index of the joint.
         joint: usize,

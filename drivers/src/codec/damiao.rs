@@ -24,7 +24,7 @@ pub enum DamiaoError {
         buses: usize,
     },
     /// More joints than an arm may have, or a joint that the robot does not have.
-    #[error("joint {joint} of the servos is not one of the {joints} joints of the robot")]
+    #[error("joint {} of the servos is not one of the {joints} joints of the robot", joint + 1)]
     JointBeyond {
         /// Index of the joint.
         joint: usize,
@@ -32,7 +32,7 @@ pub enum DamiaoError {
         joints: usize,
     },
     /// Feedback has room for four bits of the id.
-    #[error("joint {joint} has node id {node_id}; Damiao motors have 1 to 15")]
+    #[error("joint {} has node id {node_id}; Damiao motors have 1 to 15", joint + 1)]
     NodeId {
         /// Index of the joint.
         joint: usize,

@@ -13,6 +13,7 @@ const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
 
 pub(super) const STEPS: &[Step] = &[
     step("forward kinematics", kinematics),
+    step("mesh files", meshes),
     step("optimisers step by step", walks),
     step("optimisers by their results", optimisers),
     step("frames of Damiao motors", damiao_frames),
@@ -21,6 +22,15 @@ pub(super) const STEPS: &[Step] = &[
 /// Where the published planning problems are, if they are at hand: their files stay outside of this project.
 fn published_problems(root: &Path) -> PathBuf {
     env::var_os("TAUSTREAM_MBM_DIR").map_or_else(|| root.join("../shared/mbm"), PathBuf::from)
+}
+
+/// Independent readers of mesh files against ours, facet by facet.
+fn meshes(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv-meshes", "meshes-requirements.txt", &[])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join("meshes.py")).arg(place.programs.join("facets"));
+    perform("mesh files against independent readers", &mut command)?;
+    Ok(Outcome::Passed)
 }
 
 /// Independent forward kinematics, in pinned versions, against ours.
