@@ -1,21 +1,18 @@
-//! The last pose of an arm on disk: it resolves the multi-turn offset of a feedback that wraps, after everything was off.
+//! The last pose of an arm on disk: what tells the revolution of a feedback that repeats itself, after everything was off.
 //!
 //! The file is hostile until checked: it is one line of JSON and one line with the SHA-256 of the first, so that a cut or
 //! edited file is known as one. It speaks of each joint's servo by a digest of its binding, because an offset that was true for
-//! another sign, gear, zero or drive means nothing.
+//! another sign, gear, zero or drive means nothing; and it carries an [`Epoch`] that the drives' newest use must confirm.
 use crate::Servo;
+use crate::drive_epochs::{Epoch, Use};
+use crate::sealed::{hex_digest, seal, unseal};
 use crate::settings::Settings;
+use crate::state_dir::{Directory, DiskFault, replace};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::ffi::OsString;
-use std::fs::{self, DirBuilder, File, OpenOptions};
-use std::io::{Read, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// Largest file that is read: eight joints need a few hundred bytes each.
-const BYTES_MAX: u64 = 64 * 1024;
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// One joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,9 +22,9 @@ pub struct LastJoint {
     pub name: String,
     /// [`binding_digest`] of its servo.
     pub binding: String,
-    /// It was referenced.
+    /// Its revolution was known.
     pub referenced: bool,
-    /// It rested, and nothing could have moved it since but hands.
+    /// Every drive was off and it was measured still, and none was energised since.
     pub at_rest: bool,
     /// Where it stood.
     pub position_rad: f64,
@@ -40,25 +37,58 @@ pub struct LastJoint {
 #[serde(deny_unknown_fields)]
 pub struct LastPose {
     version: u32,
+    /// Confirmed by the drives' newest use.
+    pub epoch: Epoch,
     /// The arm's name.
     pub arm: String,
     /// Its joints, base to tip.
     pub joints: Vec<LastJoint>,
 }
 
+/// Why a record is not believed or cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StateError {
+    /// There is simply none yet.
+    #[error("there is none yet")]
+    Missing,
+    /// The disk.
+    #[error("{}", .0.sentence("it"))]
+    Disk(DiskFault),
+    /// Its contents.
+    #[error("{0}")]
+    Contents(String),
+    /// Its drives were used since.
+    #[error("it is out of date: {}", since(.drive, .newest.as_ref()))]
+    OutOfDate {
+        /// The drive.
+        drive: String,
+        /// Its newest use; `None` when none is known.
+        newest: Option<Use>,
+    },
+}
+
+fn since(drive: &str, newest: Option<&Use>) -> String {
+    match newest {
+        Some(Use { arm, state_directory, .. }) => format!(
+            "drive {drive} was used since as arm {arm:?} with the state directory {}; start with that one if it is another, or \
+             reference the joints again",
+            state_directory.display()
+        ),
+        None => format!("no use of drive {drive} is known on this computer; reference the joints again"),
+    }
+}
+
 /// Why there is no last pose.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("last pose {}: {why}", path.display())]
 pub struct LastPoseError {
-    /// The file.
+    /// The file or directory.
     pub path: PathBuf,
     /// What is wrong with it.
-    pub why: String,
-    /// There is simply none yet.
-    pub missing: bool,
+    pub why: StateError,
 }
 
-/// What an offset depends on besides the reading: SHA-256 over everything that says how a servo's feedback becomes the joint's
+/// What a turn depends on besides the reading: SHA-256 over everything that says how a servo's feedback becomes the joint's
 /// angle. The robot digest leaves it out (ADR 2).
 #[must_use]
 pub fn binding_digest(settings: &Settings, servo: &Servo) -> String {
@@ -73,14 +103,10 @@ pub fn binding_digest(settings: &Settings, servo: &Servo) -> String {
         servo.feedback,
         servo.feedback_range_rad
     );
-    hex(&text)
+    hex_digest(&text)
 }
 
-fn hex(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// The state directory: what was requested, else `$STATE_DIRECTORY` (systemd; the first of several), else
+/// The state directory: what was asked for, else `$STATE_DIRECTORY` (systemd; the first of several), else
 /// `$XDG_STATE_HOME/taustream`, else `~/.local/state/taustream`, else `/var/lib/taustream`.
 #[must_use]
 pub fn directory(requested: Option<&Path>) -> PathBuf {
@@ -104,52 +130,40 @@ fn choose(requested: Option<&Path>, variable: impl Fn(&str) -> Option<OsString>)
 impl LastPose {
     /// A last pose.
     #[must_use]
-    pub fn new(arm: &str, joints: Vec<LastJoint>) -> Self {
-        Self { version: VERSION, arm: arm.to_owned(), joints }
+    pub fn new(arm: &str, epoch: Epoch, joints: Vec<LastJoint>) -> Self {
+        Self { version: VERSION, epoch, arm: arm.to_owned(), joints }
     }
 
-    /// The file of an arm.
+    /// The file's name for an arm.
     #[must_use]
-    pub fn file(directory: &Path, arm: &str) -> PathBuf {
-        directory.join(format!("{arm}.last-pose"))
+    pub fn file_name(arm: &str) -> String {
+        format!("{arm}.last-pose")
     }
 
-    /// Reads the last pose of an arm.
+    /// Reads the last pose of an arm from a state directory. Whether it is the newest is not checked here.
     ///
     /// # Errors
-    /// When there is none, or none that can be believed.
-    pub fn load(directory: &Path, arm: &str) -> Result<Self, LastPoseError> {
-        let path = Self::file(directory, arm);
-        let refused = |why: String, missing| LastPoseError { path: path.clone(), why, missing };
-        let text = read(&path).map_err(|e| {
-            let missing = e.kind() == std::io::ErrorKind::NotFound;
-            refused(if missing { "there is none yet".to_owned() } else { e.to_string() }, missing)
-        })?;
-        let pose = Self::parse(&text).map_err(|why| refused(why, false))?;
+    /// When there is none, or none that can be read.
+    pub fn load(directory: &mut dyn Directory, arm: &str) -> Result<Self, StateError> {
+        let bytes = directory.read(&Self::file_name(arm)).map_err(StateError::Disk)?;
+        let pose = Self::parse(&bytes.ok_or(StateError::Missing)?).map_err(StateError::Contents)?;
         if pose.arm != arm {
-            return Err(refused(format!("it is of arm {:?}", pose.arm), false));
+            return Err(StateError::Contents(format!("it is of arm {:?}", pose.arm)));
         }
         Ok(pose)
     }
 
-    /// Reads the text of a file.
+    /// Reads the bytes of a file.
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let mut lines = text.lines();
-        let (Some(body), Some(sum), None) = (lines.next(), lines.next(), lines.next()) else {
-            return Err("it is cut off: expected two lines".to_owned());
-        };
-        if sum.strip_prefix("sha256 ") != Some(hex(body).as_str()) {
-            return Err("its sum does not fit: it was cut off or edited".to_owned());
-        }
-        let pose: Self = serde_json::from_str(body).map_err(|e| e.to_string())?;
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let pose: Self = serde_json::from_str(unseal(bytes)?).map_err(|e| e.to_string())?;
         if pose.version != VERSION {
             return Err(format!("version {}, expected {VERSION}", pose.version));
         }
         if let Some(joint) = pose.joints.iter().find(|j| !(j.position_rad + j.offset_rad).is_finite()) {
-            return Err(format!("joint {:?} stands nowhere", joint.name));
+            return Err(format!("joint {:?} has no finite position", joint.name));
         }
         Ok(pose)
     }
@@ -158,25 +172,15 @@ impl LastPose {
     #[must_use]
     pub fn text(&self) -> String {
         // A struct of names and numbers always has a JSON form.
-        let body = serde_json::to_string(self).unwrap_or_default();
-        let sum = hex(&body);
-        format!("{body}\nsha256 {sum}\n")
+        seal(&serde_json::to_string(self).unwrap_or_default())
     }
 
-    /// Writes it whole or not at all: beside the old one, synced, and then in its place.
+    /// Writes it whole or not at all, and returns when it is on the disk.
     ///
     /// # Errors
     /// When the directory does not take it.
-    pub fn store(&self, directory: &Path) -> std::io::Result<()> {
-        DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
-        let path = Self::file(directory, &self.arm);
-        let beside = path.with_extension("last-pose.new");
-        let mut options = OpenOptions::new();
-        let mut file = options.write(true).create(true).truncate(true).mode(0o600).open(&beside)?;
-        file.write_all(self.text().as_bytes())?;
-        file.sync_all()?;
-        fs::rename(&beside, &path)?;
-        File::open(directory)?.sync_all()
+    pub fn store(&self, directory: &mut dyn Directory) -> Result<(), DiskFault> {
+        replace(directory, &Self::file_name(&self.arm), &self.text())
     }
 
     /// A joint of this name whose servo is bound as it was.
@@ -186,24 +190,13 @@ impl LastPose {
     }
 }
 
-/// Reads a file of our own that is a file: a pipe would block, and another user's file is not trusted.
-fn read(path: &Path) -> std::io::Result<String> {
-    let refused = |why: &str| std::io::Error::other(why.to_owned());
-    let metadata = fs::symlink_metadata(path)?;
-    if !metadata.is_file() {
-        return Err(refused("it is no regular file"));
-    }
-    if metadata.uid() != rustix::process::geteuid().as_raw() || metadata.mode() & 0o022 != 0 {
-        return Err(refused("others could have written it (owner or mode)"));
-    }
-    let mut text = String::new();
-    File::open(path)?.take(BYTES_MAX).read_to_string(&mut text)?;
-    Ok(text)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    use crate::state_dir::{Disk, Step, SystemDisk};
+    use std::fs::{self, Permissions};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 
     fn pose() -> LastPose {
         let joint = |name: &str, position_rad| LastJoint {
@@ -214,76 +207,151 @@ mod tests {
             position_rad,
             offset_rad: -6.25,
         };
-        LastPose::new("arm", vec![joint("pan", 0.1), joint("lift", -1.0 / 3.0)])
+        LastPose::new("arm", Epoch::random().unwrap(), vec![joint("pan", 0.1), joint("lift", -1.0 / 3.0)])
+    }
+
+    /// A directory of its own, gone after the test.
+    struct Scratch(PathBuf);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            Self(std::env::temp_dir().join(format!("taustream-last-pose-{name}-{}", std::process::id())))
+        }
+        fn store(&self, pose: &LastPose) -> Result<(), DiskFault> {
+            pose.store(&mut *SystemDisk::default().open(&self.0, true)?)
+        }
+        fn load(&self, arm: &str) -> Result<LastPose, StateError> {
+            let opened = SystemDisk::default().open(&self.0, false);
+            LastPose::load(&mut *opened.map_err(StateError::Disk)?, arm)
+        }
+        fn file(&self) -> PathBuf {
+            self.0.join(LastPose::file_name("arm"))
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            let _left_behind = fs::remove_dir_all(&self.0);
+        }
     }
 
     #[test]
     fn last_pose_survives_the_disk_bit_by_bit() {
-        let scratch = std::env::temp_dir().join(format!("taustream-last-pose-{}", std::process::id()));
-        pose().store(&scratch).unwrap();
-        assert_eq!(LastPose::load(&scratch, "arm"), Ok(pose()));
-        let mode = fs::metadata(LastPose::file(&scratch, "arm")).unwrap().mode();
-        assert_eq!(mode & 0o777, 0o600);
-        assert!(LastPose::load(&scratch, "leg").unwrap_err().missing);
-        fs::rename(LastPose::file(&scratch, "arm"), LastPose::file(&scratch, "leg")).unwrap();
-        assert!(LastPose::load(&scratch, "leg").unwrap_err().why.contains("of arm \"arm\""));
-        fs::remove_dir_all(&scratch).unwrap();
+        let (scratch, pose) = (Scratch::new("disk"), pose());
+        scratch.store(&pose).unwrap();
+        scratch.store(&pose).unwrap();
+        assert_eq!(scratch.load("arm"), Ok(pose));
+        assert_eq!(fs::metadata(scratch.file()).unwrap().mode() & 0o777, 0o600);
+        assert_eq!(scratch.load("leg"), Err(StateError::Missing));
+        fs::rename(scratch.file(), scratch.0.join(LastPose::file_name("leg"))).unwrap();
+        assert!(scratch.load("leg").unwrap_err().to_string().contains("of arm \"arm\""));
     }
 
     /// Every cut and every flipped bit of the file is noticed; nothing of it is believed, nothing panics.
     #[test]
     fn last_pose_cut_or_changed_anywhere_is_refused() {
-        let good = pose().text();
+        let pose = pose();
+        let good = pose.text();
         for cut in 0..good.len() - 1 {
-            assert!(LastPose::parse(&good[..cut]).is_err(), "cut at {cut}");
+            assert!(LastPose::parse(&good.as_bytes()[..cut]).is_err(), "cut at {cut}");
         }
         for at in 0..good.len() {
-            for bit in 0..7 {
+            for bit in 0..8 {
                 let mut bytes = good.clone().into_bytes();
                 bytes[at] ^= 1 << bit;
-                let text = String::from_utf8(bytes).unwrap();
-                let read = LastPose::parse(&text);
+                let read = LastPose::parse(&bytes);
                 // Line ends may differ; what is read is then the same.
-                assert!(read.is_err() || read == Ok(pose()), "bit {bit} of byte {at}: {read:?}");
+                assert!(read.is_err() || read == Ok(pose.clone()), "bit {bit} of byte {at}: {read:?}");
             }
         }
-        assert_eq!(LastPose::parse(&good), Ok(pose()));
+        assert_eq!(LastPose::parse(good.as_bytes()), Ok(pose));
     }
 
     #[test]
-    fn last_pose_that_is_signed_but_hostile_is_refused() {
-        let signed = |body: &str| format!("{body}\nsha256 {}\n", hex(body));
-        for body in [
-            "",
-            "null",
-            "[]",
-            "{}",
-            "{\"version\":1}",
-            "{\"version\":2,\"arm\":\"arm\",\"joints\":[]}",
-            "{\"version\":1,\"arm\":\"arm\",\"joints\":[],\"x\":1}",
-            "{\"version\":1,\"arm\":\"arm\",\"joints\":[{\"name\":\"pan\",\"binding\":\"\",\"referenced\":true,\"at_rest\":true,\"position_rad\":1e999,\"offset_rad\":0}]}",
-            "{\"version\":1,\"arm\":\"arm\",\"joints\":[{\"name\":\"pan\",\"binding\":\"\",\"referenced\":true,\"at_rest\":true,\"position_rad\":1e308,\"offset_rad\":1e308}]}",
-        ] {
-            assert!(LastPose::parse(&signed(body)).is_err(), "{body}");
+    fn last_pose_that_is_sealed_but_hostile_is_refused() {
+        let good = pose().text();
+        let good = good.lines().next().unwrap();
+        let joints = good.find("\"joints\"").unwrap();
+        let mut bodies: Vec<String> =
+            ["", "null", "[]", "{}", "{\"version\":2}"].into_iter().map(str::to_owned).collect();
+        bodies.push(good.replace("\"version\":2", "\"version\":1"));
+        bodies.push(good.replace("\"arm\":\"arm\"", "\"arm\":\"arm\",\"x\":1"));
+        bodies.push(good.replace("-6.25", "1e999"));
+        bodies.push(good.replace("-6.25", "1e308").replace("0.1", "1e308"));
+        bodies.push(format!("{}\"joints\":{}", &good[..joints], "[".repeat(100_000)));
+        for body in bodies {
+            assert!(LastPose::parse(seal(&body).as_bytes()).is_err(), "{body:.200}");
         }
-        let deep = "[".repeat(100_000);
-        assert!(LastPose::parse(&signed(&deep)).is_err());
+        assert!(LastPose::parse(seal(good).as_bytes()).is_ok());
+        assert!(LastPose::parse(b"\xFF\xFE\n\n").is_err());
     }
 
     #[test]
     fn last_pose_behind_a_link_a_pipe_or_open_to_others_is_refused() {
-        use std::os::unix::fs::{PermissionsExt, symlink};
-        let scratch = std::env::temp_dir().join(format!("taustream-last-pose-odd-{}", std::process::id()));
-        pose().store(&scratch).unwrap();
-        let file = LastPose::file(&scratch, "arm");
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o666)).unwrap();
-        assert!(LastPose::load(&scratch, "arm").unwrap_err().why.contains("others"));
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
-        let elsewhere = scratch.join("elsewhere");
-        fs::rename(&file, &elsewhere).unwrap();
-        symlink(&elsewhere, &file).unwrap();
-        assert!(LastPose::load(&scratch, "arm").unwrap_err().why.contains("no regular file"));
-        fs::remove_dir_all(&scratch).unwrap();
+        let (scratch, pose) = (Scratch::new("odd"), pose());
+        scratch.store(&pose).unwrap();
+        let step = |scratch: &Scratch| match scratch.load("arm") {
+            Err(StateError::Disk(fault)) => fault.step,
+            other => panic!("{other:?}"),
+        };
+        let mode = |path: &Path, bits| fs::set_permissions(path, Permissions::from_mode(bits)).unwrap();
+        for bits in [0o666, 0o620, 0o602] {
+            mode(&scratch.file(), bits);
+            assert_eq!(step(&scratch), Step::Mode);
+        }
+        mode(&scratch.file(), 0o600);
+        for bits in [0o777, 0o1777, 0o770, 0o702] {
+            mode(&scratch.0, bits);
+            assert_eq!(step(&scratch), Step::Mode, "{bits:o}");
+            assert_eq!(scratch.store(&pose).unwrap_err().step, Step::Mode, "{bits:o}");
+        }
+        mode(&scratch.0, 0o750);
+        assert_eq!(scratch.load("arm"), Ok(pose.clone()));
+
+        let elsewhere = scratch.0.join("elsewhere");
+        fs::rename(scratch.file(), &elsewhere).unwrap();
+        symlink(&elsewhere, scratch.file()).unwrap();
+        assert_eq!(step(&scratch), Step::Read);
+        // Where the new file is written, a link lies in wait: it is replaced, and what it points to stays.
+        let target = scratch.0.join("target");
+        fs::write(&target, "precious").unwrap();
+        symlink(&target, scratch.0.join("arm.last-pose.new")).unwrap();
+        scratch.store(&pose).unwrap();
+        assert_eq!(fs::read_to_string(&target).unwrap(), "precious");
+        assert_eq!(scratch.load("arm"), Ok(pose));
+        fs::remove_file(scratch.file()).unwrap();
+        fs::create_dir(scratch.file()).unwrap();
+        assert_eq!(step(&scratch), Step::NotFile);
+    }
+
+    #[test]
+    fn state_directory_that_is_a_link_a_file_or_somebody_elses_is_refused_with_the_remedy() {
+        let scratch = Scratch::new("link");
+        scratch.store(&pose()).unwrap();
+        let open = |path: &Path| SystemDisk::default().open(path, true).err().map(|fault| fault.step);
+        let link = scratch.0.join("link");
+        symlink(&scratch.0, &link).unwrap();
+        assert_eq!(open(&link), Some(Step::Link));
+        // Making directories below a file fails before it is opened.
+        assert_eq!(open(&scratch.file()), Some(Step::Directory));
+        if rustix::process::geteuid().is_root() {
+            let other = Scratch::new("other");
+            fs::create_dir(&other.0).unwrap();
+            std::os::unix::fs::chown(&other.0, Some(4_242), None).unwrap();
+            assert_eq!(open(&other.0), Some(Step::Owner));
+            let trusting = SystemDisk { services_user: Some(4_242) };
+            assert!(trusting.open(&other.0, true).is_ok());
+            pose().store(&mut *trusting.open(&other.0, true).unwrap()).unwrap();
+            let made = fs::metadata(other.0.join(LastPose::file_name("arm"))).unwrap();
+            assert_eq!(made.uid(), 4_242, "the services' user could not read it");
+        }
+        for step in [Step::Link, Step::Owner, Step::Mode, Step::Sync] {
+            let fault = DiskFault { step, errno: 28 };
+            assert_eq!(DiskFault::from_code(fault.code()), Some(fault));
+            assert!(fault.sentence("/some/where").contains("/some/where"));
+        }
+        let full = DiskFault { step: Step::Write, errno: 28 }.sentence("/a");
+        assert!(full.contains("No space left"), "{full}");
     }
 
     #[test]

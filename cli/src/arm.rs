@@ -36,12 +36,12 @@ impl ArmName {
     /// The names, for sentences about joints and buses.
     pub(crate) fn names(&self) -> Names {
         let Self { joints, buses, servos, .. } = self.clone();
-        Names { joints, buses, servos }
+        Names { joints, buses, servos, ..Names::default() }
     }
 
     /// The arm of settings that were read as a whole.
     pub(crate) fn of(settings: &Settings) -> Self {
-        let Names { joints, buses, servos } = Names::of(settings);
+        let Names { joints, buses, servos, .. } = Names::of(settings);
         Self { name: settings.name.clone(), joints, buses, servos }
     }
 

@@ -1,5 +1,6 @@
 //! Why a command was accepted or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
+use crate::write_ahead::StoreFault;
 use taustream_drivers::DriveState;
 use taustream_drivers::bring_up::Refusal;
 use taustream_messages::{Cause, Phase, ReferenceState};
@@ -66,6 +67,9 @@ pub enum AnswerReason {
     Wait,
     ShuttingDown,
     TooLate { late_s: f64 },
+    Overtaken,
+    NotRecorded { fault: StoreFault },
+    RecordLate { waited_s: f64 },
 }
 
 impl AnswerReason {
@@ -115,7 +119,10 @@ impl AnswerReason {
     fn of_referencing(&self, names: &Names) -> Option<String> {
         Some(match *self {
             Self::Referenced { joint, at_rad } => {
-                format!("{} is referenced at {at_rad:.6} rad; stored on disk", names.joint(joint))
+                format!(
+                    "{} is referenced at {at_rad:.6} rad; stored on disk after 0.2 s at rest",
+                    names.joint(joint)
+                )
             }
             Self::NotReferenced { joint, reference_state, by_rad } => {
                 let by = match reference_state {
@@ -221,6 +228,15 @@ impl AnswerReason {
             Self::StillEnergised { joint } => {
                 format!("the drive of {} is still energised; wait and try again", name(joint))
             }
+            Self::NotRecorded { fault } => format!(
+                "nothing was changed or energised, because the record that has to say so first is not on the disk: {}",
+                names.directories.sentence(fault)
+            ),
+            Self::RecordLate { waited_s } => format!(
+                "nothing was changed or energised, because the disk has not taken the record that has to say so first within \
+                 {waited_s:.1} s; see the disk of {}, then ask again",
+                names.directories.state.display()
+            ),
             other => other.plain_refusal().to_owned(),
         }
     }
@@ -239,6 +255,7 @@ impl AnswerReason {
             Self::TooManyRamps => "too many speed changes at once; wait a second and try again",
             Self::Wait => "another change is in progress; wait until it has ended",
             Self::ShuttingDown => "the streamer is shutting down",
+            Self::Overtaken => "a stop, a fault or the end of the streamer came first; nothing was energised",
             _ => "it is not possible now",
         }
     }

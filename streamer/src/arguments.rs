@@ -30,6 +30,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     pub cycle_log: Option<PathBuf>,
     /// Directory of the last pose; default: `$STATE_DIRECTORY`, `$XDG_STATE_HOME/taustream`, `~/.local/state/taustream`.
+    ///
+    /// Only this user may write to it. Use one directory for one arm: a joint is not referenced by an older record elsewhere.
     #[arg(long, value_name = "DIR")]
     pub state_dir: Option<PathBuf>,
 }

@@ -8,11 +8,13 @@ use crate::cycle_state::CycleState;
 use crate::guard::Guard;
 use crate::intake::{Answers, Handover, Intake};
 use crate::last_sent::Ledger;
+use crate::record_first::Records;
 use crate::referencing::LastPoses;
 use crate::report::{Reporter, Writers};
 use crate::supervise::{Actions, Supervisor};
 use crate::tick::Tick;
 use crate::track::Track;
+use crate::write_ahead::Requester;
 use taustream_arm::Settings;
 use taustream_drivers::{CanLink, DriveTarget};
 
@@ -109,7 +111,7 @@ impl Core {
             track: Track::new(settings),
             guard: Guard::new(limits, joints, cycle.period_us),
             buses,
-            supervisor: Supervisor::new(settings),
+            supervisor: Supervisor::new(settings, Records::none()),
             reporter: Reporter::new(settings.robot.digest, (joints, settings.buses.len()), cycle, reports),
         }
     }
@@ -117,6 +119,12 @@ impl Core {
     /// Takes the last pose that is known, before the first cycle.
     pub fn restore_poses(&mut self, last_poses: &LastPoses) {
         self.supervisor.referencing_mut().restore_poses(last_poses);
+    }
+
+    /// From now on drives are energised only after `requester`'s record is on the disk. A core without one, as benches use,
+    /// drives no real arm.
+    pub fn record_first(&mut self, requester: Requester) {
+        self.supervisor.records = Records::new(requester);
     }
 
     /// The supervisor, to look at.

@@ -25,8 +25,8 @@ pub const COMMANDS_PENDING_MAX: usize = 16;
 /// Sources of commands: shared memory, and the operator's socket. Each has queues of its own.
 const COMMAND_PORTS: usize = 2;
 
-/// The answers of one cycle: to its commands, and to a `clear-fault` of before that waited for a bus.
-pub type Answers = [Option<CommandAnswer>; COMMANDS_MAX + 1];
+/// The answers of one cycle: to its commands, and to those of before that waited for a bus or for a record on the disk.
+pub type Answers = [Option<CommandAnswer>; COMMANDS_MAX + 2];
 
 /// A trajectory in its box.
 pub type Boxed = Box<CheckedTrajectory>;

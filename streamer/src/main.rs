@@ -10,17 +10,18 @@ use std::sync::mpsc::channel;
 use std::thread;
 use taustream_arm::daemon::Manager;
 use taustream_arm::log::start_log;
-use taustream_arm::{Kind, Settings, find, last_pose};
+use taustream_arm::state_dir::SystemDisk;
+use taustream_arm::{Kind, Settings, drive_epochs, find, last_pose};
 use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
 use taustream_streamer::intake::{self, Shutdown, ShutdownHandle};
-use taustream_streamer::pose_store::{self, PoseStore};
+use taustream_streamer::pose_store::{self, PoseRecords, PoseStore};
 use taustream_streamer::recorder::Recorder;
 use taustream_streamer::threads::Threads;
-use taustream_streamer::{report, rt};
+use taustream_streamer::{report, rt, write_ahead};
 use tracing::warn;
 
 fn main() -> ExitCode {
@@ -55,10 +56,7 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
     let recording = arguments.cycle_log.is_some();
     let (reports, mut readers) = report::queues(recording);
     let mut core = Core::new(settings, buses, queues, reports);
-    let state = last_pose::directory(arguments.state_dir.as_deref());
-    core.restore_poses(&pose_store::restore_poses(settings, &state));
-    let pose_store =
-        PoseStore::start(settings, state).context("cannot start the thread that stores the last pose")?;
+    let pose_store = keep_pose(arguments, settings, &runtime, &mut core)?;
 
     lock_memory(arguments.allow_non_realtime)?;
     let (candidates, logged) = channel();
@@ -79,6 +77,27 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
         tracing::error!("cycle log: {e}");
     }
     outcome
+}
+
+/// Takes the last pose from disk, and starts the thread that keeps it.
+fn keep_pose(
+    arguments: &Arguments,
+    settings: &Settings,
+    runtime: &Path,
+    core: &mut Core,
+) -> Result<PoseStore> {
+    let mut local = true;
+    for bus in &settings.buses {
+        local &= link::is_local(bus, arguments.link)?;
+    }
+    let state = last_pose::directory(arguments.state_dir.as_deref());
+    let directories = pose_store::directories(state, local.then_some(runtime))?;
+    let (requester, recorder) = write_ahead::pair();
+    let disk = SystemDisk { services_user: drive_epochs::services_user() };
+    let mut store = PoseRecords::new(settings, directories, Box::new(disk), recorder);
+    core.restore_poses(&store.restore_poses());
+    core.record_first(requester);
+    PoseStore::start(store).context("cannot start the thread that keeps the last pose")
 }
 
 fn open_buses(settings: &Settings, choice: LinkChoice, runtime: &Path) -> Result<Buses> {

@@ -1,5 +1,6 @@
 //! The names that an arm's settings give to joints and buses, and the sentences about them that every reader gets alike:
 //! the log, the answers to commands, `status`.
+use crate::pose_store::Directories;
 use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
@@ -37,6 +38,8 @@ pub struct Names {
     pub buses: Vec<BusName>,
     /// The servos, in the order of the joints.
     pub servos: Vec<ServoName>,
+    /// Where the last pose is kept; empty where nobody keeps it.
+    pub directories: Directories,
 }
 
 impl Names {
@@ -57,6 +60,7 @@ impl Names {
             joints: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
             buses: settings.buses.iter().map(bus).collect(),
             servos: settings.servos.iter().map(servo).collect(),
+            directories: Directories::default(),
         }
     }
 
@@ -230,6 +234,7 @@ mod tests {
             joints: vec!["pan".into(), "lift".into()],
             buses: vec![bus],
             servos: vec![servo("cia402"), servo("damiao")],
+            ..Names::default()
         }
     }
 

@@ -32,6 +32,18 @@ impl Supervisor {
         {
             return None;
         }
+        match self.begin_record(pending, cycle_state) {
+            Some(Ok(())) => return None,
+            Some(Err(why)) => {
+                return Some(CommandAnswer {
+                    sequence: pending.sequence,
+                    accepted: false,
+                    phase: self.phase,
+                    why,
+                });
+            }
+            None => {}
+        }
         let result = match pending.command {
             Command::Enable | Command::Resume if self.shutting_down != Shutdown::No => {
                 Err(AnswerReason::ShuttingDown)
@@ -76,7 +88,7 @@ impl Supervisor {
         servos.find(|(joint, s)| !unreachable[*joint] && is_energised(s.state)).map(|(joint, _)| joint)
     }
 
-    fn enable(
+    pub(crate) fn enable(
         &mut self,
         cycle_state: &CycleState,
         actions: &mut Actions,
@@ -123,7 +135,7 @@ impl Supervisor {
 
     /// The pose to energise at: the angle of each joint, or what its drive holds. Only if every joint answers,
     /// is referenced, at rest, and inside its range.
-    fn trusted_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
+    pub(crate) fn trusted_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(cycle_state) {
             let age_s = self.watch.age_s(cycle_state, joint);
@@ -348,12 +360,24 @@ impl Supervisor {
     }
 
     /// The angle of a joint set by the operator: accepted only while nothing is energised and the arm is at rest.
-    fn reference(
+    pub(crate) fn reference(
         &mut self,
         joint: u32,
         at_rad: f64,
         cycle_state: &CycleState,
     ) -> Result<AnswerReason, AnswerReason> {
+        let (joint, position_rad) = self.check_reference(joint, at_rad, cycle_state)?;
+        let at_rad = self.referencing.set_reference(joint, position_rad, at_rad)?;
+        Ok(AnswerReason::Referenced { joint, at_rad })
+    }
+
+    /// The joint and where it was measured, if its reference may be changed to `at_rad` now.
+    pub(crate) fn check_reference(
+        &self,
+        joint: u32,
+        at_rad: f64,
+        cycle_state: &CycleState,
+    ) -> Result<(usize, f64), AnswerReason> {
         let joint = usize::try_from(joint).unwrap_or(usize::MAX);
         let Some(servo) = cycle_state.servos.get(joint).filter(|_| joint < self.joints) else {
             return Err(AnswerReason::NoSuchJoint { joint });
@@ -369,8 +393,8 @@ impl Supervisor {
         if speed_rad_s > REST_RAD_S {
             return Err(AnswerReason::NotAtRest { joint: moving, speed_rad_s, limit_rad_s: REST_RAD_S });
         }
-        let at_rad = self.referencing.set_reference(joint, servo.position_rad, at_rad)?;
-        Ok(AnswerReason::Referenced { joint, at_rad })
+        self.referencing.check_reference(joint, servo.position_rad, at_rad)?;
+        Ok((joint, servo.position_rad))
     }
 }
 

@@ -8,9 +8,14 @@ use crate::answer::AnswerReason;
 use crate::cycle_state::CycleState;
 use taustream_arm::revolution::{self, OffsetError as Possible, PERIOD_SHARE_MAX};
 use taustream_arm::{Feedback, Servo, Settings};
-use taustream_drivers::{DriveState, JointCommand};
+use taustream_drivers::{DriveState, JointCommand, Nanos};
 use taustream_messages::ReferenceState;
 use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// A joint that stays within this is called still.
+pub const STILL_RAD: f64 = 0.002;
+/// After this long.
+pub const STILL_S: f64 = 0.2;
 
 /// What was last known of a joint's multi-turn offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,23 +68,28 @@ impl Rule {
         let known = |reference_state, offset_rad| Resolved { offset_rad, reference_state, by_rad: 0.0 };
         match (self.feedback, recorded) {
             (Feedback::MultiTurn, _) => known(ReferenceState::Encoder, 0.0),
-            (_, Some(recorded)) if adopted => known(ReferenceState::Adoption, recorded.offset_rad),
+            // A record of rest was written while the drive was off: whoever energised it since wrote none.
+            (_, Some(recorded)) if adopted && !recorded.at_rest => {
+                known(ReferenceState::Adoption, recorded.offset_rad)
+            }
             (Feedback::Incremental, _) => known(ReferenceState::Incremental, 0.0),
             (Feedback::Wraps, recorded) => {
                 match (revolution::only_offset_rad(reading_rad, self.period_rad, self.range_rad), recorded) {
                     (Ok(offset_rad), _) => known(ReferenceState::Encoder, offset_rad),
                     (Err(Possible::None), _) => known(ReferenceState::OutOfRange, 0.0),
                     (Err(Possible::Several), None) => known(ReferenceState::NoRecord, 0.0),
-                    (Err(Possible::Several), Some(recorded)) => self.by_record(reading_rad, recorded),
+                    (Err(Possible::Several), Some(recorded)) => {
+                        self.by_record(reading_rad, recorded, adopted)
+                    }
                 }
             }
         }
     }
 
-    fn by_record(&self, reading_rad: f64, recorded: Recorded) -> Resolved {
+    fn by_record(&self, reading_rad: f64, recorded: Recorded, adopted: bool) -> Resolved {
         let offset_rad = revolution::nearest_offset_rad(reading_rad, self.period_rad, recorded.position_rad);
         let by_rad = (reading_rad + offset_rad - recorded.position_rad).abs();
-        if !recorded.at_rest {
+        if !recorded.at_rest || adopted {
             return Resolved { offset_rad: 0.0, reference_state: ReferenceState::RecordMoving, by_rad };
         }
         // Not-a-number is too far.
@@ -117,6 +127,8 @@ struct JointReferencing {
     resolved: Resolved,
     recorded: Option<Recorded>,
     present: bool,
+    /// Where it was last seen to begin to rest, and when.
+    anchor: (f64, Nanos),
 }
 
 /// The referencing of all joints.
@@ -135,7 +147,13 @@ impl Referencing {
                 Resolved { offset_rad: 0.0, reference_state: ReferenceState::NoFeedback, by_rad: 0.0 };
             let rule = Rule::of(servo, settings);
             if let Some(slot) = entries.get_mut(servo.joint) {
-                *slot = Some(JointReferencing { rule, resolved, recorded: None, present: false });
+                *slot = Some(JointReferencing {
+                    rule,
+                    resolved,
+                    recorded: None,
+                    present: false,
+                    anchor: (f64::NAN, Nanos(0)),
+                });
             }
         }
         Self { entries }
@@ -172,11 +190,16 @@ impl Referencing {
             entry.present = present;
             servo.position_rad += entry.resolved.offset_rad;
             servo.hold_position_rad += entry.resolved.offset_rad;
+            let off = servo.state == DriveState::Disabled;
+            let near = (servo.position_rad - entry.anchor.0).abs() <= STILL_RAD;
+            if !off || !near {
+                entry.anchor = (servo.position_rad, cycle_state.tick.wake_time);
+            }
             if present && entry.resolved.reference_state.is_referenced() {
                 entry.recorded = Some(Recorded {
                     position_rad: servo.position_rad,
                     offset_rad: entry.resolved.offset_rad,
-                    at_rest: servo.state == DriveState::Disabled,
+                    at_rest: off && cycle_state.tick.wake_time.since_s(entry.anchor.1) >= STILL_S,
                 });
             }
         }
@@ -207,24 +230,45 @@ impl Referencing {
         std::array::from_fn(|joint| self.resolved(joint).offset_rad)
     }
 
-    /// Sets a joint that measures `position_rad` to `at_rad`, by command of the operator. Returns its angle.
+    /// Where a joint measured at `position_rad` is if the operator's word is right that it stands at `at_rad`, and what is
+    /// then added to its reading.
     ///
     /// Real time: arithmetic only.
     ///
     /// # Errors
-    /// Why the angle cannot be right, or no reference is needed.
+    /// Why the word cannot be right, or is not needed.
+    pub fn check_reference(
+        &self,
+        joint: usize,
+        position_rad: f64,
+        at_rad: f64,
+    ) -> Result<(f64, f64), AnswerReason> {
+        let Some(entry) = self.entries.get(joint).and_then(Option::as_ref) else {
+            return Err(AnswerReason::NoSuchJoint { joint });
+        };
+        let reading_rad = position_rad - entry.resolved.offset_rad;
+        let offset_rad = entry.rule.stated(joint, reading_rad, at_rad)?;
+        Ok((reading_rad + offset_rad, offset_rad))
+    }
+
+    /// Takes the operator's word. Gives back where the joint then is.
+    ///
+    /// Real time: arithmetic only.
+    ///
+    /// # Errors
+    /// As [`Referencing::check_reference`].
     pub fn set_reference(
         &mut self,
         joint: usize,
         position_rad: f64,
         at_rad: f64,
     ) -> Result<f64, AnswerReason> {
-        let Some(entry) = self.entries.get_mut(joint).and_then(Option::as_mut) else {
-            return Err(AnswerReason::NoSuchJoint { joint });
-        };
-        let reading_rad = position_rad - entry.resolved.offset_rad;
-        let offset_rad = entry.rule.stated(joint, reading_rad, at_rad)?;
-        entry.resolved = Resolved { offset_rad, reference_state: ReferenceState::Operator, by_rad: 0.0 };
-        Ok(reading_rad + offset_rad)
+        let (at_rad, offset_rad) = self.check_reference(joint, position_rad, at_rad)?;
+        if let Some(entry) = self.entries.get_mut(joint).and_then(Option::as_mut) {
+            entry.resolved = Resolved { offset_rad, reference_state: ReferenceState::Operator, by_rad: 0.0 };
+            // Where it rested before was measured by another offset.
+            (entry.recorded, entry.anchor) = (None, (f64::NAN, Nanos(0)));
+        }
+        Ok(at_rad)
     }
 }

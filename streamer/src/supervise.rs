@@ -7,6 +7,7 @@ use crate::answer::{AnswerReason, CommandAnswer};
 use crate::cycle_state::{Braking, Cause, CycleState, Decision, TRANSITIONS_MAX, Transition};
 use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
+use crate::record_first::{LEAVE_RECORD_S_MAX, Records};
 use crate::referencing::Referencing;
 use crate::track::SpeedChange;
 use crate::watch::Watch;
@@ -81,12 +82,13 @@ pub struct Supervisor {
     pub(crate) restoring: Option<u64>,
     pub(crate) shutting_down: Shutdown,
     shutdown_since: Nanos,
+    pub(crate) records: Records,
 }
 
 impl Supervisor {
     /// A supervisor of an arm of which nothing is known.
     #[must_use]
-    pub fn new(settings: &Settings) -> Self {
+    pub(crate) fn new(settings: &Settings, records: Records) -> Self {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
         let (cycle, rules) = (&settings.cycle, &settings.supervision);
@@ -116,6 +118,7 @@ impl Supervisor {
             restoring: None,
             shutting_down: Shutdown::No,
             shutdown_since: Nanos(0),
+            records,
         }
     }
 
@@ -200,12 +203,14 @@ impl Supervisor {
         self.evaluate_motion(cycle_state, &mut actions);
         self.evaluate_stall(cycle_state, &mut actions);
         self.evaluate_drives(cycle_state, &mut actions);
-        let [answers @ .., restored] = answers;
+        let [answers @ .., restored, recorded] = answers;
         *restored = self.evaluate_restored(cycle_state, &mut actions);
+        *recorded = self.settle_record(cycle_state, &mut actions);
         for (pending, answer) in cycle_state.commands.iter().zip(answers) {
             *answer = pending.and_then(|pending| self.command(pending, cycle_state, &mut actions));
         }
         self.evaluate_shutdown(shutdown, cycle_state, &mut actions);
+        self.release_record(cycle_state);
         self.follow_measured(cycle_state, &mut actions);
         actions
     }
@@ -543,7 +548,10 @@ impl Supervisor {
                     | Phase::Disabling => {}
                 }
                 let off = matches!(self.phase, Phase::Configuring | Phase::Disabled | Phase::Fault);
-                if off && self.energised(cycle_state).is_none() {
+                let recorded = self.records.is_rest_recorded()
+                    || cycle_state.tick.wake_time.since_s(self.since.max(self.shutdown_since))
+                        > LEAVE_RECORD_S_MAX;
+                if off && self.energised(cycle_state).is_none() && recorded {
                     actions.shutdown = Some(true);
                 } else if time_s > SHUTDOWN_S_MAX {
                     actions.shutdown = Some(false);

@@ -51,7 +51,7 @@ impl Threads {
         (command_queue, readers): (CommandQueue, Readers),
         (pose_store, candidates): (PoseStore, Option<Sender<Candidate>>),
     ) -> Result<Self, StartError> {
-        let names = Names::of(settings);
+        let names = Names { directories: pose_store.directories().clone(), ..Names::of(settings) };
         let (command_events, command_reader) = log::events();
         let (socket_events, socket_reader) = log::events();
         let command_log = CommandLog::new(vec![command_reader, socket_reader], names.clone());

@@ -20,6 +20,8 @@ mod partial_send;
 mod power;
 #[path = "cycle_suite/receive_path.rs"]
 mod receive_path;
+#[path = "cycle_suite/records.rs"]
+mod records;
 #[path = "cycle_suite/trust.rs"]
 mod trust;
 

@@ -16,7 +16,7 @@ mod socketcan;
 
 pub use controller::{Controller, ControllerState, controller};
 pub use error_frame::ErrorFrame;
-pub use open::{Holder, LinkChoice, LinkRole, OpenError, open};
+pub use open::{Holder, LinkChoice, LinkRole, OpenError, is_local, open};
 
 /// Why a link did not take, or give, frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -239,6 +239,14 @@ pub enum OpenError {
     },
 }
 
+/// Whether [`open`] takes the local link for a bus.
+///
+/// # Errors
+/// As [`open`], when the host has no link for it.
+pub fn is_local(bus: &Bus, choice: LinkChoice) -> Result<bool, OpenError> {
+    wants_socketcan(bus, choice).map(|socketcan| !socketcan)
+}
+
 /// Opens the link of a bus. `runtime` is the directory under which local links meet; it is not touched otherwise.
 ///
 /// # Errors

@@ -236,7 +236,7 @@ fn drive_that_comes_back_keeps_its_offset_from_rest_and_loses_it_from_use() {
     harness.script(|w| w.revolution_rad[0] = 2.0);
     harness.run_until(Phase::Disabled, 60);
     harness.accept(Command::Reference { joint: 0, at_rad: 0.0 });
-    harness.run(40);
+    harness.run(300);
     // Its supply was off: it counts from another turn now.
     let power_cut = |harness: &mut CycleHarness, revolution_rad: f64| {
         harness.script(|w| w.forced[0] = Some(DriveState::Absent));

@@ -16,8 +16,10 @@ use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
 use taustream_streamer::cycle_state::{Cause, Decision, TrajectoryResult};
 use taustream_streamer::intake::{self, CommandQueue, Shutdown};
 use taustream_streamer::names::Names;
+use taustream_streamer::pose_store::PoseRecords;
 use taustream_streamer::report::{self, CycleRecord, Note, Readers, Record};
 use taustream_streamer::tick::Tick;
+use taustream_streamer::write_ahead::Requester;
 
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const JOINTS: usize = 6;
@@ -271,6 +273,10 @@ pub struct CycleHarness {
     pub error_notes: u32,
     /// Joint, code and count of each note of emergency messages.
     pub emergencies: Vec<(usize, u32, u32)>,
+    /// Keeps the last pose, on this thread.
+    pub store: Option<PoseRecords>,
+    /// The store looks for a request every so many ticks.
+    pub store_every: u64,
     generation: u64,
     last: Next,
 }
@@ -358,6 +364,8 @@ impl CycleHarness {
             report: None,
             error_notes: 0,
             emergencies: Vec::new(),
+            store: None,
+            store_every: 1,
             generation: 0,
             last: Next::Go,
         }
@@ -386,7 +394,13 @@ impl CycleHarness {
         }
         while self.readers.timings.pop().is_ok() {}
         while let Ok(report) = self.readers.reports.pop() {
+            if let Some(store) = &mut self.store {
+                store.note(&report);
+            }
             self.report = Some(report);
+        }
+        if let Some(store) = self.store.as_mut().filter(|_| self.tick.is_multiple_of(self.store_every)) {
+            store.serve();
         }
         while let Ok(note) = self.readers.notes.pop() {
             self.error_notes += u32::from(matches!(note, Note::BusError { .. }));
@@ -439,6 +453,26 @@ impl CycleHarness {
         let answer = self.command_queue.commands.answer().expect("every command is answered in its cycle");
         assert_eq!(answer.sequence, sequence);
         answer
+    }
+
+    /// Takes what `store` knows, and keeps the last pose in it from now on.
+    pub fn keep(&mut self, mut store: PoseRecords, requester: Requester) {
+        self.core.restore_poses(&store.restore_poses());
+        self.core.record_first(requester);
+        self.store = Some(store);
+    }
+
+    /// Asks, and runs until there is an answer.
+    pub fn ask_and_wait(&mut self, command: Command) -> CommandAnswer {
+        let mut answer = self.queue_request(command);
+        for _ in 0..3_000 {
+            if let Some(answer) = answer {
+                return answer;
+            }
+            self.step_after(1);
+            answer = self.command_queue.commands.answer();
+        }
+        panic!("no answer to {command:?}");
     }
 
     /// Asks what cannot be answered in the same cycle, and runs it.
