@@ -18,7 +18,15 @@ const HOME_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 fn table(every_s: f64, rows: usize, at: impl Fn(f64) -> JointArray) -> MotionTable {
     let t_s: Vec<f64> = (0..rows).map(|i| i as f64 * every_s).collect();
     let position_rad = t_s.iter().map(|t| at(*t)).collect();
-    MotionTable { joints: 6, t_s, position_rad, began_s: 0.0, ignored: Vec::new() }
+    MotionTable {
+        joints: 6,
+        t_s,
+        position_rad,
+        velocity_rad_s: None,
+        acceleration_rad_s2: None,
+        began_s: 0.0,
+        ignored: Vec::new(),
+    }
 }
 
 /// The largest difference to the original at instants that the import does not know, by its own account of delay and scale.
@@ -141,11 +149,112 @@ fn table_of_a_verified_motion_is_imported_at_its_own_speed() {
     let durations_s = fitted_durations_s(&points_rad, 6, profile, &robot.limits()).expect("durations");
     let via = Via { points_rad: &points_rad, joints: 6, profile, durations_s: &durations_s };
     let original = Reference::through(&via).expect("a motion");
-    let reference = Reference::of_table(table(1e-3, 3_000, |t| original.at(t))).expect("a table");
+    let reference =
+        Reference::of_table(table(1e-3, 3_000, |t| original.at(t)), &robot.limits()).expect("a table");
     let imported = import(&robot, &scene("open"), &reference, TOLERANCE_RAD_DEFAULT).expect("a motion");
     far_and_safe(&imported, &reference, &robot, 1);
     let late_s = imported.trajectory.duration_s() - original.duration_s();
     assert!(imported.time_scale < 1.05 && late_s < 0.25, "{late_s} s, {}", imported.time_scale);
+}
+
+/// Goal: a table with few rows costs little time: by its own velocities and accelerations it is the motion itself, and
+/// without them a spline does nearly as well, where straight lines made it three times slower.
+#[test]
+fn coarse_table_of_a_verified_motion_is_imported_nearly_at_its_own_speed() {
+    let robot = ur5();
+    let limits = robot.limits();
+    let points_rad = [pose(HOME_RAD), pose([1.2, -1.3, 1.4, -1.6, -1.57, 0.0])];
+    let profile = ViaProfile::TauJStar { k: 0.1 };
+    let durations_s = fitted_durations_s(&points_rad, 6, profile, &limits).expect("durations");
+    let via = Via { points_rad: &points_rad, joints: 6, profile, durations_s: &durations_s };
+    let original = import_strokes(&robot, &scene("open"), &via, 10).expect("strokes").trajectory;
+    let at = |t: f64| original.sample(t);
+    let rows = 2 + (original.duration_s() / 0.1) as usize;
+    for order in 0..3 {
+        let mut coarse = table(0.1, rows, |t| at(t).position_rad);
+        let column =
+            |f: &dyn Fn(f64) -> JointArray| Some(coarse.t_s.iter().map(|t| f(*t)).collect::<Vec<_>>());
+        let velocity = column(&|t| at(t).velocity_rad_s).filter(|_| order >= 1);
+        let acceleration = column(&|t| at(t).acceleration_rad_s2).filter(|_| order >= 2);
+        (coarse.velocity_rad_s, coarse.acceleration_rad_s2) = (velocity, acceleration);
+        let reference = Reference::of_table(coarse, &limits).expect("a table");
+        assert_eq!(reference.note(), None);
+        let off_rad = (0..1000).map(|i| {
+            let t = f64::from(i) * 1e-3 * original.duration_s();
+            let (q, r) = (at(t).position_rad, reference.at(t));
+            q.iter().zip(r).map(|(q, r)| (q - r).abs()).fold(0.0, f64::max)
+        });
+        let off_rad = off_rad.fold(0.0, f64::max);
+        assert!(off_rad < [0.02, 0.01, 0.002][order], "order {order}: {off_rad} rad from the motion");
+        let imported = import(&robot, &scene("open"), &reference, TOLERANCE_RAD_DEFAULT).expect("a motion");
+        far_and_safe(&imported, &reference, &robot, order as u64);
+        let factor = imported.trajectory.duration_s() / original.duration_s();
+        assert!(factor < [1.6, 1.5, 1.4][order], "order {order}: {factor} times as long");
+    }
+}
+
+/// Velocities of another unit or joint are found out by the rows themselves, and left out aloud.
+#[test]
+fn velocities_that_do_not_fit_their_rows_are_not_used() {
+    let robot = ur5();
+    let mut q = pose(HOME_RAD);
+    let made = |factor: f64| {
+        let mut made = table(0.05, 41, |t| {
+            q[0] = 0.4 * (1.0 - (3.0 * t).cos());
+            q
+        });
+        let velocity = |t: &f64| {
+            let mut v = [0.0; 8];
+            v[0] = factor * 1.2 * (3.0 * t).sin();
+            v
+        };
+        made.velocity_rad_s = Some(made.t_s.iter().map(velocity).collect());
+        Reference::of_table(made, &robot.limits()).expect("a table")
+    };
+    let mut made = made;
+    assert_eq!(made(1.0).note(), None);
+    let degrees = made(57.29578);
+    let note = degrees.note().expect("a note");
+    assert!(note.contains("joint 1") && note.contains("not used"), "{note}");
+    let beside = (degrees.at(0.525)[0] - made(1.0).at(0.525)[0]).abs();
+    assert!(beside < 1e-3, "{beside}");
+}
+
+/// A curve through rows stays between the limits, stands still where rows do, and meets every row.
+#[test]
+fn curve_through_random_rows_stays_inside_the_range_and_rests_where_they_rest() {
+    let robot = ur5();
+    let limits = robot.limits();
+    for seed in 0..300 {
+        let mut rng = SeededRng::new(seed, 4);
+        let mut values: Vec<f64> = Vec::new();
+        while values.len() < 12 {
+            let value = rng.within(-3.1416, 3.1416).clamp(-3.1, 3.1);
+            values.extend(std::iter::repeat_n(
+                if rng.index(4) == 0 { 3.1416 } else { value },
+                1 + rng.index(3),
+            ));
+        }
+        let mut t_s = vec![0.0];
+        for _ in 1..values.len() {
+            t_s.push(t_s[t_s.len() - 1] + 10_f64.powf(rng.within(-2.0, 0.0)));
+        }
+        let mut made = table(1.0, values.len(), |_| pose(HOME_RAD));
+        made.t_s = t_s.clone();
+        made.position_rad.iter_mut().zip(&values).for_each(|(row, value)| row[0] = *value);
+        made.position_rad.push(pose(HOME_RAD));
+        made.t_s.push(t_s[t_s.len() - 1] + 1.0);
+        let reference = Reference::of_table(made, &limits).expect("a table");
+        for (row, pair) in t_s.windows(2).enumerate() {
+            assert_eq!(reference.at(pair[0])[0].to_bits(), values[row].to_bits(), "seed {seed}");
+            for i in 0..=20 {
+                let q = reference.at(pair[0] + (pair[1] - pair[0]) * f64::from(i) / 20.0)[0];
+                assert!(q.abs() <= 3.1416 + 1e-12, "seed {seed}: {q} rad in row {row}");
+                let rests = values[row] == values[row + 1];
+                assert!(!rests || (q - values[row]).abs() < 1e-12, "seed {seed}: it moves in row {row}");
+            }
+        }
+    }
 }
 
 /// Goal: nothing is asked of a table but rising times: corners, tears below a jump, a start at full speed, long rests.
@@ -165,7 +274,7 @@ fn tables_of_rough_motions_are_imported_from_rest_to_rest() {
         ("rests for an hour", table(0.5, 7_201, |t| moved((t - 1_800.0).clamp(0.0, 1.0) * 0.3))),
     ];
     for (i, (what, table)) in rough.into_iter().enumerate() {
-        let reference = Reference::of_table(table).expect(what);
+        let reference = Reference::of_table(table, &robot.limits()).expect(what);
         let imported = import(&robot, &scene, &reference, TOLERANCE_RAD_DEFAULT)
             .unwrap_or_else(|e| panic!("{what}: {e}"));
         far_and_safe(&imported, &reference, &robot, i as u64);
@@ -185,7 +294,7 @@ fn motions_that_cannot_be_followed_are_refused_with_joint_time_and_size() {
         q
     };
     let said = |table: MotionTable, tolerance_rad: f64| {
-        let reference = match Reference::of_table(table) {
+        let reference = match Reference::of_table(table, &robot.limits()) {
             Ok(r) => r,
             Err(e) => return e.to_string(),
         };
@@ -235,8 +344,8 @@ fn mutated_tables_never_panic_and_never_pass_unverified() {
                 _ => bytes.truncate(at.max(60)),
             }
         }
-        let Ok(table) = MotionTable::read(Path::new("m.csv"), bytes.as_slice()) else { continue };
-        let Ok(reference) = Reference::of_table(table) else { continue };
+        let Ok(table) = MotionTable::read(Path::new("m.csv"), bytes.as_slice(), &[]) else { continue };
+        let Ok(reference) = Reference::of_table(table, &robot.limits()) else { continue };
         if let Ok(imported) = import(&robot, &scene, &reference, TOLERANCE_RAD_DEFAULT) {
             check_motion(&imported.trajectory, &robot.limits())
                 .unwrap_or_else(|e| panic!("seed {seed}: {e}"));

@@ -109,10 +109,11 @@ fn from_table(
     robot: &Robot,
     scene: &Scene,
 ) -> Result<(Imported, Source), Failure> {
+    let joints: Vec<String> = robot.joints.iter().map(|joint| joint.name.clone()).collect();
     let table = if path == Path::new("-") {
-        MotionTable::read(Path::new("standard input"), io::stdin().lock())?
+        MotionTable::read(Path::new("standard input"), io::stdin().lock(), &joints)?
     } else {
-        MotionTable::load(path)?
+        MotionTable::load(path, &joints)?
     };
     let mut notes = Vec::new();
     if !table.ignored.is_empty() {
@@ -122,7 +123,8 @@ fn from_table(
         notes.push(format!("its clock begins at {} s; that is 0 here", table.began_s));
     }
     let words = format!("{} of {}", counted(table.t_s.len(), "row"), path.display());
-    let reference = Reference::of_table(table).map_err(|e| refused(&e))?;
+    let reference = Reference::of_table(table, &robot.limits()).map_err(|e| refused(&e))?;
+    notes.extend(reference.note().map(str::to_owned));
     let imported = import(robot, scene, &reference, args.tolerance_rad).map_err(|e| refused(&e))?;
     Ok((imported, Source { words, notes }))
 }

@@ -8,6 +8,7 @@ mod fit;
 mod places;
 mod profiles;
 mod reference;
+mod rows;
 
 pub use deviation::Deviation;
 pub use places::{TimedBy, optimised_durations_s, poses_of};

@@ -1,6 +1,7 @@
 //! The motion that is imported, as it was before: rows of a table, or a profile through way points.
 use super::ImportError;
 use super::profiles::ViaProfile;
+use super::rows::Rows;
 use crate::papers::spline::Spline;
 use crate::timing::used;
 use taustream_arm::MotionTable;
@@ -18,8 +19,8 @@ pub struct Reference {
 }
 
 enum ReferenceShape {
-    /// Straight lines in time between rows.
-    Rows { t_s: Vec<f64>, position_rad: Vec<JointArray> },
+    /// A curve through rows.
+    Rows(Rows),
     /// One scalar profile from point to point, at rest at each.
     Stops { t_s: Vec<f64>, points_rad: Vec<JointArray>, profile: Box<dyn Profile> },
     /// A cubic spline a joint.
@@ -42,23 +43,25 @@ pub struct Via<'a> {
 }
 
 impl Reference {
-    /// The motion of a table, without the rest at its end.
+    /// The motion of a table, without the rest at its end: through its rows, by its own velocities and accelerations where it
+    /// has them, and inside of `limits` where its rows are.
     ///
     /// # Errors
     /// When nothing moves in it.
-    pub fn of_table(table: MotionTable) -> Result<Self, ImportError> {
-        let MotionTable { joints, mut t_s, mut position_rad, .. } = table;
-        while let [.., before, last] = position_rad.as_slice()
-            && before.map(f64::to_bits) == last.map(f64::to_bits)
-        {
-            position_rad.pop();
-            t_s.pop();
+    pub fn of_table(table: MotionTable, limits: &[JointLimits; MAX_JOINTS]) -> Result<Self, ImportError> {
+        let joints = table.joints;
+        let rows = Rows::of(table, limits)?;
+        let duration_s = rows.t_s.last().copied().unwrap_or(0.0);
+        Ok(Self { joints, duration_s, shape: ReferenceShape::Rows(rows) })
+    }
+
+    /// What is worth saying about how the table was read.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        match &self.shape {
+            ReferenceShape::Rows(rows) => rows.note.as_deref(),
+            ReferenceShape::Stops { .. } | ReferenceShape::Cubic { .. } | ReferenceShape::Seventh(_) => None,
         }
-        if position_rad.len() < 2 {
-            return Err(ImportError::Still);
-        }
-        let duration_s = t_s.last().copied().unwrap_or(0.0);
-        Ok(Self { joints, duration_s, shape: ReferenceShape::Rows { t_s, position_rad } })
     }
 
     /// A profile through way points.
@@ -119,7 +122,7 @@ impl Reference {
     pub fn at(&self, time_s: f64) -> JointArray {
         let time_s = time_s.clamp(0.0, self.duration_s);
         match &self.shape {
-            ReferenceShape::Rows { t_s, position_rad } => between(t_s, position_rad, time_s, |share| share),
+            ReferenceShape::Rows(rows) => rows.at(self.joints, time_s),
             ReferenceShape::Stops { t_s, points_rad, profile } => {
                 between(t_s, points_rad, time_s, |share| profile.at(share).value)
             }
@@ -140,7 +143,7 @@ impl Reference {
     #[must_use]
     pub fn joins_s(&self) -> Vec<f64> {
         match &self.shape {
-            ReferenceShape::Rows { t_s, .. }
+            ReferenceShape::Rows(Rows { t_s, .. })
             | ReferenceShape::Stops { t_s, .. }
             | ReferenceShape::Cubic { t_s, .. } => t_s.clone(),
             ReferenceShape::Seventh(spline) => spline.joins_s(),
@@ -151,8 +154,8 @@ impl Reference {
     #[must_use]
     pub fn moving_s(&self) -> f64 {
         match &self.shape {
-            ReferenceShape::Rows { t_s, position_rad: points }
-            | ReferenceShape::Stops { t_s, points_rad: points, .. } => {
+            ReferenceShape::Rows(rows) => rows.moving_s(),
+            ReferenceShape::Stops { t_s, points_rad: points, .. } => {
                 let pieces = t_s.windows(2).zip(points.windows(2));
                 let moves = pieces.filter(|(_, points)| points.first() != points.last());
                 moves.map(|(t, _)| if let [a, b] = t { b - a } else { 0.0 }).sum()
@@ -165,7 +168,7 @@ impl Reference {
     #[must_use]
     pub fn bend_rad_s2(&self) -> JointArray {
         match &self.shape {
-            ReferenceShape::Rows { .. } => [0.0; MAX_JOINTS],
+            ReferenceShape::Rows(rows) => rows.bend_rad_s2(self.joints),
             ReferenceShape::Stops { t_s, points_rad, profile } => {
                 let c_a = profile.peaks().c_a;
                 let mut bend = [0.0; MAX_JOINTS];
@@ -191,16 +194,7 @@ impl Reference {
             ReferenceShape::Stops { .. } | ReferenceShape::Seventh(_) => [[0.0; MAX_JOINTS]; 2],
             ReferenceShape::Cubic { splines, .. } => [0.0, self.duration_s]
                 .map(|t| std::array::from_fn(|j| splines.get(j).map_or(0.0, |s| s.sample(t).d1))),
-            ReferenceShape::Rows { t_s, position_rad } => {
-                let speed = |i: usize| -> JointArray {
-                    let (Some([t0, t1]), Some([a, b])) = (t_s.get(i..i + 2), position_rad.get(i..i + 2))
-                    else {
-                        return [0.0; MAX_JOINTS];
-                    };
-                    std::array::from_fn(|j| (b[j] - a[j]) / (t1 - t0))
-                };
-                [speed(0), speed(t_s.len().saturating_sub(2))]
-            }
+            ReferenceShape::Rows(rows) => rows.end_speeds_rad_s(),
         }
     }
 
@@ -213,7 +207,7 @@ impl Reference {
         times: f64,
         tolerance_rad: f64,
     ) -> Option<(f64, usize, f64, f64)> {
-        let ReferenceShape::Rows { t_s, position_rad } = &self.shape else { return None };
+        let ReferenceShape::Rows(Rows { t_s, position_rad, .. }) = &self.shape else { return None };
         for (t, rows) in t_s.windows(2).zip(position_rad.windows(2)) {
             let ([t0, t1], [from, to]) = (t, rows) else { continue };
             for (joint, limits) in limits.iter().enumerate().take(self.joints) {
@@ -311,7 +305,7 @@ impl Reference {
     pub fn peaks(&self, joint: usize) -> [f64; 3] {
         const SAMPLES: u32 = 64;
         match &self.shape {
-            ReferenceShape::Rows { .. } | ReferenceShape::Stops { .. } => [0.0; 3],
+            ReferenceShape::Rows(_) | ReferenceShape::Stops { .. } => [0.0; 3],
             ReferenceShape::Cubic { splines, .. } => splines.get(joint).map_or([0.0; 3], |spline| {
                 let (peaks, d) = (spline.peaks(), self.duration_s);
                 [peaks.c_v / d, peaks.c_a / (d * d), peaks.c_j / (d * d * d)]
