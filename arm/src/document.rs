@@ -97,6 +97,9 @@ pub(crate) fn read_file(file: &Path, bytes_max: u64, what: &str) -> Result<Vec<u
         let missing = e.kind() == std::io::ErrorKind::NotFound;
         fault(&if missing { "no such file".to_owned() } else { format!("cannot be read ({e})") }, what)
     };
+    if let Some(carried) = crate::shipped::bytes(file) {
+        return Ok(carried.to_vec());
+    }
     // A device or a pipe could block or never end, so it is turned away before it is opened.
     let metadata = std::fs::metadata(file).map_err(refused)?;
     if !metadata.is_file() {

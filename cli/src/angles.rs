@@ -1,4 +1,4 @@
-//! Lists of joint angles on the command line: `"0,-1.57,1.57,0,0,0"`, in rad.
+//! Lists of joint angles on the command line: `"0,-1.57,1.57,0,0,0"`, in rad where no unit says otherwise (`90deg`).
 use crate::failure::Failure;
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
@@ -14,7 +14,7 @@ pub(crate) struct Angles(Vec<f64>);
 pub(crate) enum AnglesError {
     /// A word that is no number.
     #[error(
-        "value {position} is `{word}`, which is no number; write angles in rad, separated by commas: \"0,-1.57,1.57\""
+        "value {position} is `{word}`, which is no number; write angles in rad, or with a unit (90deg), separated by commas: \"0,-1.57,1.57\""
     )]
     Word {
         /// One-based place in the list.
@@ -42,11 +42,32 @@ impl FromStr for Angles {
     type Err = AnglesError;
 
     fn from_str(text: &str) -> Result<Self, AnglesError> {
+        Self::parse(text, 1.0)
+    }
+}
+
+/// What a degree is, rad.
+const RAD_PER_DEG: f64 = PI / 180.0;
+
+impl Angles {
+    /// No angles.
+    pub(crate) const NONE: &'static Self = &Self(Vec::new());
+
+    /// Angles in degrees where no unit says otherwise.
+    ///
+    /// # Errors
+    /// Why the text is no list of angles.
+    pub(crate) fn of_degrees(text: &str) -> Result<Self, AnglesError> {
+        Self::parse(text, RAD_PER_DEG)
+    }
+
+    /// `factor` makes rad of a value without unit.
+    fn parse(text: &str, factor: f64) -> Result<Self, AnglesError> {
         let mut values = Vec::with_capacity(MAX_JOINTS);
         for (i, word) in text.split(',').enumerate() {
             let (position, word) = (i + 1, word.trim());
-            let value: f64 =
-                word.parse().map_err(|_| AnglesError::Word { position, word: word.to_owned() })?;
+            let refused = || AnglesError::Word { position, word: word.to_owned() };
+            let value = angle_rad(word, factor).ok_or_else(refused)?;
             if !value.is_finite() {
                 return Err(AnglesError::NotFinite { position, value });
             }
@@ -57,6 +78,14 @@ impl FromStr for Angles {
             count => Err(AnglesError::Count { count }),
         }
     }
+}
+
+/// One angle in rad: a number with `deg`, `rad`, or neither, which `factor` turns into rad.
+pub(crate) fn angle_rad(word: &str, factor: f64) -> Option<f64> {
+    const UNITS: [(&str, f64); 3] = [("deg", RAD_PER_DEG), ("\u{b0}", RAD_PER_DEG), ("rad", 1.0)];
+    let unit = UNITS.iter().find_map(|(unit, factor)| Some((word.strip_suffix(unit)?, *factor)));
+    let (number, factor) = unit.unwrap_or((word, factor));
+    number.trim_end().parse::<f64>().ok().map(|value| value * factor)
 }
 
 impl From<Vec<f64>> for Angles {
@@ -152,6 +181,16 @@ mod tests {
     }
 
     #[test]
+    fn angles_with_a_unit_are_taken_by_it_and_others_by_the_option() {
+        assert_eq!(
+            "90deg,1, -180 deg,0.5rad,45\u{b0}".parse::<Angles>(),
+            Ok(Angles(vec![PI / 2.0, 1.0, -PI, 0.5, PI / 4.0]))
+        );
+        assert_eq!(Angles::of_degrees("90,1rad,-180deg"), Ok(Angles(vec![PI / 2.0, 1.0, -PI])));
+        assert!(Angles::of_degrees("x").is_err());
+    }
+
+    #[test]
     fn angles_refuse_what_is_no_finite_number_and_say_which() {
         let cases = [
             ("", "value 1 is ``"),
@@ -161,7 +200,9 @@ mod tests {
             ("1.0,NaN", "value 2 is NaN"),
             ("inf", "value 1 is inf"),
             ("0,1e999", "value 2 is inf"),
-            ("90deg", "value 1 is `90deg`"),
+            ("90grad", "value 1 is `90grad`"),
+            ("deg", "value 1 is `deg`"),
+            ("1e999deg", "value 1 is inf"),
             ("0,0,0,0,0,0,0,0,0", "9 values"),
         ];
         for (text, expected) in cases {

@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::output::note;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
-use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile};
+use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile, shipped};
 use taustream_messages::service::is_arm_name;
 use taustream_streamer::names::{BusName, Names, ServoName};
 
@@ -65,7 +65,7 @@ impl ArmName {
 
 /// The `name` of a settings file whatever else stands in it.
 fn name_alone(path: &Path) -> Option<String> {
-    let table: toml::Table = fs::read_to_string(path).ok()?.parse().ok()?;
+    let table: toml::Table = shipped::read_to_string(path).ok()?.parse().ok()?;
     let name = table.get("name")?.as_str()?;
     is_arm_name(name).then(|| name.to_owned())
 }
@@ -139,17 +139,56 @@ pub(crate) fn path(given: &Path) -> Result<PathFile, Failure> {
     Ok(PathFile::load(&find(Kind::Path, given)?)?)
 }
 
+/// A demo file by path or shipped name.
+pub(crate) fn demo(given: &Path) -> Result<PathBuf, Failure> {
+    find(Kind::Demo, given)
+}
+
+/// The robot of a trajectory: as given, else the one that the file names.
+pub(crate) fn robot_of(given: Option<&Path>, path: &Path, file: &TrajectoryFile) -> Result<Robot, Failure> {
+    if let Some(given) = given {
+        return robot(given);
+    }
+    // The file names a robot, never a path: what it could point to is not its choice.
+    let is_name =
+        |name: &str| !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "_-".contains(c));
+    if !is_name(&file.robot) {
+        let why = format!(
+            "its robot {:?} is no name of a shipped robot; name the robot file with --robot",
+            file.robot
+        );
+        return Err(Failure::unfit(path, why));
+    }
+    robot(Path::new(&file.robot)).map_err(|why| {
+        Failure::unfit(
+            path,
+            format!("its robot {:?} is not found; name the robot file with --robot ({why})", file.robot),
+        )
+    })
+}
+
+/// A trajectory file and the robot that it is for: as given, else the one that the file names.
+pub(crate) fn motion_of(given: Option<&Path>, path: &Path) -> Result<(Robot, TrajectoryFile), Failure> {
+    let file = TrajectoryFile::load(path)?;
+    let robot = robot_of(given, path, &file)?;
+    fitting(path, &file, &robot)?;
+    Ok((robot, file))
+}
+
 /// A trajectory file that fits a robot: same number of joints, and the same digest where the file has one.
 pub(crate) fn trajectory_for(path: &Path, robot: &Robot) -> Result<TrajectoryFile, Failure> {
-    fitting(path, TrajectoryFile::load(path)?, robot)
+    let file = TrajectoryFile::load(path)?;
+    fitting(path, &file, robot).map(|()| file)
 }
 
 /// As [`trajectory_for`], for a file whose text came with the command.
 pub(crate) fn trajectory_from(path: &Path, text: &str, robot: &Robot) -> Result<TrajectoryFile, Failure> {
-    fitting(path, TrajectoryFile::from_json(path, text)?, robot)
+    let file = TrajectoryFile::from_json(path, text)?;
+    fitting(path, &file, robot).map(|()| file)
 }
 
-fn fitting(path: &Path, file: TrajectoryFile, robot: &Robot) -> Result<TrajectoryFile, Failure> {
+/// Whether a trajectory file fits a robot.
+pub(crate) fn fitting(path: &Path, file: &TrajectoryFile, robot: &Robot) -> Result<(), Failure> {
     let (got, joints) = (file.trajectory.joints(), robot.joints.len());
     if got != joints {
         return Err(Failure::unfit(
@@ -171,7 +210,7 @@ fn fitting(path: &Path, file: TrajectoryFile, robot: &Robot) -> Result<Trajector
                 robot.digest_hex().get(..12).unwrap_or_default()
             ),
         )),
-        _ => Ok(file),
+        _ => Ok(()),
     }
 }
 
@@ -200,7 +239,9 @@ pub(crate) enum AnyFile {
 
 /// Finds a file by path or shipped name, and tells its kind by what stands in it.
 pub(crate) fn find_any(given: &Path) -> Result<AnyFile, Failure> {
-    if given.exists() {
+    // A word without slash and ending is a name, whatever the working directory holds.
+    let is_path = given.to_str().is_none_or(|text| text.contains('/')) || given.extension().is_some();
+    if is_path && (given.exists() || shipped::is_file(given)) {
         return Ok(kind_of(given));
     }
     let robot = || find(Kind::Robot, given).map(AnyFile::Robot);
@@ -221,7 +262,7 @@ fn kind_of(path: &Path) -> AnyFile {
     if path.extension().is_some_and(|e| e == "urdf" || e == "srdf" || e == "xacro") {
         return AnyFile::Robot(owned);
     }
-    let table = fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    let table = shipped::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     match table {
         Some(t) if t.contains_key("joint") || t.contains_key("urdf") => AnyFile::Robot(owned),
         Some(t) if ["robot", "bus", "servo", "cycle"].iter().any(|k| t.contains_key(*k)) => {

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 1 refused or failed, 2 bad usage or bad file; 130 after Ctrl-C,
 //! as shells have it. The reason goes to stderr, as one sentence or, with `--json`, as one JSON object.
+use crate::output::SCHEMA;
 use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -152,7 +153,7 @@ impl Failure {
                 })
                 .collect();
         }
-        json!({ "error": error })
+        json!({ "schema": SCHEMA, "error": error })
     }
 }
 

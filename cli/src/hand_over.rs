@@ -81,7 +81,7 @@ fn order(cli: &Cli, words: impl Iterator<Item = Result<String, OsString>>) -> Re
         words.extend(["--settings".to_owned(), named]);
     }
     let trajectory =
-        if let Action::Run(args) = &cli.action { Some(read_text(&args.trajectory)?) } else { None };
+        if let Action::Run(args) = &cli.action { Some(read_text(args.trajectory.path())?) } else { None };
     Ok(Order { version: VERSION, words, trajectory })
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn taken() -> Result<Result<Cli, clap::Error>, Failure> {
         let what = "is started by sudo as the services' user; run the command itself instead";
         return Err(Failure::Usage(format!("`{COMMAND}` {what}")));
     }
-    // Names of settings are looked for below the working directory too, and that one is the caller's.
+    // Whatever is relative would mean the caller's directory.
     env::set_current_dir("/").map_err(|e| Failure::Failed(format!("cannot leave for /: {e}")))?;
     let mut text = String::new();
     let read = stdin().lock().take(ORDER_BYTES_MAX).read_to_string(&mut text);
@@ -162,7 +162,7 @@ fn understood(text: &str) -> Result<Result<Cli, clap::Error>, Failure> {
         let got = order.version;
         return Err(bad(format!("its version is {got}, not {VERSION}; use the taustream that is installed")));
     }
-    let mut cli = match Cli::try_parse_from(std::iter::once("taustream".to_owned()).chain(order.words)) {
+    let mut cli = match Cli::from_words(std::iter::once("taustream".to_owned()).chain(order.words)) {
         Ok(cli) => cli,
         Err(error) => return Ok(Err(error)),
     };

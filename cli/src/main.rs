@@ -19,16 +19,16 @@ mod words;
 
 use args::{Action, Cli};
 use arm::ArmName;
-use clap::Parser;
 use failure::Failure;
 use output::{Form, note};
 use std::env;
 use std::path::Path;
 use std::process::ExitCode;
+use taustream_arm::printable::printable_json;
 use taustream_messages::Command;
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::from_words(env::args_os()) {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
@@ -99,7 +99,7 @@ fn report(form: Form, failure: &Failure) -> ExitCode {
             // A result is at the beginning of its line.
             Form::Text if matches!(failure, Failure::Demo { .. }) => note(failure),
             Form::Text => note(format_args!("taustream: {failure}")),
-            Form::Json => note(failure.to_json()),
+            Form::Json => note(printable_json(&failure.to_json().to_string())),
         }
     }
     ExitCode::from(failure.exit_code())
@@ -114,7 +114,12 @@ fn usage(error: &clap::Error) -> ExitCode {
         let reason = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").trim();
         return report(Form::Json, &Failure::Usage(reason.to_owned()));
     }
-    // A closed stdout or stderr leaves no place for a message.
-    let _closed = error.print();
+    if error.use_stderr() {
+        // What was typed stands in it.
+        note(error.to_string().trim_end());
+    } else {
+        // A closed stdout leaves nobody to tell.
+        let _closed = error.print();
+    }
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }

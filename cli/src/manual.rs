@@ -73,7 +73,7 @@ pub(crate) fn run(form: Form, args: &ManArgs) -> Result<(), Failure> {
 /// Prints a completion script.
 pub(crate) fn completions(form: Form, shell: clap_complete::Shell) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "taustream", &mut script);
+    clap_complete::generate(shell, &mut Cli::definition(), "taustream", &mut script);
     let text = String::from_utf8_lossy(&script).into_owned();
     form.print(&Text { name: shell.to_string(), text })
 }
@@ -81,7 +81,7 @@ pub(crate) fn completions(form: Form, shell: clap_complete::Shell) -> Result<(),
 /// The programs, the command line first.
 fn programs() -> [Command; 4] {
     [
-        Cli::command(),
+        Cli::definition(),
         taustream_streamer::arguments::Arguments::command(),
         taustream_planner::arguments::Arguments::command(),
         taustream_drivers::sim::arguments::Arguments::command(),

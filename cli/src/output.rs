@@ -2,10 +2,12 @@
 use crate::args::Cli;
 use crate::failure::Failure;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 use std::{fs, process};
+use taustream_arm::printable::{printable, printable_json};
 
 /// The form of the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,10 +30,23 @@ impl Form {
             Self::Text => answer.to_string(),
             Self::Json => to_json(answer)?,
         };
+        self.print_line(line.trim_end())
+    }
+
+    /// Prints a line that is made already.
+    pub(crate) fn print_line(self, line: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
-        writeln!(out, "{}", line.trim_end())
+        writeln!(out, "{}", self.shown(line))
             .and_then(|()| out.flush())
             .map_err(|e| Failure::writing("standard output", e))
+    }
+
+    /// The line as a terminal may get it.
+    fn shown(self, line: &str) -> Cow<'_, str> {
+        match self {
+            Self::Text => printable(line),
+            Self::Json => printable_json(line),
+        }
     }
 
     /// Prints progress on stderr where it does not disturb other output; silent for programs.
@@ -53,10 +68,7 @@ pub(crate) fn deliver(
     match output {
         None => form.print(summary),
         Some(path) if path == Path::new("-") => {
-            let mut out = io::stdout().lock();
-            writeln!(out, "{}", text.trim_end())
-                .and_then(|()| out.flush())
-                .map_err(|e| Failure::writing("standard output", e))?;
+            Form::Json.print_line(text.trim_end())?;
             form.progress(summary);
             Ok(())
         }
@@ -69,12 +81,22 @@ pub(crate) fn deliver(
 
 /// Writes a line to stderr. A stderr that is closed is no reason to stop.
 pub(crate) fn note(text: impl Display) {
-    let _closed = writeln!(io::stderr(), "{text}");
+    let _closed = writeln!(io::stderr(), "{}", printable(&text.to_string()));
 }
 
-fn to_json(answer: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string(answer)
-        .map_err(|e| Failure::Failed(format!("the answer does not fit into JSON: {e}")))
+/// The number of the form in which every JSON object of this release is written; docs/json.md has the keys. It rises when a
+/// key changes its meaning or goes; new keys leave it as it is.
+pub(crate) const SCHEMA: u32 = 1;
+
+/// The JSON of an answer, with `schema` as its first key.
+pub(crate) fn to_json(answer: &impl Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string(answer)
+        .map_err(|e| Failure::Failed(format!("the answer does not fit into JSON: {e}")))?;
+    Ok(match text.strip_prefix('{') {
+        Some("}") => format!("{{\"schema\":{SCHEMA}}}"),
+        Some(rest) => format!("{{\"schema\":{SCHEMA},{rest}"),
+        None => text,
+    })
 }
 
 /// Writes a file as a whole or not at all: a reader, or a crash, never meets half of it.

@@ -11,6 +11,8 @@ mod doctor;
 mod good_path;
 #[path = "cli/imports.rs"]
 mod imports;
+#[path = "cli/json.rs"]
+mod json;
 #[path = "cli/manual.rs"]
 mod manual;
 #[path = "cli/papers.rs"]

@@ -16,7 +16,7 @@ pub(crate) fn find(urdf: &Path, package_dirs: &[PathBuf], named: &str) -> Result
         Some(("package" | "model", rest)) => in_packages(folder, package_dirs, rest)?,
         Some(_) => return Err("a path, file:// or package://: nothing is fetched from elsewhere".to_owned()),
     };
-    if let Some(found) = places.iter().find(|place| place.is_file()) {
+    if let Some(found) = places.iter().find(|place| crate::shipped::is_file(place)) {
         return Ok(found.clone());
     }
     let places: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();

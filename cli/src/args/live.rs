@@ -1,5 +1,5 @@
 //! Arguments of the commands that talk to the running streamer and planner.
-use super::offline::planner_kind;
+use super::offline::{TrajectoryArg, planner_kind};
 use crate::angles::Angles;
 use clap::Args;
 use std::path::PathBuf;
@@ -63,12 +63,11 @@ pub(crate) struct ReferenceArgs {
     pub(crate) confirm: bool,
 }
 
-/// An angle: a finite number.
+/// An angle: a finite number of rad, or one with its unit.
 fn angle_rad(text: &str) -> Result<f64, String> {
-    text.parse::<f64>()
-        .ok()
+    crate::angles::angle_rad(text.trim(), 1.0)
         .filter(|angle| angle.is_finite())
-        .ok_or_else(|| "expected a finite number of rad".to_owned())
+        .ok_or_else(|| "expected a finite number of rad, or one with its unit: 90deg".to_owned())
 }
 
 const REPLAN_HELP: &str = "\
@@ -83,9 +82,12 @@ whether, and from which cycle, it runs. Exit code 0 means: accepted (with --wait
 #[derive(Args, Debug)]
 #[command(after_help = REPLAN_HELP)]
 pub(crate) struct ReplanArgs {
-    /// Goal pose, rad, one value per joint.
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
-    pub(crate) goal: Angles,
+    /// Goal pose, rad, one value per joint; a value may have a unit: "90deg".
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, required_unless_present = "goal_deg")]
+    goal: Option<Angles>,
+    /// The same in degrees.
+    #[arg(long, value_name = "DEG,..", allow_hyphen_values = true, value_parser = Angles::of_degrees, conflicts_with = "goal")]
+    goal_deg: Option<Angles>,
     /// Start as soon as the motion is planned (the default).
     #[arg(long, conflicts_with = "after_current")]
     pub(crate) at_once: bool,
@@ -106,6 +108,17 @@ pub(crate) struct ReplanArgs {
     pub(crate) wait: bool,
 }
 
+impl ReplanArgs {
+    /// Where to go, and the option that says so. One of the two is there: clap asks for it.
+    pub(crate) fn goal(&self) -> (&Angles, &'static str) {
+        match (&self.goal, &self.goal_deg) {
+            (None, Some(angles)) => (angles, "--goal-deg"),
+            (Some(angles), _) => (angles, "--goal"),
+            (None, None) => (Angles::NONE, "--goal"),
+        }
+    }
+}
+
 const RUN_HELP: &str = "\
 Examples:
   taustream run move.json --wait
@@ -117,9 +130,9 @@ the settings. The arm must be at the base pose of the motion: `taustream replan 
 #[derive(Args, Debug)]
 #[command(after_help = RUN_HELP)]
 pub(crate) struct RunArgs {
-    /// Trajectory file.
-    #[arg(value_name = "FILE")]
-    pub(crate) trajectory: PathBuf,
+    /// What to execute.
+    #[command(flatten)]
+    pub(crate) trajectory: TrajectoryArg,
     /// Return only when the motion has ended.
     #[arg(long)]
     pub(crate) wait: bool,
@@ -157,7 +170,7 @@ pub(crate) struct WatchArgs {
 const DEMO_HELP: &str = "\
 Examples:
   taustream demo --output /tmp/demo
-  taustream demo --config config/demo.toml --link local --output out
+  taustream demo --config ./my-demo.toml --link local --output out
 
 Starts taustream-servosim, taustream-streamer and taustream-planner (from the directory of this program), enables the
 simulated arm, moves to every goal of the demo file, disables, and writes SVG plots. It writes only to the output
@@ -167,8 +180,8 @@ directory. Ctrl-C stops the arm first.";
 #[derive(Args, Debug)]
 #[command(after_help = DEMO_HELP)]
 pub(crate) struct DemoArgs {
-    /// Demo file: `settings`, `start_rad`, `goals_rad`.
-    #[arg(long, value_name = "FILE", default_value = "config/demo.toml")]
+    /// Demo file (`settings`, `start_rad`, `goals_rad`): a path, or the name of a shipped one.
+    #[arg(long, value_name = "FILE", default_value = "demo")]
     pub(crate) config: PathBuf,
     /// Directory for plots, logs and the cycle log; created if missing.
     #[arg(long, value_name = "DIR", default_value = "demo-output")]

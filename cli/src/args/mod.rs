@@ -17,7 +17,8 @@ pub(crate) use offline::{
 pub(crate) use papers::PapersArgs;
 pub(crate) use planners::PlannersArgs;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -34,8 +35,8 @@ Examples:
   taustream watch                                         live view, until you end it
   taustream status --json | jq .phase
 
-Units: angles are rad, times s, lengths m. Robots, scenes and settings are given by path, or by the name of a
-shipped file (`ur5`, `pillars`, `vcan6`).";
+Units: angles are rad, times s, lengths m; an angle with a unit is taken by it (`90deg`). Robots, scenes, paths and settings are given by path
+(with a slash or an ending), or by the name of a shipped file (`ur5`, `pillars`, `vcan6`).";
 
 /// Exit codes for scripts; help, manual pages and `failure.rs` agree.
 pub(crate) const EXIT_CODES: &str = "\
@@ -48,7 +49,68 @@ taustream is not a safety function: its stops are best effort by software over a
 hard-wired emergency stop and safe torque off.";
 
 fn after_help() -> String {
-    format!("{EXAMPLES}\n\n{EXIT_CODES}\n\n{SAFETY}")
+    let order = taustream_arm::lookup::ORDER;
+    format!("{EXAMPLES}\n\n{order}\n\n{EXIT_CODES}\n\n{SAFETY}")
+}
+
+/// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
+const WITHOUT_SETTINGS: [&str; 10] =
+    ["plan", "import", "sample", "plot", "cost", "verify", "check", "demo", "completions", "man"];
+
+impl Cli {
+    /// The definition with help that the terminal wraps, and without options that a command does not use.
+    pub(crate) fn definition() -> Command {
+        let mut definition = flowing(Self::command());
+        for name in WITHOUT_SETTINGS {
+            definition = definition.mut_subcommand(name, |command| {
+                // It stands in the place of the global one, which clap then leaves out here.
+                let settings = Arg::new("settings").long("settings").value_name("FILE").hide(true);
+                command.arg(settings.value_parser(clap::value_parser!(PathBuf)))
+            });
+        }
+        definition
+    }
+
+    /// Reads the words of a command line.
+    ///
+    /// # Errors
+    /// What clap does not take, and help and version.
+    pub(crate) fn from_words(
+        words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    ) -> Result<Self, clap::Error> {
+        let mut definition = Self::definition();
+        let mut matches = definition.try_get_matches_from_mut(words)?;
+        Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut definition))
+    }
+}
+
+/// The command and those below it with help texts whose paragraphs are one line each: clap wraps them to the terminal.
+fn flowing(command: Command) -> Command {
+    let help = command.get_after_help().map(|help| flow(&help.to_string()));
+    let command = match help {
+        Some(help) => command.after_help(help),
+        None => command,
+    };
+    let names: Vec<String> = command.get_subcommands().map(|below| below.get_name().to_owned()).collect();
+    names.into_iter().fold(command, |command, name| command.mut_subcommand(name, flowing))
+}
+
+/// Joins the lines of a paragraph; lines that are indented, and what leads to them, stay lines.
+fn flow(text: &str) -> String {
+    let mut flowed = String::with_capacity(text.len());
+    let mut before = "";
+    for line in text.lines() {
+        let joins =
+            !before.is_empty() && !line.is_empty() && ![before, line].iter().any(|l| l.starts_with(' '));
+        flowed.push_str(match (flowed.is_empty(), joins) {
+            (true, _) => "",
+            (false, true) => " ",
+            (false, false) => "\n",
+        });
+        flowed.push_str(line);
+        before = line;
+    }
+    flowed
 }
 
 /// Plan, run and watch the motion of CAN-connected robot arms.
@@ -137,10 +199,74 @@ pub(crate) enum Action {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn command_line_definition_is_consistent() {
         Cli::command().debug_assert();
+        Cli::definition().debug_assert();
+    }
+
+    /// The rendered help of a command.
+    fn help_of(words: &[&str]) -> String {
+        let words = ["taustream"].into_iter().chain(words.iter().copied()).chain(["--help"]);
+        Cli::from_words(words).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn help_shows_settings_only_where_they_mean_something() {
+        for name in WITHOUT_SETTINGS {
+            assert!(!help_of(&[name]).contains("--settings"), "{name}");
+        }
+        for name in ["status", "enable", "doctor", "replan", "run", "watch", "reference"] {
+            assert!(help_of(&[name]).contains("--settings"), "{name}");
+        }
+        // A habit of scripts that name the arm everywhere stays without effect.
+        for words in
+            [["taustream", "--settings", "a", "check", "b"], ["taustream", "check", "b", "--settings", "a"]]
+        {
+            assert!(Cli::from_words(words).is_ok());
+        }
+        let status = Cli::from_words(["taustream", "status", "--settings", "a"]).unwrap();
+        assert_eq!(status.settings, Some(PathBuf::from("a")));
+        let status = Cli::from_words(["taustream", "--settings", "a", "status"]).unwrap();
+        assert_eq!(status.settings, Some(PathBuf::from("a")));
+    }
+
+    #[test]
+    fn paragraphs_of_help_are_wrapped_by_the_terminal_and_examples_are_not() {
+        assert_eq!(
+            flow("Examples:\n  a\n  b\n\none\ntwo\n\nthree"),
+            "Examples:\n  a\n  b\n\none two\n\nthree"
+        );
+        assert!(help_of(&[]).contains("not searched"), "the order of search is said");
+    }
+
+    #[test]
+    fn trajectory_file_is_taken_with_and_without_its_word() {
+        for command in ["sample", "plot", "run"] {
+            for words in [&["f.json"][..], &["--trajectory", "f.json"]] {
+                let words = ["taustream", command].into_iter().chain(words.iter().copied());
+                let read = Cli::from_words(words).unwrap();
+                let path = if let Action::Sample(args) = &read.action {
+                    args.trajectory.path()
+                } else if let Action::Plot(args) = &read.action {
+                    args.trajectory.path()
+                } else if let Action::Run(args) = &read.action {
+                    args.trajectory.path()
+                } else {
+                    panic!("{command} is read as something else");
+                };
+                assert_eq!(path, std::path::Path::new("f.json"), "{command}");
+            }
+            assert!(Cli::from_words(["taustream", command]).is_err());
+            assert!(Cli::from_words(["taustream", command, "f", "--trajectory", "g"]).is_err());
+        }
+        for command in ["verify", "cost"] {
+            for words in [&["f.json"][..], &["--trajectory", "f.json", "--robot", "ur5"]] {
+                let words =
+                    ["taustream", command, "--scene", "open"].into_iter().chain(words.iter().copied());
+                assert!(Cli::from_words(words).is_ok(), "{command}");
+            }
+        }
     }
 }

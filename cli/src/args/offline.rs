@@ -2,7 +2,7 @@
 use crate::angles::{Angles, Position, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_planner::optimize::{METHODS, Method, Reading};
@@ -32,17 +32,29 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: PathBuf,
     /// Start pose, rad, one value per joint: "0,-1.57,1.57,-1.57,-1.57,0".
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true)]
-    pub(crate) start: Angles,
-    /// Goal pose, rad, one value per joint.
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, required_unless_present = "start_deg")]
+    start: Option<Angles>,
+    /// The same in degrees.
+    #[arg(long, value_name = "DEG,..", allow_hyphen_values = true, value_parser = Angles::of_degrees, conflicts_with = "start")]
+    start_deg: Option<Angles>,
+    /// Goal pose, rad, one value per joint; a value may have a unit: "90deg".
     #[arg(
         long,
         value_name = "RAD,..",
         allow_hyphen_values = true,
-        required_unless_present = "to_position",
+        required_unless_present_any = ["to_position", "goal_deg"],
         conflicts_with = "to_position"
     )]
-    pub(crate) goal: Option<Angles>,
+    goal: Option<Angles>,
+    /// The same in degrees.
+    #[arg(
+        long,
+        value_name = "DEG,..",
+        allow_hyphen_values = true,
+        value_parser = Angles::of_degrees,
+        conflicts_with_all = ["to_position", "goal"]
+    )]
+    goal_deg: Option<Angles>,
     /// Goal position of the tip, m, in the base frame, instead of a pose: "0.4,-0.2,0.3".
     ///
     /// Swarms search clear poses with the tip at this position. The result is the best verified motion to one of them. The
@@ -50,7 +62,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) to_position: Option<Position>,
     /// Optimiser that searches poses for --to-position; without it the best two alternate.
-    #[arg(long, value_name = "NAME", conflicts_with = "goal", value_parser = method())]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg"], value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
     /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
@@ -72,6 +84,23 @@ pub(crate) struct PlanArgs {
     pub(crate) output: Option<PathBuf>,
 }
 
+impl PlanArgs {
+    /// Where to start, and the option that says so. One of the two is there: clap asks for it.
+    pub(crate) fn start(&self) -> (&Angles, &'static str) {
+        match (&self.start, &self.start_deg) {
+            (None, Some(angles)) => (angles, "--start-deg"),
+            (Some(angles), _) => (angles, "--start"),
+            (None, None) => (Angles::NONE, "--start"),
+        }
+    }
+
+    /// Where to go, and the option that says so.
+    pub(crate) fn goal(&self) -> Option<(&Angles, &'static str)> {
+        let given = self.goal.as_ref().map(|angles| (angles, "--goal"));
+        given.or_else(|| self.goal_deg.as_ref().map(|angles| (angles, "--goal-deg")))
+    }
+}
+
 const SAMPLE_HELP: &str = "\
 Examples:
   taustream sample move.json > move.csv
@@ -86,9 +115,9 @@ Numbers have enough digits to read back the same bits.";
 #[derive(Args, Debug)]
 #[command(after_help = SAMPLE_HELP)]
 pub(crate) struct SampleArgs {
-    /// Trajectory file.
-    #[arg(value_name = "FILE")]
-    pub(crate) trajectory: PathBuf,
+    /// What to sample.
+    #[command(flatten)]
+    pub(crate) trajectory: TrajectoryArg,
     /// Sample rate, Hz.
     #[arg(
         long,
@@ -116,14 +145,14 @@ Meshes of scenes are drawn as their hulls.";
 #[derive(Args, Debug)]
 #[command(after_help = PLOT_HELP)]
 pub(crate) struct PlotArgs {
-    /// Trajectory file.
-    #[arg(value_name = "FILE")]
-    pub(crate) trajectory: PathBuf,
-    /// Robot, for limits and views: a path, or the name of a shipped robot.
+    /// What to draw.
+    #[command(flatten)]
+    pub(crate) trajectory: TrajectoryArg,
+    /// Robot, for limits and views: a path, or the name of a shipped robot. Without it the one that the file names.
     #[arg(long, value_name = "FILE")]
     pub(crate) robot: Option<PathBuf>,
     /// Scene, for the obstacles in the views: a path, or the name of a shipped scene.
-    #[arg(long, value_name = "FILE", requires = "robot")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
     /// Picture to write; `-` is stdout. Without it: beside the trajectory file, with the extension svg.
     #[arg(short, long, value_name = "FILE")]
@@ -161,20 +190,43 @@ pub(crate) struct CostArgs {
 /// Robot, scene and trajectory; `taustream verify`
 #[derive(Args, Debug)]
 pub(crate) struct MotionArgs {
-    /// Robot: a path, or the name of a shipped robot.
+    /// Robot: a path, or the name of a shipped robot. Without it the one that the file names.
     #[arg(long, value_name = "FILE")]
-    pub(crate) robot: PathBuf,
+    pub(crate) robot: Option<PathBuf>,
     /// Scene: a path, or the name of a shipped scene.
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: PathBuf,
+    /// Trajectory.
+    #[command(flatten)]
+    pub(crate) trajectory: TrajectoryArg,
+}
+
+/// A trajectory file, with or without the word `--trajectory`.
+#[derive(Args, Debug)]
+pub(crate) struct TrajectoryArg {
     /// Trajectory file.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) trajectory: PathBuf,
+    #[arg(
+        value_name = "FILE",
+        required_unless_present = "named_trajectory",
+        conflicts_with = "named_trajectory"
+    )]
+    trajectory: Option<PathBuf>,
+    /// The same, by its name.
+    #[arg(id = "named_trajectory", long = "trajectory", value_name = "FILE")]
+    named: Option<PathBuf>,
+}
+
+impl TrajectoryArg {
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        // One of the two is there: clap asks for it.
+        self.trajectory.as_deref().or(self.named.as_deref()).unwrap_or(Path::new(""))
+    }
 }
 
 /// `taustream check`
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:\n  taustream check vcan6\n  taustream check config/robots/ur5.toml --json")]
+#[command(after_help = "Examples:\n  taustream check vcan6\n  taustream check ./my-arm.toml --json")]
 pub(crate) struct CheckArgs {
     /// Settings, robot, scene or trajectory file: a path, or the name of a shipped file.
     #[arg(value_name = "CONFIG")]

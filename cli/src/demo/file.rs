@@ -2,9 +2,8 @@
 use crate::angles::Angles;
 use crate::failure::Failure;
 use serde::Deserialize;
-use std::fs;
 use std::path::Path;
-use taustream_arm::{Fault, Faults, Settings};
+use taustream_arm::{Fault, Faults, Settings, shipped};
 use taustream_motion::JointArray;
 
 /// Most goals; a demo that never ends is none.
@@ -35,7 +34,7 @@ impl DemoFile {
         let fault = |key: &str, value: &str, expected: &str| {
             Failure::File(Faults(vec![Fault::new(path, key, value, expected)]))
         };
-        let text = fs::read_to_string(path).map_err(|e| fault("", &e.to_string(), "a demo file"))?;
+        let text = shipped::read_to_string(path).map_err(|e| fault("", &e.to_string(), "a demo file"))?;
         let raw: Raw = toml::from_str(&text).map_err(|e| {
             fault("", e.message(), "settings = \"..\", start_rad = [..] and goals_rad = [[..], ..]")
         })?;
@@ -44,7 +43,7 @@ impl DemoFile {
         }
         // A path is relative to the demo file, as settings do it for the files that they name.
         let beside = path.parent().unwrap_or(Path::new("")).join(&raw.settings);
-        let settings = if beside.is_file() {
+        let settings = if shipped::is_file(&beside) {
             beside
         } else {
             crate::arm::settings_path(Some(Path::new(&raw.settings)))?

@@ -6,7 +6,7 @@ mod summary;
 mod view;
 
 use crate::args::DemoArgs;
-use crate::arm::ArmName;
+use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Form;
@@ -25,7 +25,7 @@ pub(crate) fn run(form: Form, args: &DemoArgs) -> Result<(), Failure> {
 }
 
 fn perform(form: Form, args: &DemoArgs) -> Result<Summary, Failure> {
-    let demo = DemoFile::load(&args.config)?;
+    let demo = DemoFile::load(&arm::demo(&args.config)?)?;
     let arm = ArmName::of(&demo.settings);
     fs::create_dir_all(&args.output).map_err(|e| Failure::writing(args.output.display().to_string(), e))?;
 

@@ -4,6 +4,7 @@ use crate::view::{Line, Picture, Screen, Tone, is_terminal, line};
 use crate::{arm::ArmName, view::Scale};
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
+use taustream_arm::printable::printable;
 use taustream_messages::{Phase, Report};
 
 /// Pictures a second on a terminal; more only flicker.
@@ -69,7 +70,8 @@ impl View {
                 screen.draw(&lines)
             }
             Style::Lines | Style::Silent => {
-                writeln!(io::stdout(), "{which}  {}", line(report, phase, &self.arm))
+                let line = format!("{which}  {}", line(report, phase, &self.arm));
+                writeln!(io::stdout(), "{}", printable(&line))
             }
         };
         self.shown = Some((Instant::now(), *report));

@@ -85,7 +85,8 @@ pub(crate) struct Wanted {
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
     let settings = arm::settings(settings)?;
     let arm = ArmName::of(&settings);
-    let goal_rad = args.goal.pose_of(&settings.robot, "--goal")?;
+    let (goal, option) = args.goal();
+    let goal_rad = goal.pose_of(&settings.robot, option)?;
     let client = Client::join(&arm.name)?;
     let wanted = Wanted {
         when: if args.after_current { When::AfterCurrent } else { When::AtOnce },
@@ -103,7 +104,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     };
     form.progress(format_args!("planning, {:.1} s at most ..", f64::from(args.deadline_ms) * 1e-3));
     let planned = ask_while(&client, &arm, &request, &mut || Ok(())).map_err(|failure| {
-        match args.goal.degrees_hint(&settings.robot) {
+        match args.goal().0.degrees_hint(&settings.robot) {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))
             }

@@ -62,7 +62,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
     let arm = ArmName::of(&settings);
     let file = load(args, &settings)?;
     let proof = verify(&settings.robot, &settings.scene, &file.trajectory).map_err(|v| {
-        Failure::Refused(format!("{}: not safe, nothing was sent: {v}", args.trajectory.display()))
+        Failure::Refused(format!("{}: not safe, nothing was sent: {v}", args.trajectory.path().display()))
     })?;
 
     let client = Client::join(&arm.name)?;
@@ -85,7 +85,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
     };
     form.print(&Answer {
         arm: arm.name,
-        trajectory: args.trajectory.display().to_string(),
+        trajectory: args.trajectory.path().display().to_string(),
         trajectory_id: sent.trajectory_id,
         generation: sent.generation,
         duration_s: proof.duration_s,
@@ -100,7 +100,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
 
 /// A trajectory file that says which robot it was made for; offline use may leave that out, the streamer may not.
 fn load(args: &RunArgs, settings: &Settings) -> Result<TrajectoryFile, Failure> {
-    let path = &args.trajectory;
+    let path = args.trajectory.path();
     let file = match &args.text {
         Some(text) => arm::trajectory_from(path, text, &settings.robot)?,
         None => arm::trajectory_for(path, &settings.robot)?,

@@ -8,10 +8,10 @@ use crate::args::WatchArgs;
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::{Form, note};
+use crate::output::{Form, SCHEMA, note};
 use crate::view::{Line, Picture, Scale, Screen, Tone, is_terminal, line};
 use serde_json::json;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -160,7 +160,7 @@ impl Watch {
             Sink::Lines => {
                 let t_s = Duration::from_nanos(report.time_ns).as_secs_f64();
                 let line = line(report, phase, &self.arm);
-                writeln!(io::stdout(), "{t_s:10.3} s  {line}").map_err(closed)
+                Form::Text.print_line(&format!("{t_s:10.3} s  {line}"))
             }
             Sink::Picture(screen, picture) => {
                 let mut lines = picture.lines(report, phase, before, screen.size().0);
@@ -204,8 +204,8 @@ impl Watch {
             }
             Sink::Json if !said => {
                 let arm = &self.arm.name;
-                let line = json!({ "arm": arm, "phase": null, "silent_s": silent_s, "message": why });
-                writeln!(io::stdout(), "{line}").map_err(closed)
+                let line = json!({ "schema": SCHEMA, "arm": arm, "phase": null, "silent_s": silent_s, "message": why });
+                Form::Json.print_line(&line.to_string())
             }
             Sink::Lines | Sink::Json => Ok(()),
         }

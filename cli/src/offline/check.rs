@@ -14,26 +14,55 @@ use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
-    match arm::find_any(&args.config)? {
+    let checked = arm::find_any(&args.config).and_then(|found| match found {
         arm::AnyFile::Settings(path) => check_settings(form, &path),
-        arm::AnyFile::Robot(path) => form.print(&CheckedRobot::of(&Robot::load(&path)?)),
-        arm::AnyFile::Scene(path) => form.print(&CheckedScene::of(&Scene::load(&path)?)),
+        arm::AnyFile::Robot(path) => form.print(&Verdict(CheckedRobot::of(&Robot::load(&path)?))),
+        arm::AnyFile::Scene(path) => form.print(&Verdict(CheckedScene::of(&Scene::load(&path)?))),
         arm::AnyFile::Empty(path) => {
             let why = "is empty, which says nothing about settings or a robot; a scene without obstacles says so by its margin: \
                        margin_m = 0.02";
             Err(Failure::Unfit { path, why: why.to_owned() })
         }
         arm::AnyFile::Trajectory(path) => {
-            form.print(&CheckedTrajectory::of(&path, &TrajectoryFile::load(&path)?))
+            form.print(&Verdict(CheckedTrajectory::of(&path, &TrajectoryFile::load(&path)?)))
         }
+    });
+    match checked {
+        Err(Failure::File(faults)) if form == Form::Text => {
+            form.progress(&faults);
+            let why = format!("REFUSED: {} fault(s), listed above", faults.0.len());
+            Err(Failure::unfit(&args.config, why))
+        }
+        other => other,
+    }
+}
+
+/// What was found, with the verdict as its last line.
+struct Verdict<T>(T);
+
+impl<T: Serialize> Serialize for Verdict<T> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for Verdict<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}\nno faults", self.0.to_string().trim_end())
     }
 }
 
 /// Settings whose only fault is a bus that is too full are shown with its table and the remedies, and refused all the same.
 fn check_settings(form: Form, path: &Path) -> Result<(), Failure> {
-    form.print(&CheckedSettings::of(&Settings::load_overloaded(path)?))?;
-    Settings::load(path)?;
-    Ok(())
+    let shown = CheckedSettings::of(&Settings::load_overloaded(path)?);
+    let Err(faults) = Settings::load(path) else { return form.print(&Verdict(shown)) };
+    if form == Form::Text {
+        form.progress(&faults);
+        form.print(&shown)?;
+        return Err(Failure::unfit(path, format!("REFUSED: {} fault(s), listed first", faults.0.len())));
+    }
+    form.print(&shown)?;
+    Err(faults.into())
 }
 
 /// A scene that is sound.
@@ -229,10 +258,6 @@ impl fmt::Display for CheckedSettings {
             writeln!(f, "    {:<18} {how}", s.joint)?;
         }
         let full = self.buses.iter().filter(|bus| bus.is_refused()).count();
-        if full == 0 {
-            write!(f, "no faults")
-        } else {
-            write!(f, "{full} buses too full: these settings are refused")
-        }
+        if full > 0 { write!(f, "{full} buses too full") } else { Ok(()) }
     }
 }

@@ -52,15 +52,13 @@ pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
         weights: args.weights.0,
         ..CostModel::default()
     };
-    let robot = arm::robot(&args.motion.robot)?;
+    let path = args.motion.trajectory.path();
     let scene = arm::scene(&args.motion.scene)?;
-    let file = arm::trajectory_for(&args.motion.trajectory, &robot)?;
+    let (robot, file) = arm::motion_of(args.motion.robot.as_deref(), path)?;
     let cost = paper_cost(&robot, &scene, &file.trajectory, &model).map_err(|error| match error {
         CostError::Model { .. } => Failure::Usage(error.to_string()),
         CostError::NotSpheres { .. } => Failure::unfit(&scene.file, error.to_string()),
-        CostError::Overlap { .. } | CostError::Joints { .. } => {
-            Failure::unfit(&args.motion.trajectory, error.to_string())
-        }
+        CostError::Overlap { .. } | CostError::Joints { .. } => Failure::unfit(path, error.to_string()),
     })?;
     form.print(&Answer {
         path_length_m: cost.path_length_m,

@@ -70,7 +70,8 @@ impl fmt::Display for Summary {
 pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     let robot = arm::modelled_robot(&args.robot)?;
     let scene = arm::scene(&args.scene)?;
-    let start_rad = args.start.pose_of(&robot, "--start")?;
+    let (start, option) = args.start();
+    let start_rad = start.pose_of(&robot, option)?;
     let options = PlanOptions {
         seed: args.seed,
         deadline: Duration::from_millis(args.deadline_ms.into()),
@@ -107,10 +108,10 @@ struct Planned {
 
 impl End {
     fn of(args: &PlanArgs, robot: &Robot) -> Result<Self, Failure> {
-        match (&args.goal, args.to_position) {
+        match (args.goal(), args.to_position) {
             (_, Some(Position(target_m))) => Ok(Self::Position(target_m, args.reach_with)),
-            (Some(goal), None) => goal.pose_of(robot, "--goal").map(Self::Pose),
-            (None, None) => Err(Failure::Usage("give --goal or --to-position".to_owned())),
+            (Some((goal, option)), None) => goal.pose_of(robot, option).map(Self::Pose),
+            (None, None) => Err(Failure::Usage("give --goal, --goal-deg or --to-position".to_owned())),
         }
     }
 
@@ -151,8 +152,9 @@ fn millimetres_hint(error: &PositionError, args: &PlanArgs) -> Option<String> {
 }
 
 fn explain(error: &PositionError, args: &PlanArgs, robot: &Robot) -> Failure {
-    let goal_hint = || args.goal.as_ref().and_then(|goal| goal.degrees_hint(robot));
-    let hint = args.start.degrees_hint(robot).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
+    let goal_hint = || args.goal().and_then(|(goal, _)| goal.degrees_hint(robot));
+    let hint =
+        args.start().0.degrees_hint(robot).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
     Failure::Refused(match hint {
         Some(hint) => format!("no plan: {error} ({hint})"),
         None => format!("no plan: {error}"),

@@ -6,10 +6,9 @@ use crate::output::{Form, write_whole};
 use crate::plot::motion;
 use serde::Serialize;
 use std::fmt;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use taustream_arm::text::counted;
-use taustream_arm::{Scene, TrajectoryFile};
+use taustream_arm::{Robot, Scene, TrajectoryFile};
 
 /// What was drawn.
 #[derive(Debug, Serialize)]
@@ -35,33 +34,49 @@ impl fmt::Display for Answer {
 
 /// Draws, and says what.
 pub(crate) fn run(form: Form, args: &PlotArgs) -> Result<(), Failure> {
-    let robot = args.robot.as_deref().map(arm::robot).transpose()?;
+    let path = args.trajectory.path();
+    let file = TrajectoryFile::load(path)?;
+    let robot = drawn_robot(form, args, &file)?;
     let scene = args
         .scene
         .as_deref()
         .map(arm::scene)
         .transpose()?
         .unwrap_or_else(|| Scene { file: PathBuf::new(), ..Scene::default() });
-    let file = match &robot {
-        Some(robot) => arm::trajectory_for(&args.trajectory, robot)?,
-        None => TrajectoryFile::load(&args.trajectory)?,
-    };
-    let svg = motion::svg(&args.trajectory, &file, robot.as_ref().map(|robot| (robot, &scene)))?;
-    let picture = args.output.clone().unwrap_or_else(|| args.trajectory.with_extension("svg"));
+    let svg = motion::svg(path, &file, robot.as_ref().map(|robot| (robot, &scene)))?;
+    let picture = args.output.clone().unwrap_or_else(|| path.with_extension("svg"));
     if picture == Path::new("-") {
-        let mut out = io::stdout().lock();
-        return out
-            .write_all(svg.as_bytes())
-            .and_then(|()| out.flush())
-            .map_err(|e| Failure::writing("standard output", e));
+        return Form::Text.print_line(svg.trim_end());
     }
     write_whole(&picture, &svg)?;
     form.print(&Answer {
-        trajectory: args.trajectory.display().to_string(),
+        trajectory: path.display().to_string(),
         picture: picture.display().to_string(),
         obstacles: scene.obstacles.len(),
         robot: robot.map(|robot| robot.name),
         duration_s: file.trajectory.duration_s(),
         strokes: file.trajectory.strokes().len(),
     })
+}
+
+/// The robot that is asked for, else the one that the file names; without a robot that fits, only curves are drawn.
+fn drawn_robot(form: Form, args: &PlotArgs, file: &TrajectoryFile) -> Result<Option<Robot>, Failure> {
+    let path = args.trajectory.path();
+    if let Some(given) = &args.robot {
+        let robot = arm::robot(given)?;
+        return arm::fitting(path, file, &robot).map(|()| Some(robot));
+    }
+    let named =
+        arm::robot_of(None, path, file).and_then(|robot| arm::fitting(path, file, &robot).map(|()| robot));
+    match named {
+        Ok(robot) => Ok(Some(robot)),
+        Err(why) if args.scene.is_some() => Err(why),
+        Err(_) => {
+            form.progress(format_args!(
+                "the robot {:?} that the file names is not found, or is another one now: only curves are drawn; --robot names it",
+                file.robot
+            ));
+            Ok(None)
+        }
+    }
 }

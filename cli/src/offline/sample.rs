@@ -1,10 +1,11 @@
 //! `taustream sample`: a trajectory as a table.
 use crate::args::SampleArgs;
 use crate::failure::Failure;
-use crate::output::Form;
+use crate::output::{Form, SCHEMA};
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use taustream_arm::TrajectoryFile;
+use taustream_arm::printable::printable_json;
 use taustream_motion::Setpoint;
 use taustream_motion::trajectory::Cursor;
 
@@ -28,7 +29,7 @@ pub(crate) fn run(form: Form, args: &SampleArgs) -> Result<(), Failure> {
         let why = format!("--rate-hz is {rate_hz}; it must be above 0 and at most {RATE_HZ_MAX} (Hz)");
         return Err(Failure::Usage(why));
     }
-    let file = TrajectoryFile::load(&args.trajectory)?;
+    let file = TrajectoryFile::load(args.trajectory.path())?;
     let mut out = BufWriter::new(io::stdout().lock());
     let written = match &args.at {
         Some(times) => write_table(&mut out, form, &file, times.0.iter().copied()),
@@ -61,7 +62,8 @@ fn write_table(
         Form::Text => write_header(out, joints)?,
         Form::Json => {
             let robot = serde_json::to_string(&file.robot)?;
-            write!(out, "{{\"robot\":{robot},\"joints\":{joints},\"samples\":[")?;
+            let robot = printable_json(&robot);
+            write!(out, "{{\"schema\":{SCHEMA},\"robot\":{robot},\"joints\":{joints},\"samples\":[")?;
         }
     }
     for (i, t_s) in times.enumerate() {

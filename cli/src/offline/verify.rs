@@ -43,16 +43,17 @@ impl fmt::Display for Answer {
 
 /// Verifies and prints the proof.
 pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
-    let robot = arm::modelled_robot(&args.robot)?;
+    let path = args.trajectory.path();
     let scene = arm::scene(&args.scene)?;
-    let file = arm::trajectory_for(&args.trajectory, &robot)?;
+    let (robot, file) = arm::motion_of(args.robot.as_deref(), path)?;
+    robot.require_modelled()?;
     let proof = verify(&robot, &scene, &file.trajectory)
-        .map_err(|v| Failure::Refused(format!("{}: not safe: {v}", args.trajectory.display())))?;
+        .map_err(|v| Failure::Refused(format!("{}: not safe: {v}", path.display())))?;
     let (a, b) = proof.clearance_between;
     form.print(&Answer {
         verified: true,
         robot: robot.name.clone(),
-        trajectory: args.trajectory.display().to_string(),
+        trajectory: path.display().to_string(),
         duration_s: proof.duration_s,
         strokes: file.trajectory.strokes().len(),
         clearance_m: proof.clearance_m,

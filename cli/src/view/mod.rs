@@ -10,6 +10,8 @@ mod screen;
 pub(crate) use picture::{Picture, Scale, line};
 pub(crate) use screen::{Screen, is_terminal};
 
+use taustream_arm::printable::printable;
+
 /// What a piece of text means; the screen makes a colour of it, or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tone {
@@ -33,9 +35,10 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// A piece with a meaning.
+    /// A piece with a meaning. Names come from files, so nothing in them reaches the terminal that it would obey.
     pub(crate) fn new(text: impl Into<String>, tone: Tone) -> Self {
-        Self { text: text.into(), tone }
+        let text = text.into();
+        Self { text: printable(&text).into_owned(), tone }
     }
     /// A piece as any text.
     pub(crate) fn plain(text: impl Into<String>) -> Self {

@@ -10,7 +10,8 @@ fn run(scratch: &Scratch, words: &str) -> crate::common::Ran {
 fn plot_draws_curves_and_with_a_robot_the_arm_in_three_views() {
     let scratch = Scratch::new();
     scratch.write("move.json", &trajectory(&stroke("10", "0", "0.5")));
-    let curves = run(&scratch, "plot move.json --json").json();
+    scratch.write("elsewhere.json", &trajectory(&stroke("10", "0", "0.5")).replace("ur5", "nobody"));
+    let curves = run(&scratch, "plot elsewhere.json -o move.svg --json").json();
     assert_eq!(curves["picture"], "move.svg");
     assert!(curves["robot"].is_null(), "{curves}");
     let svg = fs::read_to_string(scratch.dir.join("move.svg")).unwrap();
@@ -43,7 +44,10 @@ fn plot_refuses_what_it_cannot_draw_and_leaves_no_picture() {
     let before = scratch.files();
     run(&scratch, "plot nothing.json").refused(2, &["nothing.json"]);
     run(&scratch, "plot nan.json").refused(2, &["nan.json"]);
-    run(&scratch, "plot move.json --scene pillars").refused(2, &["--robot"]);
+    scratch.write("elsewhere.json", &trajectory(&stroke("10", "0", "0.5")).replace("ur5", "nobody"));
+    let before: std::collections::BTreeSet<_> =
+        before.into_iter().chain(["elsewhere.json".to_owned()]).collect();
+    run(&scratch, "plot elsewhere.json --scene pillars").refused(2, &["nobody", "--robot"]);
     run(&scratch, "plot move.json --robot ur9").refused(2, &["ur9"]);
     run(&scratch, "plot other.json --robot ur5").refused(2, &["other.json", "digest"]);
     run(&scratch, "plot move.json -o taken.svg").refused(1, &["taken.svg", "cannot be written"]);
