@@ -32,6 +32,7 @@ impl Supervisor {
         {
             return None;
         }
+        self.stop_waiting(pending.command);
         match self.begin_record(pending, cycle_state) {
             Some(Ok(())) => return None,
             Some(Err(why)) => {

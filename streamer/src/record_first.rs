@@ -22,6 +22,7 @@ struct Waiting {
     number: u32,
     since: Nanos,
     phase: Phase,
+    stopped: bool,
 }
 
 /// The records of a supervisor.
@@ -93,22 +94,29 @@ impl Supervisor {
         }
         let number = self.records.requester.as_mut()?.request(&joints);
         self.records.open = true;
-        self.records.waiting =
-            Some(Waiting { pending, number, since: cycle_state.tick.wake_time, phase: self.phase });
+        self.records.waiting = Some(Waiting {
+            pending,
+            number,
+            since: cycle_state.tick.wake_time,
+            phase: self.phase,
+            stopped: false,
+        });
         Some(Ok(()))
     }
 
-    /// Ends a command that waits for its record: a stop, a fault or the end of the streamer came first.
-    fn ends_waiting(&self, phase: Phase, cycle_state: &CycleState) -> bool {
-        let stop = |pending: &PendingCommand| {
-            matches!(
-                pending.command,
-                Command::Stop | Command::FastStop | Command::TorqueOff | Command::Disable
-            )
-        };
-        self.shutting_down != Shutdown::No
-            || (self.phase == Phase::Fault && phase != Phase::Fault)
-            || cycle_state.commands.iter().flatten().any(stop)
+    /// Whether a stop, a fault or the end of the streamer has come before the record of a command that waits.
+    fn ends_waiting(&self, waiting: &Waiting, cycle_state: &CycleState) -> bool {
+        waiting.stopped
+            || self.shutting_down != Shutdown::No
+            || (self.phase == Phase::Fault && waiting.phase != Phase::Fault)
+            || cycle_state.commands.iter().flatten().any(|pending| ends(pending.command))
+    }
+
+    /// A command that stops the arm ends one that waits, also when both came in the same cycle.
+    pub(crate) fn stop_waiting(&mut self, command: Command) {
+        if let Some(waiting) = &mut self.records.waiting {
+            waiting.stopped |= ends(command);
+        }
     }
 
     /// Decides the command that waits, if its record is written or will not be.
@@ -119,13 +127,14 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) -> Option<CommandAnswer> {
-        let Waiting { pending, number, since, phase } = self.records.waiting?;
+        let waiting = self.records.waiting?;
+        let Waiting { pending, number, since, .. } = waiting;
         let waited_s = cycle_state.tick.wake_time.since_s(since);
         let late_s = cycle_state.tick.wake_time.since_s(pending.valid_until);
         let stored = self.records.requester.as_ref()?.answer(number);
         let result = match stored {
             _ if late_s > 0.0 => Err(AnswerReason::TooLate { late_s }),
-            _ if self.ends_waiting(phase, cycle_state) => Err(AnswerReason::Overtaken),
+            _ if self.ends_waiting(&waiting, cycle_state) => Err(AnswerReason::Overtaken),
             Some(Err(fault)) => Err(AnswerReason::NotRecorded { fault }),
             None if waited_s > RECORD_S_MAX => Err(AnswerReason::RecordLate { waited_s }),
             None => return None,
@@ -171,4 +180,9 @@ impl Supervisor {
             self.records.open = false;
         }
     }
+}
+
+/// Commands after which nothing is energised that was asked for before.
+fn ends(command: Command) -> bool {
+    matches!(command, Command::Stop | Command::FastStop | Command::TorqueOff | Command::Disable)
 }
