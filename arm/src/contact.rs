@@ -4,6 +4,7 @@
 //! collision. As set-up assistants do it, a pair that touches in every one of many random poses may touch. The draw
 //! is seeded and of our own making, so that an arm has the same list on every machine and in every version.
 use crate::body::{Body, Posed, to_parry};
+use crate::link_margin::LinkMargins;
 use crate::rng::SeededRng;
 use crate::robot::{LinkShape, Robot};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,28 +20,47 @@ type LinkPair = (usize, usize);
 
 const SEED: u64 = 0x7461_7573_7472_6561;
 
-/// The given neighbours, and pairs that touch in every one of [`POSES`] poses drawn uniformly inside the joint limits.
-/// Lower index first, sorted, each once; pairs that are `allowed` already are not tried.
-///
-/// # Errors
-/// The index of a shape that cannot be built.
-pub(crate) fn allowed_by_rule(
-    chain: &Chain,
-    shapes: &[LinkShape],
-    limits: &[JointLimits],
-    (neighbours, allowed): (&[LinkPair], &[LinkPair]),
-) -> Result<Vec<LinkPair>, usize> {
-    let mut solid = Vec::new();
-    for (i, shape) in shapes.iter().enumerate() {
-        let body = Body::new(&shape.shape, &shape.pose).ok_or(i)?;
-        solid.push(Solid { link: shape.link, frame: shape.frame.min(chain.joints()), body });
+/// What is known of the pairs before the rule.
+pub(crate) struct ContactRule<'a> {
+    /// Links that meet at a joint: they may touch.
+    pub(crate) neighbours: &'a [LinkPair],
+    /// Pairs that may touch because a file says so; they are not tried.
+    pub(crate) allowed: &'a [LinkPair],
+    /// What the other pairs keep.
+    pub(crate) margins: &'a LinkMargins,
+}
+
+/// What the rule says; lower index first, sorted, each once.
+#[derive(Debug, Default)]
+pub(crate) struct Ruled {
+    /// The neighbours, and pairs that touch in every one of [`POSES`] poses drawn uniformly inside the joint limits.
+    pub(crate) allowed: Vec<LinkPair>,
+    /// Pairs that are never further apart than their margin, and do not always touch: no pose at all would keep it.
+    pub(crate) close: Vec<LinkPair>,
+}
+
+impl ContactRule<'_> {
+    /// Tries every pair that is not known.
+    ///
+    /// # Errors
+    /// The index of a shape that cannot be built.
+    pub(crate) fn apply(
+        &self,
+        chain: &Chain,
+        shapes: &[LinkShape],
+        limits: &[JointLimits],
+    ) -> Result<Ruled, usize> {
+        let mut solid = Vec::new();
+        for (i, shape) in shapes.iter().enumerate() {
+            let body = Body::new(&shape.shape, &shape.pose).ok_or(i)?;
+            solid.push(Solid { link: shape.link, frame: shape.frame.min(chain.joints()), body });
+        }
+        let mut ruled = self.sample(chain, &solid, limits);
+        ruled.allowed.extend_from_slice(self.neighbours);
+        ruled.allowed.sort_unstable();
+        ruled.allowed.dedup();
+        Ok(ruled)
     }
-    let known = |pair: &LinkPair| neighbours.contains(pair) || allowed.contains(pair);
-    let mut ruled: Vec<LinkPair> = neighbours.to_vec();
-    ruled.extend(always_touching(chain, &solid, limits, &known));
-    ruled.sort_unstable();
-    ruled.dedup();
-    Ok(ruled)
 }
 
 /// A shape of a link.
@@ -50,42 +70,61 @@ struct Solid {
     body: Body,
 }
 
-fn always_touching(
-    chain: &Chain,
-    solid: &[Solid],
-    limits: &[JointLimits],
-    known: &dyn Fn(&LinkPair) -> bool,
-) -> Vec<LinkPair> {
-    // Shapes in one frame are rigid with each other.
-    let mut pairs: BTreeMap<LinkPair, Vec<(usize, usize)>> = BTreeMap::new();
-    for (i, a) in solid.iter().enumerate() {
-        for (j, b) in solid.iter().enumerate().skip(i + 1).filter(|(_, b)| a.frame != b.frame) {
-            let links = (a.link.min(b.link), a.link.max(b.link));
-            if a.link != b.link && !known(&links) {
-                pairs.entry(links).or_default().push((i, j));
+/// The shapes of a pair of links, and how it was found so far.
+#[derive(Debug, Default)]
+struct Tried {
+    shapes: Vec<(usize, usize)>,
+    /// In one pose at least it did not touch.
+    parted: bool,
+}
+
+impl ContactRule<'_> {
+    fn pairs(&self, solid: &[Solid]) -> BTreeMap<LinkPair, Tried> {
+        let known = |pair: &LinkPair| self.neighbours.contains(pair) || self.allowed.contains(pair);
+        // Shapes in one frame are rigid with each other.
+        let mut pairs: BTreeMap<LinkPair, Tried> = BTreeMap::new();
+        for (i, a) in solid.iter().enumerate() {
+            for (j, b) in solid.iter().enumerate().skip(i + 1).filter(|(_, b)| a.frame != b.frame) {
+                let links = (a.link.min(b.link), a.link.max(b.link));
+                if a.link != b.link && !known(&links) {
+                    pairs.entry(links).or_default().shapes.push((i, j));
+                }
             }
         }
+        pairs
     }
-    let mut rng = SeededRng::new(SEED, 0);
-    let mut placed: Vec<Posed> = Vec::new();
-    for _ in 0..POSES {
-        // Every pose takes its numbers, so that the list does not depend on when a pair drops out.
-        let position_rad = uniform_pose(&mut rng, limits);
-        if pairs.is_empty() {
-            break;
-        }
-        let frames = chain.frames(&position_rad).map(|frame| to_parry(&frame));
-        placed.clear();
-        placed.extend(solid.iter().filter_map(|s| Some(s.body.placed(frames.get(s.frame)?))));
-        let touch =
-            |(i, j): &(usize, usize)| match (solid.get(*i), placed.get(*i), solid.get(*j), placed.get(*j)) {
-                (Some(a), Some(a_at), Some(b), Some(b_at)) => are_touching((a, a_at), (b, b_at)),
-                _ => false,
+
+    fn sample(&self, chain: &Chain, solid: &[Solid], limits: &[JointLimits]) -> Ruled {
+        let mut pairs = self.pairs(solid);
+        let mut rng = SeededRng::new(SEED, 0);
+        let mut placed: Vec<Posed> = Vec::new();
+        for _ in 0..POSES {
+            // Every pose takes its numbers, so that the list does not depend on when a pair drops out.
+            let position_rad = uniform_pose(&mut rng, limits);
+            if pairs.is_empty() {
+                break;
+            }
+            let frames = chain.frames(&position_rad).map(|frame| to_parry(&frame));
+            placed.clear();
+            placed.extend(solid.iter().filter_map(|s| Some(s.body.placed(frames.get(s.frame)?))));
+            let within = |(i, j): &(usize, usize), keep_m: f64| {
+                let sides = (solid.get(*i), placed.get(*i), solid.get(*j), placed.get(*j));
+                let (Some(a), Some(a_at), Some(b), Some(b_at)) = sides else { return false };
+                let apart_m = (a_at.centre - b_at.centre).length() - a.body.bound_m() - b.body.bound_m();
+                apart_m <= keep_m && a.body.distance_m(a_at, &b.body, b_at) <= keep_m
             };
-        // Pairs that have parted once are out; most are out after a few poses, so the rest costs little.
-        pairs.retain(|_, shapes| shapes.iter().any(touch));
+            // Pairs that have kept their margin once are out; most are after a few poses, so the rest costs little.
+            pairs.retain(|links, tried| {
+                let touch = tried.shapes.iter().any(|shapes| within(shapes, 0.0));
+                tried.parted |= !touch;
+                let margin_m = self.margins.of(links.0, links.1);
+                touch || tried.shapes.iter().any(|shapes| within(shapes, margin_m))
+            });
+        }
+        let (close, allowed): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|(_, tried)| tried.parted);
+        let links = |pairs: Vec<(LinkPair, Tried)>| pairs.into_iter().map(|(links, _)| links).collect();
+        Ruled { allowed: links(allowed), close: links(close) }
     }
-    pairs.into_keys().collect()
 }
 
 /// Poses that [`Robot::often_touching`] looks at.

@@ -3,6 +3,7 @@
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
 use crate::capsule::Capsule;
 use crate::document::{Node, Value, shown};
+use crate::link_margin::LinkMargins;
 use crate::mass::{self, Weight};
 use crate::modelled::{self, Listed};
 use crate::reader::{Bounds, FaultList, Table};
@@ -41,6 +42,8 @@ pub(crate) struct Description {
     pub(crate) base_capsules: Vec<Capsule>,
     /// Links that are acknowledged to have no shape.
     pub(crate) unmodelled_links: Vec<String>,
+    /// What links keep from each other.
+    pub(crate) margins: LinkMargins,
     /// What the tip carries, in its frame.
     pub(crate) payload: Option<Weight>,
     /// Gravity in the base's frame.
@@ -78,16 +81,18 @@ impl Description {
             read_rows(&mut top, &mut notices)
         };
         let allowed_contacts = read_contacts(&mut top, read.links.as_deref());
+        let margins = LinkMargins::read(&mut top, read.links.as_deref());
         let payload = read_payload(&mut top);
         let gravity_m_s2 = Weight::read_gravity(&mut top);
         top.done();
         let (joints, geometry) = read.whole?;
-        let (name, payload, gravity_m_s2) = (name?, payload?, gravity_m_s2?);
+        let (name, payload, gravity_m_s2, margins) = (name?, payload?, gravity_m_s2?, margins?);
         let described = Self {
             name,
             joints,
             geometry,
             allowed_contacts,
+            margins,
             base_capsules: base_capsules?,
             unmodelled_links: listed.iter().map(|listed| listed.name.clone()).collect(),
             payload,
@@ -485,12 +490,7 @@ fn read_contacts(top: &mut Table<'_>, links: Option<&[String]>) -> Vec<(usize, u
         match pair_of(item, links) {
             Some(pair) if !pairs.contains(&pair) => pairs.push(pair),
             Some(_) => top.fault_list().add(item.line, &key, &item.to_string(), "each pair once"),
-            None => {
-                let names: Vec<String> = links.iter().take(LINKS_SHOWN_MAX).map(|name| shown(name)).collect();
-                let more = if links.len() > LINKS_SHOWN_MAX { ", .." } else { "" };
-                let expected = format!("two different links of {}{more}", names.join(", "));
-                top.fault_list().add(item.line, &key, &item.to_string(), &expected);
-            }
+            None => top.fault_list().add(item.line, &key, &item.to_string(), &two_links_of(links)),
         }
     }
     pairs.sort_unstable();
@@ -500,7 +500,15 @@ fn read_contacts(top: &mut Table<'_>, links: Option<&[String]>) -> Vec<(usize, u
 /// Names of links that a fault lists.
 const LINKS_SHOWN_MAX: usize = 30;
 
-fn pair_of(item: &Node, links: &[String]) -> Option<(usize, usize)> {
+/// What a pair of links is expected to be.
+pub(crate) fn two_links_of(links: &[String]) -> String {
+    let names: Vec<String> = links.iter().take(LINKS_SHOWN_MAX).map(|name| shown(name)).collect();
+    let more = if links.len() > LINKS_SHOWN_MAX { ", .." } else { "" };
+    format!("two different links of {}{more}", names.join(", "))
+}
+
+/// A pair of names as indices, lower first.
+pub(crate) fn pair_of(item: &Node, links: &[String]) -> Option<(usize, usize)> {
     let Value::List(names) = &item.value else { return None };
     let [first, second] = names.as_slice() else { return None };
     let index = |node: &Node| {

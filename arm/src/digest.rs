@@ -37,11 +37,16 @@
 //! | then, only when base or rows have capsules: | |
 //! | u8 | 2 |
 //! | base, then per joint: | u32 number of capsules; per capsule 3 x f64 `from_m`, 3 x f64 `to_m`, f64 `radius_m` |
+//! | then, only when links keep another margin than the default, or pairs have one of their own: | |
+//! | string | `link margins` |
+//! | f64 | the margin of all pairs |
+//! | u32 | number of pairs with one of their own; per pair 2 x u32 links, f64 margin |
 //!
 //! A string is its length in bytes as u32, then its UTF-8 bytes. An origin is x, y, z, roll, pitch, yaw as 6 x f64. An f64 is its
 //! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
 use crate::capsule::Capsule;
 use crate::description::{Description, Geometry, Joint};
+use crate::link_margin::LinkMargins;
 use crate::mass::Weight;
 use crate::rows::{Row, RowKind};
 use sha2::{Digest, Sha256};
@@ -67,6 +72,7 @@ fn bytes(description: &Description) -> Vec<u8> {
         joints,
         geometry,
         allowed_contacts,
+        margins,
         base_capsules,
         unmodelled_links: _,
         payload,
@@ -96,6 +102,7 @@ fn bytes(description: &Description) -> Vec<u8> {
     }
     put_weights(&mut out, geometry, payload.as_ref());
     put_capsules(&mut out, geometry, base_capsules);
+    put_margins(&mut out, margins);
     out
 }
 
@@ -112,6 +119,21 @@ fn put_capsules(out: &mut Vec<u8>, geometry: &Geometry, base: &[Capsule]) {
             from_m.iter().chain(to_m).for_each(|number| put_number(out, *number));
             put_number(out, *radius_m);
         }
+    }
+}
+
+/// What links keep from each other; nothing when it is the default.
+fn put_margins(out: &mut Vec<u8>, margins: &LinkMargins) {
+    if *margins == LinkMargins::default() {
+        return;
+    }
+    put_text(out, "link margins");
+    put_number(out, margins.all_m);
+    put_count(out, margins.pairs.len());
+    for ((first, second), margin_m) in &margins.pairs {
+        put_count(out, *first);
+        put_count(out, *second);
+        put_number(out, *margin_m);
     }
 }
 

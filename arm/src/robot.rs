@@ -1,11 +1,13 @@
 //! A robot: its chain, limits and collision shapes.
 use crate::capsule::{Capsule, segment_shape};
+use crate::contact::ContactRule;
 use crate::description::{Description, Geometry};
+use crate::link_margin::LinkMargins;
 use crate::mass::LinkMass;
 use crate::reader::FaultList;
 use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
-use crate::{contact, digest, document, modelled};
+use crate::{digest, document, modelled};
 use nalgebra::{Point3, Vector3};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -69,6 +71,10 @@ pub struct Robot {
     pub allowed_by_srdf: Vec<(usize, usize)>,
     /// Link pairs that may touch by the contact rule (neighbours, and pairs that touch in every one of 10,000 seeded poses).
     pub allowed_by_rule: Vec<(usize, usize)>,
+    /// What links that may not touch keep from each other.
+    pub margins: LinkMargins,
+    /// Link pairs that are never further apart than their margin, in 10,000 seeded poses: they keep more than 0 m.
+    pub close_by_rule: Vec<(usize, usize)>,
     /// Hash over everything that changes what a setpoint means.
     pub digest: [u8; 32],
 }
@@ -109,11 +115,17 @@ impl Robot {
         };
         let limits: Vec<JointLimits> = description.joints.iter().map(|joint| joint.limits).collect();
         let known = [description.allowed_contacts.as_slice(), &parts.allowed].concat();
-        let ruled = contact::allowed_by_rule(&chain, &parts.shapes, &limits, (&parts.neighbours, &known));
-        let allowed_by_rule = ruled.map_err(|shape| {
+        let mut margins = description.margins.clone();
+        let rule = ContactRule { neighbours: &parts.neighbours, allowed: &known, margins: &margins };
+        let ruled = rule.apply(&chain, &parts.shapes, &limits);
+        let ruled = ruled.map_err(|shape| {
             let link = parts.shapes.get(shape).and_then(|shape| parts.links.get(shape.link));
             fault_list.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
         });
+        let ruled = ruled.ok()?;
+        for pair in &ruled.close {
+            margins.set(*pair, 0.0);
+        }
         let tip = (chain.joints(), Pose::identity());
         let outside = modelled::masses_outside(&parts.links, &parts.shapes, &parts.masses);
         let listed = |name: &String| description.unmodelled_links.contains(name);
@@ -135,7 +147,9 @@ impl Robot {
             notices: [parts.notices, description.notices.clone(), outside].concat(),
             allowed_by_file: description.allowed_contacts.clone(),
             allowed_by_srdf: parts.allowed,
-            allowed_by_rule: allowed_by_rule.ok()?,
+            allowed_by_rule: ruled.allowed,
+            close_by_rule: ruled.close,
+            margins,
             digest: digest::of(description),
             chain,
         })

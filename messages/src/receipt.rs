@@ -1,6 +1,7 @@
 //! The streamer's typed answer to a trajectory.
 use crate::{LAYOUT_VERSION, Phase, Text};
 use iceoryx2::prelude::ZeroCopySend;
+use taustream_motion::digits::{Amount, Decimals};
 
 /// A receipt on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
@@ -61,7 +62,8 @@ pub enum Rejection {
         newest: u64,
     },
     /// A motion or position limit is exceeded.
-    #[error("limit of joint {} exceeded at t = {at_s:.3} s: {value:.6} against {limit:.6} ({what})", joint + 1)]
+    #[error("limit of joint {} exceeded at t = {at_s:.3} s: {} against {} ({what})", joint + 1,
+        Decimals::apart(&[*value, *limit], 6).show(*value), Decimals::apart(&[*value, *limit], 6).show(*limit))]
     Limit {
         /// Zero-based index of the joint.
         joint: u32,
@@ -75,7 +77,7 @@ pub enum Rejection {
         what: String,
     },
     /// The arm is not at the trajectory's base.
-    #[error("not at base: joint {} is {by_rad:.6} rad away; plan from the commanded pose", joint + 1)]
+    #[error("not at base: joint {} is {} rad away; plan from the commanded pose", joint + 1, Amount(*by_rad))]
     NotAtBase {
         /// Zero-based index of the joint.
         joint: u32,

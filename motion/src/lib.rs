@@ -11,11 +11,13 @@ extern crate std;
 
 pub mod brake;
 pub mod chain;
+pub mod digits;
 pub mod duration;
 pub mod limits;
 pub mod peaks;
 pub mod profile;
 mod proof;
+pub mod range;
 pub mod smoothing;
 pub mod spline;
 pub mod stroke;

@@ -2,6 +2,7 @@
 //!
 //! `motion` limits are what plans use; `stop` limits are what the mechanics withstand. Their difference is the
 //! room in which pauses and stops slow the arm down along its path (docs/adr).
+use crate::digits::Decimals;
 use crate::{JointArray, MAX_JOINTS, Trajectory};
 
 /// Largest absolute velocity, acceleration and jerk of one joint.
@@ -41,8 +42,9 @@ pub enum Quantity {
 
 /// The first limit that a trajectory exceeds.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{quantity:?} limit of joint {} {} at t = {at_s:.3} s: {value} against {limit}", joint + 1,
-    if *proven { "exceeded" } else { "not proven to hold (its bound is given)" })]
+#[error("{quantity:?} limit of joint {} {} at t = {at_s:.3} s: {} against {}", joint + 1,
+    if *proven { "exceeded" } else { "not proven to hold (its bound is given)" },
+    Decimals::apart(&[*value, *limit], 6).show(*value), Decimals::apart(&[*value, *limit], 6).show(*limit))]
 pub struct LimitViolation {
     /// Zero-based index of the joint.
     pub joint: usize,
@@ -73,8 +75,9 @@ pub struct Peaks {
 
 /// Proves that a trajectory keeps the motion limits (and the position limits) of every joint.
 ///
-/// Exact up to a relative [`TOLERANCE`] ([`POSITION_TOLERANCE_RAD`] for positions): between samples a bound of a
-/// higher derivative says what can happen. Its work is bounded; what it cannot prove it refuses.
+/// Exact up to a relative [`TOLERANCE`]; positions have the tolerance of [`crate::range`]. Between samples a bound of a
+/// higher derivative says what can happen. Its work is bounded; what it cannot prove it refuses. A joint whose base is
+/// outside its range must come inside, and may only move inwards until it is.
 ///
 /// # Errors
 /// The first violation in time, at its worst instant.
@@ -88,7 +91,3 @@ pub fn check_motion(
 /// Relative excess that [`check_motion`] lets pass, so that a motion timed exactly to a limit is not refused
 /// for rounding.
 pub const TOLERANCE: f64 = 1e-6;
-
-/// Excess of a position limit that [`check_motion`] lets pass (rad), for a pose that lies exactly on it: far below
-/// one count of a 24-bit encoder.
-pub const POSITION_TOLERANCE_RAD: f64 = 1e-9;

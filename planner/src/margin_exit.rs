@@ -83,8 +83,8 @@ impl Note {
 pub struct MarginExit<'a> {
     /// What it must keep until it has left.
     pub near: &'a World<'a>,
-    /// Where it begins.
-    pub start_rad: JointArray,
+    /// Where it begins, and what it passes before the pipeline's own path.
+    pub first_rad: Vec<JointArray>,
     /// What is reported when less than the margin is kept.
     pub note: Option<Note>,
 }

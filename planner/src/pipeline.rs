@@ -8,7 +8,7 @@ use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
 use crate::objective::{Evaluator, Objective};
 use crate::optimize::{METHODS, Method, Optimizer, Setup};
-use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions};
+use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions, Remedy};
 use crate::refine::{self, PathProblem, refine};
 use crate::rng::SeededRng;
 use crate::search::Searcher;
@@ -103,6 +103,8 @@ pub struct Pipeline<'a> {
     best: Option<Best>,
     /// Why the latest motion was not proven.
     violation: Option<Violation>,
+    /// A path had no timing.
+    untimed: bool,
 }
 
 impl<'a> Pipeline<'a> {
@@ -124,6 +126,7 @@ impl<'a> Pipeline<'a> {
             tried: Vec::new(),
             best: None,
             violation: None,
+            untimed: false,
         }
     }
 
@@ -252,7 +255,7 @@ impl<'a> Pipeline<'a> {
 
     /// The corners of a whole motion: the exit path from the margin comes before the path.
     fn whole_path(&self, path: &[JointArray]) -> Vec<JointArray> {
-        self.margin_exit.iter().map(|l| l.start_rad).chain(path.iter().copied()).collect()
+        self.margin_exit.iter().flat_map(|l| l.first_rad.iter()).chain(path).copied().collect()
     }
 
     /// What a motion must keep, and when; `None` when it does not leave the margin that it begins in.
@@ -392,8 +395,9 @@ impl<'a> Pipeline<'a> {
         let corners = self.whole_path(path);
         let waits = vec![1.0; corners.len().saturating_sub(2)];
         let timed = self.path(&corners).fastest(&waits, self.space.budget);
-        if let Some(timed) = timed {
-            self.prove(&corners, timed, how);
+        match timed {
+            Some(timed) => self.prove(&corners, timed, how),
+            None => self.untimed = true,
         }
     }
 
@@ -486,8 +490,27 @@ impl<'a> Pipeline<'a> {
                 let planning_s = budget.elapsed_s();
                 Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, checks })
             }
-            (None, Some(violation)) => Err(PlanError::Unproven { tried, violation }),
-            (None, None) => Err(PlanError::NotFound { tried, cut_short: cut }),
+            (None, Some(violation)) => {
+                if cut && matches!(violation, Violation::Unresolved { .. }) {
+                    let tried = format!("{tried}, {violation}");
+                    return Err(PlanError::NotFound { tried, remedy: Remedy::Clock(self.options.deadline) });
+                }
+                Err(PlanError::Unproven { tried, violation })
+            }
+            (None, None) if self.untimed && !cut => Err(PlanError::Untimed { tried }),
+            (None, None) => {
+                let remedy = match self.options.planner {
+                    _ if cut => Remedy::Clock(self.options.deadline),
+                    PlannerKind::Straight => Remedy::Planner,
+                    PlannerKind::Auto
+                    | PlannerKind::RrtConnect
+                    | PlannerKind::Rrt
+                    | PlannerKind::Rbf
+                    | PlannerKind::Bfo
+                    | PlannerKind::Optimiser(_) => Remedy::Budget(self.options.deadline),
+                };
+                Err(PlanError::NotFound { tried, remedy })
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! From two poses to a verified motion.
 use crate::budget::Budget;
+use crate::collide::SweepRules;
 use crate::dynamics::NoMasses;
+use crate::enter::Entry;
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::{MarginExit, Relaxed, find_margin_exit, is_clear};
 use crate::objective::{Evaluator, Objective};
@@ -11,7 +13,9 @@ use crate::world::World;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::{JointArray, Trajectory};
+use taustream_motion::digits::{Amount, OutsideRange};
+use taustream_motion::range::INSIDE_RAD;
+use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
 
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
 pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";
@@ -107,8 +111,13 @@ pub enum PlanError {
     },
     /// A joint lies outside its range.
     #[error(
-        "{which} outside limits: joint {} ({name}) at {value_rad:.4} rad is {by_rad:.4} rad outside [{:.4}, {:.4}]; choose a {which} inside",
-        joint + 1, range_rad[0], range_rad[1]
+        "{which} outside limits: joint {} ({name}) at {}; {}",
+        joint + 1,
+        OutsideRange { position_rad: *value_rad, range_rad: *range_rad },
+        match which {
+            PoseOf::Start => "choose a start inside, or lead an arm that stands there back with `taustream recover`",
+            PoseOf::Goal => "choose a goal inside",
+        }
     )]
     OutsideLimits {
         /// Which pose.
@@ -132,8 +141,12 @@ pub enum PlanError {
         /// What touches what.
         contact: Contact,
     },
-    /// The arm touches nothing in a given pose, but is nearer to something than the scene's margin.
-    #[error("{which} nearer than the margin: {contact}; choose another {which} or a smaller margin")]
+    /// The arm touches nothing in a given pose, but is nearer to something than the margin of the scene, or of the robot's
+    /// links; a goal must keep [`SweepRules::EDGE_END_M`] more.
+    #[error("{which} nearer than the margin: {contact}{}; choose another {which} or a smaller margin", match which {
+        PoseOf::Start => String::new(),
+        PoseOf::Goal => format!(" (a goal keeps {} m more, or no way to it can be proven)", SweepRules::EDGE_END_M),
+    })]
     InsideMargin {
         /// Which pose.
         which: PoseOf,
@@ -150,15 +163,39 @@ pub enum PlanError {
     #[error(transparent)]
     NoMasses(#[from] NoMasses),
     /// Nothing was found.
-    #[error(
-        "no path found: {tried}{}; try a longer deadline, another seed, planner or goal",
-        if *cut_short { " (the deadline cut the search short)" } else { "" }
-    )]
+    #[error("no path found: {tried}; {remedy}")]
     NotFound {
         /// What was tried, with counts and the obstacle in the way.
         tried: String,
-        /// True when the clock ended the search before its budget did.
-        cut_short: bool,
+        /// What ended the search, and what helps.
+        remedy: Remedy,
+    },
+    /// A joint would be on its way for longer than any motion may take.
+    #[error(
+        "the motion would take at least {least_s:.0} s, and the longest is {LONGEST_S:.0} s: joint {} ({name}) has to go {} rad with \
+         velocity_rad_s = {}, acceleration_rad_s2 = {}, jerk_rad_s3 = {}; correct its motion limits or choose a nearer goal",
+        joint + 1, Amount(*by_rad), motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3
+    )]
+    TooSlow {
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// The joint's name.
+        name: String,
+        /// How far it has to go.
+        by_rad: f64,
+        /// What it may do.
+        motion: LimitSet,
+        /// Lower bound of the duration.
+        least_s: f64,
+    },
+    /// A path was found, but no timing of it fits into a message.
+    #[error(
+        "a path was found ({tried}), but not in {MAX_STROKES} strokes: it is too long, or has too many corners, for the motion \
+         limits; raise them or choose a nearer goal"
+    )]
+    Untimed {
+        /// What found the path.
+        tried: String,
     },
     /// A path was found, but its timed motion could not be proven.
     #[error("a path was found ({tried}), but its motion is not proven: {violation}")]
@@ -169,6 +206,31 @@ pub enum PlanError {
         violation: Violation,
     },
 }
+
+/// What ended a search, and what helps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Remedy {
+    /// The clock: more time helps.
+    #[error("the deadline of {} ms ended it: try a longer one", .0.as_millis())]
+    Clock(Duration),
+    /// The evaluations that the deadline grants.
+    #[error("the evaluations that a deadline of {} ms grants are spent: try another seed, planner or goal, or a longer deadline", .0.as_millis())]
+    Budget(Duration),
+    /// Only the straight line was asked for.
+    #[error("only the straight line was asked for: try another planner or goal")]
+    Planner,
+}
+
+impl Remedy {
+    /// True when the clock ended the work.
+    #[must_use]
+    pub fn is_clock(self) -> bool {
+        matches!(self, Self::Clock(_))
+    }
+}
+
+/// Longest motion that is planned (s): a day. What would take longer is a slip of a unit in the limits.
+const LONGEST_S: f64 = 86_400.0;
 
 /// Plans a verified motion between two poses at rest.
 ///
@@ -221,8 +283,29 @@ pub fn plan_until(
     cancel: Option<&AtomicBool>,
 ) -> Result<Plan, PlanError> {
     let budget = Budget::until(options.clock(), cancel);
-    check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
+    check_numbers(task.robot, PoseOf::Start, &task.start_rad)?;
+    let entry = Entry::of(task.robot, &task.start_rad);
+    if task.margin == StartMargin::Scene {
+        check_pose(task.robot, PoseOf::Start, &task.start_rad)?;
+    }
     check_pose(task.robot, PoseOf::Goal, &task.goal_rad)?;
+    // A goal at a limit ends inside of it, whatever rounding does.
+    let asked_rad = task.goal_rad;
+    let task = &Task { goal_rad: nearest_inside(task.robot, &asked_rad), ..*task };
+    check_duration(task)?;
+    let mut plan = plan_inside(task, options, (&budget, entry.as_ref()))?;
+    if let Some(words) = goal_words(task, &asked_rad) {
+        plan.how = format!("{words}; {}", plan.how);
+    }
+    Ok(plan)
+}
+
+/// Plans to a goal inside the limits.
+fn plan_inside(
+    task: &Task,
+    options: &PlanOptions,
+    (budget, entry): (&Budget, Option<&Entry>),
+) -> Result<Plan, PlanError> {
     let evaluator = Evaluator::new(options.objective, task.robot)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
     let (start_rad, goal_rad) = (&task.start_rad, &task.goal_rad);
@@ -231,41 +314,58 @@ pub fn plan_until(
         (StartMargin::Scene, None) => None,
         (StartMargin::AsItStands, _) => Some(Relaxed::around(&world, start_rad)?),
     };
-    if let Some(contact) = world.contact(goal_rad) {
+    if let Some(contact) = world.contact_within(goal_rad, SweepRules::EDGE_END_M) {
         return Err(PlanError::too_close(PoseOf::Goal, contact));
     }
-    if is_clear(&world, start_rad) {
-        return Pipeline::new(&world, &budget, options, &evaluator).run(start_rad, goal_rad);
+    if entry.is_none() && is_clear(&world, start_rad) {
+        return Pipeline::new(&world, budget, options, &evaluator).run(start_rad, goal_rad);
     }
-    plan_out(&world, relaxed.as_ref(), (&budget, &evaluator), (task, options))
+    plan_out(&world, (relaxed.as_ref(), entry), (budget, &evaluator), (task, options))
 }
 
-/// Plans from a start inside the margin or at its edge: out of it first.
+/// Plans from a start outside the limits, inside the margin or at its edge: out of there first.
 fn plan_out(
     world: &World,
-    relaxed: Option<&Relaxed>,
+    (relaxed, entry): (Option<&Relaxed>, Option<&Entry>),
     (budget, evaluator): (&Budget, &Evaluator),
     (task, options): (&Task, &PlanOptions),
 ) -> Result<Plan, PlanError> {
-    let ends = [&task.start_rad, &task.goal_rad];
-    let full = world.contact(&task.start_rad).is_none().then_some((world, None));
+    let (start_rad, goal_rad) = (task.start_rad, &task.goal_rad);
+    let inside_rad = entry.map_or(start_rad, |entry| entry.pose_rad);
+    let led_in = |mut plan: Plan| {
+        if let Some(entry) = entry {
+            plan.how = format!("{}; {}", entry.words, plan.how);
+        }
+        plan
+    };
+    let full = world.contact(&start_rad).is_none().then_some((world, None));
     let reduced = relaxed.map(|r| (&r.world, Some(r.note.clone())));
     for (near, note) in full.into_iter().chain(reduced) {
-        if let Some(pose_rad) = find_margin_exit([near, world], ends, options.seed, budget) {
-            let margin_exit = MarginExit { near, start_rad: task.start_rad, note };
-            return Pipeline::new(world, budget, options, evaluator)
-                .margin_exit(margin_exit)
-                .run(&pose_rad, &task.goal_rad);
+        let (clear_rad, first_rad) = if is_clear(world, &inside_rad) {
+            (Some(inside_rad), vec![start_rad])
+        } else {
+            let first_rad = if entry.is_some() { vec![start_rad, inside_rad] } else { vec![start_rad] };
+            (find_margin_exit([near, world], [&inside_rad, goal_rad], options.seed, budget), first_rad)
+        };
+        if let Some(clear_rad) = clear_rad {
+            let pipeline = Pipeline::new(world, budget, options, evaluator);
+            return pipeline
+                .margin_exit(MarginExit { near, first_rad, note })
+                .run(&clear_rad, goal_rad)
+                .map(led_in);
         }
     }
     // No exit path nearby: the reduced margin along the whole motion, rather than an arm that cannot be moved.
-    let Some(relaxed) = relaxed else {
-        return Pipeline::new(world, budget, options, evaluator).run(&task.start_rad, &task.goal_rad);
-    };
-    let mut plan =
-        Pipeline::new(&relaxed.world, budget, options, evaluator).run(&task.start_rad, &task.goal_rad)?;
-    plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
-    Ok(plan)
+    let near = relaxed.map_or(world, |relaxed| &relaxed.world);
+    let mut pipeline = Pipeline::new(near, budget, options, evaluator);
+    if entry.is_some() {
+        pipeline = pipeline.margin_exit(MarginExit { near, first_rad: vec![start_rad], note: None });
+    }
+    let mut plan = pipeline.run(&inside_rad, goal_rad)?;
+    if let Some(relaxed) = relaxed {
+        plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
+    }
+    Ok(led_in(plan))
 }
 
 impl PlanError {
@@ -279,18 +379,61 @@ impl PlanError {
     }
 }
 
-pub(crate) fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
+/// Refuses goals that a joint cannot reach within [`LONGEST_S`], whatever the path.
+fn check_duration(task: &Task) -> Result<(), PlanError> {
+    let ends = task.start_rad.iter().zip(&task.goal_rad);
+    for (joint, (described, (start_rad, goal_rad))) in task.robot.joints.iter().zip(ends).enumerate() {
+        let (by_rad, motion) = ((goal_rad - start_rad).abs(), described.limits.motion);
+        // From rest to rest: half of the way is gained at the full acceleration, or jerk, at most.
+        let least_s = (by_rad / motion.velocity_rad_s)
+            .max(2.0 * (by_rad / motion.acceleration_rad_s2).sqrt())
+            .max((32.0 * by_rad / motion.jerk_rad_s3).cbrt());
+        if by_rad > 0.0 && least_s > LONGEST_S {
+            return Err(PlanError::TooSlow { joint, name: described.name.clone(), by_rad, motion, least_s });
+        }
+    }
+    Ok(())
+}
+
+/// What is reported when a goal at a limit was taken inside of it.
+fn goal_words(task: &Task, asked_rad: &JointArray) -> Option<String> {
+    let joints = task.robot.joints.iter().zip(asked_rad.iter().zip(&task.goal_rad));
+    let moved = joints.filter(|(_, (requested, goal))| (*requested - *goal).abs() > 2.0 * INSIDE_RAD);
+    let words: Vec<String> = moved
+        .map(|(joint, (requested, goal))| {
+            format!("{} by {} rad", joint.name, Amount((requested - goal).abs()))
+        })
+        .collect();
+    (!words.is_empty()).then(|| format!("goal taken at the limit: {}", words.join(", ")))
+}
+
+/// The pose with every joint at the nearest angle at which a plan may end.
+pub(crate) fn nearest_inside(robot: &Robot, pose_rad: &JointArray) -> JointArray {
+    let mut inside_rad = *pose_rad;
+    for (position_rad, joint) in inside_rad.iter_mut().zip(&robot.joints) {
+        *position_rad = joint.limits.nearest_inside(*position_rad);
+    }
+    inside_rad
+}
+
+fn check_numbers(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
     let joints = robot.joints.len();
     for (joint, &value_rad) in pose_rad.iter().enumerate() {
         if !value_rad.is_finite() || (joint >= joints && value_rad != 0.0) {
             return Err(PlanError::BadPose { which, joint, value_rad, joints });
         }
     }
+    Ok(())
+}
+
+/// Refuses a pose that no arm has, or that lies outside the limits by more than the tolerance.
+pub(crate) fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
+    check_numbers(robot, which, pose_rad)?;
     for (joint, (described, &value_rad)) in robot.joints.iter().zip(pose_rad).enumerate() {
-        let range_rad = described.limits.position_rad;
-        let by_rad = (range_rad[0] - value_rad).max(value_rad - range_rad[1]);
-        if by_rad > 0.0 {
-            let name = described.name.clone();
+        let limits = &described.limits;
+        if !limits.is_inside(value_rad) {
+            let (name, range_rad) = (described.name.clone(), limits.position_rad);
+            let by_rad = limits.outside_rad(value_rad).abs();
             return Err(PlanError::OutsideLimits { which, joint, name, value_rad, by_rad, range_rad });
         }
     }

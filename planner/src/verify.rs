@@ -7,6 +7,7 @@ use crate::collide::{Blocked, SweepRules, sweep};
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::Trajectory;
+use taustream_motion::digits::{Amount, Decimals};
 use taustream_motion::limits::{LimitViolation, Peaks, check_motion};
 
 /// What was proven about a trajectory.
@@ -21,6 +22,8 @@ pub struct Proof {
     pub clearance_at_s: f64,
     /// What is closest there: a link, and an obstacle or another link. Empty when nothing can collide.
     pub clearance_between: (String, String),
+    /// What these two must keep; 0 when nothing can collide.
+    pub clearance_required_m: f64,
     /// Proven upper bounds of velocity, acceleration and jerk.
     pub peaks: Peaks,
 }
@@ -32,7 +35,7 @@ pub struct Contact {
     pub between: (String, String),
     /// Their distance; negative when they overlap and the depth is known.
     pub distance_m: f64,
-    /// The distance that they must keep: the scene's margin for obstacles, 0 between links.
+    /// The distance that they must keep: the scene's margin for obstacles, the robot's between links.
     pub required_m: f64,
 }
 
@@ -46,12 +49,22 @@ impl Contact {
 
 impl std::fmt::Display for Contact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let ((a, b), distance_m, required_m) = (&self.between, self.distance_m, self.required_m);
+        let Self { between: (a, b), distance_m, required_m } = self;
         if self.touches() {
             return write!(f, "{a} touches {b}");
         }
-        let by_m = (required_m - distance_m).max(0.0);
-        write!(f, "{a} is {distance_m:.4} m from {b}, {by_m:.4} m less than the {required_m:.4} m required")
+        let decimals = Decimals::apart(&[*distance_m, *required_m], 4);
+        let (distance, required) = (decimals.show(*distance_m), decimals.show(*required_m));
+        let by_m = required_m - distance_m;
+        if by_m > 0.0 {
+            write!(f, "{a} is {distance} m from {b}, {} m less than the {required} m required", Amount(by_m))
+        } else {
+            write!(
+                f,
+                "{a} is {distance} m from {b}, only {} m more than the {required} m required",
+                Amount(-by_m)
+            )
+        }
     }
 }
 
@@ -156,6 +169,7 @@ pub fn verify_stretches(
         clearance_m: f64::INFINITY,
         clearance_at_s: 0.0,
         clearance_between: Default::default(),
+        clearance_required_m: 0.0,
         peaks,
     };
     for stretch in stretches {
@@ -163,6 +177,7 @@ pub fn verify_stretches(
             .map_err(|blocked| explain(stretch, trajectory, &blocked, budget))?;
         if clearance.proven_m < proof.clearance_m {
             let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
+            proof.clearance_required_m = clearance.pair.map_or(0.0, |pair| pair.required_m);
             proof.clearance_m = clearance.proven_m;
             (proof.clearance_at_s, proof.clearance_between) = (clearance.at, between);
         }

@@ -1,7 +1,7 @@
 //! The robot and its surroundings as bodies, and which pairs of them must keep apart.
 //!
-//! Obstacles keep the scene's margin; links keep more than 0 m from each other unless the robot file or the
-//! contact rule lets them touch. The base does not move, so that it is not checked against obstacles: planning
+//! Obstacles keep the scene's margin, links the robot's from each other unless the robot file or the contact rule lets
+//! them touch. The base does not move, so that it is not checked against obstacles: planning
 //! could not change it.
 use crate::collide::{Body, Posed};
 use crate::verify::Contact;
@@ -117,16 +117,17 @@ impl<'a> World<'a> {
                 // Rigid with one frame: their distance never changes.
                 let once = b.frame < a.frame;
                 if once && a.link != b.link && !self.robot.may_touch(a.link, b.link) {
-                    pairs.push(Pair { link, other: Other::Link(other), required_m: 0.0 });
+                    let required_m = self.robot.margins.of(a.link, b.link);
+                    pairs.push(Pair { link, other: Other::Link(other), required_m });
                 }
             }
         }
         pairs
     }
 
-    /// The same world for an arm that stands nearer to obstacles than it should: each pair that is nearer in this
-    /// pose need only keep what it has there, less `slack_m`. Pairs that are nearer than `floor_m` keep their
-    /// distance, so that the pose is still refused.
+    /// The same world for an arm that stands nearer to obstacles, or to itself, than it should: each pair that is nearer
+    /// in this pose need only keep what it has there, less `slack_m`. Pairs with obstacles that are nearer than `floor_m`,
+    /// and links that touch, keep their distance, so that the pose is still refused.
     #[must_use]
     pub fn relaxed(&self, position_rad: &JointArray, floor_m: f64, slack_m: f64) -> Self {
         let mut relaxed = self.clone();
@@ -134,8 +135,11 @@ impl<'a> World<'a> {
         self.place(position_rad, &mut snapshot);
         for pair in &mut relaxed.pairs {
             let distance_m = self.solid_distance_m(pair, &snapshot);
-            if distance_m > floor_m.min(pair.required_m) {
-                // Links among themselves keep more than 0 m, whatever they have.
+            let floor_m = match pair.other {
+                Other::Obstacle(_) => floor_m.min(pair.required_m),
+                Other::Link(_) => 0.0,
+            };
+            if distance_m > floor_m {
                 pair.required_m = pair.required_m.min((distance_m - slack_m).max(0.0));
             }
         }
@@ -253,8 +257,14 @@ impl<'a> World<'a> {
     /// What is too close in a pose, the worst first; `None` when the pose is free.
     #[must_use]
     pub fn contact(&self, position_rad: &JointArray) -> Option<Contact> {
+        self.contact_within(position_rad, 0.0)
+    }
+
+    /// Like [`Self::contact`], for a pose that must keep `extra_m` more than every pair must.
+    #[must_use]
+    pub fn contact_within(&self, position_rad: &JointArray, extra_m: f64) -> Option<Contact> {
         let (pair, distance_m) = self.closest(position_rad)?;
-        (distance_m <= pair.required_m).then(|| self.contact_of(&pair, distance_m))
+        (distance_m <= pair.required_m + extra_m).then(|| self.contact_of(&pair, distance_m))
     }
 
     /// A contact as text.

@@ -7,6 +7,7 @@ mod common;
 use common::ur5;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
+use taustream_arm::body::{Body, to_parry};
 use taustream_arm::scene::Shape;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
@@ -14,7 +15,7 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::budget::Budget;
 use taustream_planner::collide::{StraightEdge, SweepRules, sweep};
 use taustream_planner::rng::SeededRng;
-use taustream_planner::world::{Snapshot, World};
+use taustream_planner::world::{Other, Snapshot, World};
 
 const KINDS: usize = 6;
 
@@ -156,6 +157,7 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
         world.place(&q, &mut snapshot);
         world.moves_m(&snapshot, &turn, &mut moves_m);
         let (before, after) = (robot.chain.frames(&q), robot.chain.frames(&there));
+        assert_pairs_move_no_further(&world, &moves_m, (&before, &after), &mut rng);
         for (body, shape) in robot.shapes.iter().enumerate() {
             for point in points(&mut rng, &shape.shape) {
                 let at = |frames: &[Pose]| frames[shape.frame] * shape.pose * point;
@@ -181,6 +183,86 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
     for (kind, share) in nearest.iter().enumerate() {
         assert!(*share > 0.9, "kind {kind}: no point came nearer than {share} to its bound");
     }
+}
+
+/// The bound that a sweep takes for a pair of links: points of the one, seen from the other.
+fn assert_pairs_move_no_further(
+    world: &World,
+    moves_m: &[[f64; MAX_JOINTS + 1]],
+    (before, after): (&[Pose], &[Pose]),
+    rng: &mut SeededRng,
+) {
+    let shapes = &world.robot().shapes;
+    for pair in world.pairs() {
+        let Other::Link(other) = pair.other else { continue };
+        let (shape, from) = (&shapes[pair.link], shapes[other].frame);
+        let bound_m = world.pair_moves_m(pair, moves_m);
+        for point in points(rng, &shape.shape) {
+            let seen = |frames: &[Pose]| frames[from].inverse() * frames[shape.frame] * shape.pose * point;
+            let moved_m = (seen(after) - seen(before)).norm();
+            assert!(moved_m <= bound_m + 1e-12, "{pair:?}: {moved_m} above {bound_m}");
+        }
+    }
+}
+
+/// Goal: what a sweep proves about the links among themselves holds at every instant, for every pair that may not touch.
+/// Method: random robots and edges; the pairs that are near at the start are let touch. Dense poses, and distances of all
+/// shapes of different links, chosen and measured without the world.
+#[test]
+fn clearance_between_links_that_a_sweep_proves_holds_at_every_pose_between() {
+    let (mut proven, mut refused) = (0, 0);
+    let template = ur5();
+    for seed in 0..1_500 {
+        let mut robot = robot(&template, seed);
+        let bodies: Vec<Body> =
+            robot.shapes.iter().map(|s| Body::new(&s.shape, &s.pose).expect("a body")).collect();
+        let mut rng = SeededRng::new(seed, 33);
+        let mut ends: [JointArray; 2] = Default::default();
+        for end in &mut ends {
+            (0..robot.joints.len()).for_each(|j| end[j] = rng.within(-0.8, 0.8));
+        }
+        let at = |t: f64| std::array::from_fn(|j| ends[0][j] + (ends[1][j] - ends[0][j]) * t);
+        let apart = |robot: &Robot, t: f64| -> Vec<((usize, usize), f64)> {
+            let frames = robot.chain.frames(&at(t));
+            let placed: Vec<_> = robot
+                .shapes
+                .iter()
+                .zip(&bodies)
+                .map(|(s, body)| body.placed(&to_parry(&frames[s.frame])))
+                .collect();
+            let mut pairs = Vec::new();
+            for (i, a) in robot.shapes.iter().enumerate() {
+                for (j, b) in robot.shapes.iter().enumerate().skip(i + 1) {
+                    if a.link != b.link && !robot.may_touch(a.link, b.link) {
+                        let d = bodies[i].distance_m(&placed[i], &bodies[j], &placed[j]);
+                        pairs.push(((a.link.min(b.link), a.link.max(b.link)), d));
+                    }
+                }
+            }
+            pairs
+        };
+        let near = apart(&robot, 0.0).into_iter().filter(|(_, d)| *d < 0.004).map(|(links, _)| links);
+        robot.allowed_by_file = near.collect();
+        if apart(&robot, 0.0).is_empty() {
+            continue;
+        }
+        let scene = empty();
+        let world = World::new(&robot, &scene).expect("builds");
+        let edge = StraightEdge { from_rad: &ends[0], to_rad: &ends[1] };
+        let swept = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Budget::unbounded());
+        let Ok(clearance) = swept else {
+            refused += 1;
+            continue;
+        };
+        proven += 1;
+        for step in 0..=300 {
+            for (links, distance_m) in apart(&robot, f64::from(step) / 300.0) {
+                let least_m = clearance.proven_m.max(robot.margins.of(links.0, links.1));
+                assert!(distance_m >= least_m - 1e-9, "seed {seed}, {links:?}: {distance_m} below {least_m}");
+            }
+        }
+    }
+    assert!(proven > 200 && refused > 100, "{proven} proven, {refused} refused");
 }
 
 /// Goal: what a sweep proves about a whole motion holds at every instant of it, for all shapes against all.

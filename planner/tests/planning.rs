@@ -11,7 +11,7 @@ use taustream_planner::refine::{PathProblem, refine};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Space;
 use taustream_planner::world::World;
-use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, plan, verify};
+use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, Remedy, plan, verify};
 
 fn options(seed: u64, deadline_ms: u64, planner: PlannerKind) -> PlanOptions {
     PlanOptions { seed, deadline: Duration::from_millis(deadline_ms), planner, ..PlanOptions::default() }
@@ -209,8 +209,39 @@ fn planning_without_any_time_fails_clearly() {
         (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
     for kind in PlannerKind::all() {
         let error = plan(&robot, &scene, &start, &goal, &options(0, 0, kind)).unwrap_err();
-        assert!(matches!(error, PlanError::NotFound { cut_short: true, .. }), "{kind:?}: {error}");
+        assert!(matches!(error, PlanError::NotFound { remedy: Remedy::Clock(_), .. }), "{kind:?}: {error}");
         assert!(error.to_string().contains("deadline"), "{error}");
+    }
+}
+
+/// Goal: a longer deadline is advised only where it can help.
+#[test]
+fn planning_that_more_time_cannot_help_names_what_can() {
+    let (mut robot, scene) = (ur5(), scene("pillars"));
+    let (start, goal) =
+        (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
+    let error = |robot: &Robot, kind| {
+        plan(robot, &scene, &start, &goal, &options(0, 2_000, kind)).unwrap_err().to_string()
+    };
+    let straight = error(&robot, PlannerKind::Straight);
+    assert!(straight.contains("front_pillar") && straight.contains("try another planner"), "{straight}");
+    assert!(!straight.contains("deadline"), "{straight}");
+    let rested = robot.joints[0].limits.motion;
+    for spoil in [
+        LimitSet { velocity_rad_s: 2.794_826e-8, ..rested },
+        LimitSet { acceleration_rad_s2: 1e-11, ..rested },
+        LimitSet { jerk_rad_s3: 1e-15, ..rested },
+    ] {
+        robot.joints[0].limits.motion = spoil;
+        let slow = error(&robot, PlannerKind::Auto);
+        assert!(
+            slow.starts_with("the motion would take at least ") && slow.contains("(shoulder_pan)"),
+            "{slow}"
+        );
+        assert!(slow.contains("velocity_rad_s = ") && !slow.contains("deadline"), "{slow}");
+        // A joint that does not move does not matter.
+        let still = plan(&robot, &scene, &start, &start, &options(0, 2_000, PlannerKind::Auto));
+        assert!(still.is_ok(), "{still:?}");
     }
 }
 

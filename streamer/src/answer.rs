@@ -1,9 +1,11 @@
 //! Why a command was accepted or refused: as plain values on the real-time thread, as sentences off it.
 use crate::names::Names;
 use crate::write_ahead::StoreFault;
+use taustream_arm::revolution::OUTSIDE_RAD_MAX;
 use taustream_drivers::DriveState;
 use taustream_drivers::bring_up::Refusal;
 use taustream_messages::{Cause, Phase, ReferenceState};
+use taustream_motion::digits::{Decimals, OutsideRange};
 
 /// The cycle's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +25,7 @@ pub struct CommandAnswer {
 #[expect(missing_docs, reason = "each variant has its text in `AnswerReason::sentence`")]
 pub enum AnswerReason {
     Enabling,
+    EnablingOutside { joint: usize, position_rad: f64, range_rad: [f64; 2], percent: f64 },
     Unlocked,
     TakingOver,
     Referenced { joint: usize, at_rad: f64 },
@@ -33,6 +36,7 @@ pub enum AnswerReason {
     FastStopping,
     TorqueOff,
     SpeedSet { percent: f64, moving: bool },
+    SpeedHeld { percent: f64, limit: f64 },
     Resetting,
     ClearedHolding,
     ClearedOff,
@@ -41,7 +45,6 @@ pub enum AnswerReason {
     NotConfigured { joint: usize, state: DriveState, refusal: Refusal },
     NotAtRest { joint: usize, speed_rad_s: f64, limit_rad_s: f64 },
     SpeedUnknown,
-    OutOfRange { joint: usize, position_rad: f64, range_rad: [f64; 2] },
     NoFeedback { joint: usize, age_s: f64 },
     Warns { joint: usize, status_word: u32 },
     Tracking { joint: usize, error_rad: f64, limit_rad: f64 },
@@ -101,6 +104,11 @@ impl AnswerReason {
             Self::SpeedSet { percent, moving: false } => {
                 return Some(format!("the next motion runs at {percent} %"));
             }
+            Self::SpeedHeld { percent, limit } => {
+                return Some(format!(
+                    "motions that begin outside the position limits run at {limit} % at most; those after them at {percent} %"
+                ));
+            }
             Self::Resetting => "fault reset sent to the drives; `status` shows the result",
             Self::ClearedHolding => "fault cleared, the drives hold; `enable` makes the arm ready",
             Self::ClearedOff => "fault cleared, the drives are de-energised; `enable` energises them",
@@ -135,15 +143,25 @@ impl AnswerReason {
                     reference_state.word()
                 )
             }
-            Self::ReferenceOutside { joint, at_rad, range_rad: [low, high] } => format!(
-                "{} cannot be at {at_rad:.4} rad: its range is [{low:.4}, {high:.4}] rad; measure again",
-                names.joint(joint)
-            ),
-            Self::ReferenceFar { joint, at_rad, nearest_rad, limit_rad } => format!(
-                "{} cannot be at {at_rad:.4} rad: the nearest angle that its feedback allows is {nearest_rad:.4} rad, {:.4} rad away (at most {limit_rad:.4}); measure again, or correct zero_offset_rad and sign",
+            Self::EnablingOutside { joint, position_rad, range_rad, percent } => format!(
+                "drives are being energised at the measured pose; {} at {}: only motions that lead it inwards are accepted, at {percent} % speed (`taustream recover`)",
                 names.joint(joint),
-                (nearest_rad - at_rad).abs()
+                OutsideRange { position_rad, range_rad }
             ),
+            Self::ReferenceOutside { joint, at_rad, range_rad } => format!(
+                "{} cannot be there: {}, and at most {OUTSIDE_RAD_MAX} rad is plausible; measure again",
+                names.joint(joint),
+                OutsideRange { position_rad: at_rad, range_rad }
+            ),
+            Self::ReferenceFar { joint, at_rad, nearest_rad, limit_rad } => {
+                let by_rad = (nearest_rad - at_rad).abs();
+                let decimals = Decimals::apart(&[by_rad, limit_rad], 4);
+                let (by, limit) = (decimals.show(by_rad), decimals.show(limit_rad));
+                format!(
+                    "{} cannot be at {at_rad:.4} rad: the nearest angle that its feedback allows is {nearest_rad:.4} rad, {by} rad away (at most {limit}); measure again, or correct zero_offset_rad and sign",
+                    names.joint(joint)
+                )
+            }
             Self::ReferenceNotNeeded { joint, reading_rad, at_rad } => format!(
                 "{} needs no reference: its feedback is absolute and reads {reading_rad:.6} rad, {:.6} rad from {at_rad:.6}; if that is wrong, correct zero_offset_rad or sign in the settings",
                 names.joint(joint),
@@ -178,10 +196,6 @@ impl AnswerReason {
                 "{} moves at {speed_rad_s:.3} rad/s (at rest: {limit_rad_s} rad/s); wait until the arm is at rest",
                 name(joint)
             ),
-            Self::OutOfRange { joint, position_rad, range_rad: [low, high] } => format!(
-                "{} is at {position_rad:.4} rad, outside its range [{low:.4}, {high:.4}]; move it back by hand",
-                name(joint)
-            ),
             Self::NoFeedback { joint, age_s } if age_s.is_infinite() => {
                 format!("no feedback from {} yet; {}", name(joint), present(names, joint))
             }
@@ -193,10 +207,14 @@ impl AnswerReason {
                 name(joint),
                 names.status_word(joint, status_word)
             ),
-            Self::Tracking { joint, error_rad, limit_rad } => format!(
-                "{} is {error_rad:.4} rad from its command (limit {limit_rad}); `disable` and free the arm",
-                name(joint)
-            ),
+            Self::Tracking { joint, error_rad, limit_rad } => {
+                let decimals = Decimals::apart(&[error_rad, limit_rad], 4);
+                let (error, limit) = (decimals.show(error_rad), decimals.show(limit_rad));
+                format!(
+                    "{} is {error} rad from its command (limit {limit}); `disable` and free the arm",
+                    name(joint)
+                )
+            }
             Self::BusPassive { bus } => format!(
                 "the controller of {} is still error-passive; check cable, termination and the power of the drives, or restart \
                  it: ip link set {1} down && ip link set {1} up",

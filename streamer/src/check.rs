@@ -182,6 +182,32 @@ mod tests {
         assert!(matches!(refused, Err(Rejection::Limit { joint: 0, .. })), "{refused:?}");
     }
 
+    /// An arm outside its limits on two joints: only what leads both of them inwards is a motion.
+    #[test]
+    fn check_of_a_motion_from_outside_lets_it_come_in_and_refuses_to_go_further() {
+        let rules = Rules::of(&robot());
+        let mut base_rad = BASE_RAD;
+        (base_rad[0], base_rad[5]) = (-3.25, 3.1600);
+        let led = |by_rad: [f64; 2]| {
+            let delta_rad = [by_rad[0], 0.0, 0.0, 0.0, 0.0, by_rad[1], 0.0, 0.0];
+            let stroke = Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad };
+            let trajectory = Trajectory::new(6, base_rad, &[stroke]).unwrap();
+            let (robot_digest, replaces) = (robot().digest, Replaces::Rest);
+            let checked =
+                CheckedTrajectory { trajectory_id: 7, generation: 1, robot_digest, replaces, trajectory };
+            rules.check(&TrajectoryMessage::new(&checked)).map(drop)
+        };
+        assert_eq!(led([0.3, -0.3]), Ok(()));
+        for (by_rad, offender) in [([-0.01, -0.3], 0), ([0.3, 0.001], 5), ([0.3, 0.0], 5), ([0.05, -0.3], 0)]
+        {
+            let refused = led(by_rad);
+            assert!(
+                matches!(refused, Err(Rejection::Limit { joint, .. }) if joint == offender),
+                "{by_rad:?}: {refused:?}"
+            );
+        }
+    }
+
     #[test]
     fn check_of_a_cut_is_refused_as_unsupported() {
         let cut = Replaces::Cut { trajectory_id: 3, at_s: 0.5 };

@@ -9,6 +9,9 @@
 //! Each joint is checked against the setpoint that it was last sent: with decimated setpoints, its last command is older than the
 //! cycle before. A command that is not sent is checked too, since the average holds for any step.
 //!
+//! A joint outside its range may stay or move inwards. What it is permitted narrows with every command that was sent to
+//! it, so that no sum of small steps leads outwards again.
+//!
 //! A setpoint that fails starts a brake: each joint to rest by its own closed-form law, from the last good state.
 use crate::cycle_state::{Braking, CycleState, Trip, TripKind};
 use crate::last_sent::{LastSent, Ledger};
@@ -16,7 +19,8 @@ use crate::track::RequestedSetpoint;
 use taustream_drivers::JointCommand;
 use taustream_motion::brake::{Brake, JointState};
 use taustream_motion::limits::Quantity;
-use taustream_motion::{JointLimits, MAX_JOINTS, Setpoint};
+use taustream_motion::range::PermittedRange;
+use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS, Setpoint};
 
 /// Relative excess over a limit that is taken for rounding.
 const SLACK: f64 = 1e-3;
@@ -108,6 +112,11 @@ pub struct Guard {
     limits: [JointLimits; MAX_JOINTS],
     joints: usize,
     period_s: f64,
+    permitted: [PermittedRange; MAX_JOINTS],
+    /// The drives were energised in the cycle before.
+    was_live: bool,
+    /// A brake has ended: it may have left the range.
+    released: bool,
     brake: Option<Running>,
 }
 
@@ -116,7 +125,8 @@ impl Guard {
     #[must_use]
     pub fn new(limits: [JointLimits; MAX_JOINTS], joints: usize, period_us: u32) -> Self {
         let period_s = f64::from(period_us.max(1)) * 1e-6;
-        Self { limits, joints, period_s, brake: None }
+        let permitted = limits.map(|limits| PermittedRange::new(&limits));
+        Self { limits, joints, period_s, permitted, was_live: false, released: false, brake: None }
     }
 
     /// Lets a setpoint pass, or replaces it by a braking command and says why.
@@ -130,6 +140,7 @@ impl Guard {
     ) -> GuardedCommand {
         let tick = cycle_state.tick.number;
         let mut past = *ledger.joints();
+        self.permit(requested, &past);
         if requested.restart && self.brake.is_none() {
             for (last, position_rad) in past.iter_mut().zip(&requested.setpoint.position_rad) {
                 // A pose that is not finite is none; the check of the setpoint itself will refuse it.
@@ -154,7 +165,25 @@ impl Guard {
     ///
     /// Real time: a store.
     pub fn release(&mut self) {
+        self.released |= self.brake.is_some();
         self.brake = None;
+    }
+
+    /// What each joint is permitted: up to where it was energised, or where a brake has left it, outside its range; from
+    /// there on no further outside than it was commanded last.
+    fn permit(&mut self, requested: &RequestedSetpoint, past: &[LastSent; MAX_JOINTS]) {
+        let energised_now = !(requested.live && self.was_live);
+        let joints = self.permitted.iter_mut().zip(&self.limits).zip(past);
+        for (((permitted, limits), last), requested_rad) in joints.zip(&requested.setpoint.position_rad) {
+            *permitted = if energised_now {
+                PermittedRange::around(limits, *requested_rad)
+            } else if self.released {
+                PermittedRange::around(limits, last.position_rad[0])
+            } else {
+                permitted.narrowed_to(last.position_rad[0])
+            };
+        }
+        (self.was_live, self.released) = (requested.live, false);
     }
 
     fn find_trip(
@@ -170,10 +199,10 @@ impl Guard {
             velocity_rad_s: *velocity,
             acceleration_rad_s2: *acceleration,
         });
-        let joints = states.zip(past).zip(&self.limits).take(self.joints);
-        joints.enumerate().find_map(|(joint, ((state, last), limits))| {
+        let joints = states.zip(past).zip(self.limits.iter().zip(&self.permitted)).take(self.joints);
+        joints.enumerate().find_map(|(joint, ((state, last), (limits, permitted)))| {
             let seen = differences(last, state.position_rad, tick, self.period_s);
-            let (kind, value, limit) = refuse(&state, last.position_rad[0], limits, &seen)?;
+            let (kind, value, limit) = refuse(&state, permitted.ends_rad(), &limits.stop, &seen)?;
             Some(Trip { joint, kind, value, limit })
         })
     }
@@ -226,21 +255,22 @@ impl Guard {
 type Refusal = (TripKind, f64, f64);
 
 /// The first thing that is wrong with one joint's setpoint.
-fn refuse(state: &JointState, last_rad: f64, limits: &JointLimits, seen: &Differences) -> Option<Refusal> {
+fn refuse(
+    state: &JointState,
+    [lowest, highest]: [f64; 2],
+    stop: &LimitSet,
+    seen: &Differences,
+) -> Option<Refusal> {
     let (q, v, a) = (state.position_rad, state.velocity_rad_s, state.acceleration_rad_s2);
     if let Some(value) = [q, v, a].into_iter().find(|x| !x.is_finite()) {
         return Some((TripKind::NotFinite, value, 0.0));
     }
-    let [lowest, highest] = limits.position_rad;
-    // A joint that rests outside its range (it was moved there by a brake, say) may stay; it may not move there.
-    let moved = (q - last_rad).abs() > 0.0;
-    if moved && q < lowest - POSITION_SLACK_RAD {
+    if q < lowest - POSITION_SLACK_RAD {
         return Some((TripKind::Limit(Quantity::Position), q, lowest));
     }
-    if moved && q > highest + POSITION_SLACK_RAD {
+    if q > highest + POSITION_SLACK_RAD {
         return Some((TripKind::Limit(Quantity::Position), q, highest));
     }
-    let stop = &limits.stop;
     let beyond = |value: f64, limit: f64| value.abs() > limit * (1.0 + SLACK) + RATE_SLACK;
     for (quantity, value, limit) in [
         (Quantity::Velocity, v, stop.velocity_rad_s),
@@ -263,11 +293,11 @@ fn refuse(state: &JointState, last_rad: f64, limits: &JointLimits, seen: &Differ
         return Some((TripKind::Inconsistent(Quantity::Acceleration), a, seen.acceleration_rad_s2));
     }
     let up = q + reach_rad(v, a, stop.acceleration_rad_s2, stop.jerk_rad_s3);
-    if moved && up > highest + POSITION_SLACK_RAD {
+    if up > highest + POSITION_SLACK_RAD {
         return Some((TripKind::CannotStop, up, highest));
     }
     let down = q - reach_rad(-v, -a, stop.acceleration_rad_s2, stop.jerk_rad_s3);
-    (moved && down < lowest - POSITION_SLACK_RAD).then_some((TripKind::CannotStop, down, lowest))
+    (down < lowest - POSITION_SLACK_RAD).then_some((TripKind::CannotStop, down, lowest))
 }
 
 /// How far a joint still goes in the positive direction under the hardest braking: jerk -j down to acceleration

@@ -6,6 +6,7 @@ use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
 use taustream_drivers::bring_up::{Refusal, explain_on, explain_refusal_on, explain_status};
 use taustream_messages::{BusFault, BusReport, Cause, Evidence};
+use taustream_motion::digits::Decimals;
 
 /// A bus as its settings name it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -160,7 +161,10 @@ impl Names {
             Evidence::Statusword(word) => format!(": {}", self.status_word(joint, word)),
             Evidence::Bus(bus_fault) => format!(": {}", self.bus_fault(cause, bus_fault)),
             Evidence::Value(value) => format!(": {value:.6}"),
-            Evidence::Amount { value, limit } => format!(": {value:.6} against {limit:.6}"),
+            Evidence::Amount { value, limit } => {
+                let decimals = Decimals::apart(&[value, limit], 6);
+                format!(": {} against {}", decimals.show(value), decimals.show(limit))
+            }
         };
         format!("{}{place}{evidence}", cause.reason.word())
     }

@@ -115,7 +115,14 @@ impl Supervisor {
                     self.speed_chosen = false;
                 }
                 self.step(Event::EnableRequested, cycle_state, actions);
-                Ok(AnswerReason::Enabling)
+                Ok(self.first_outside(&pose_rad).map_or(AnswerReason::Enabling, |joint| {
+                    AnswerReason::EnablingOutside {
+                        joint,
+                        position_rad: pose_rad[joint],
+                        range_rad: self.limits[joint].position_rad,
+                        percent: self.inwards_speed() * 100.0,
+                    }
+                }))
             }
             // All drives ready, yet still configuring: only their speeds are missing.
             Phase::Configuring => {
@@ -135,7 +142,7 @@ impl Supervisor {
     }
 
     /// The pose to energise at: the angle of each joint, or what its drive holds. Only if every joint answers,
-    /// is referenced, at rest, and inside its range.
+    /// is referenced, and at rest. A joint outside its range is energised, too: from there it may only move inwards.
     pub(crate) fn trusted_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(cycle_state) {
@@ -151,16 +158,12 @@ impl Supervisor {
                 let (reference_state, by_rad) = (resolved.reference_state, resolved.by_rad);
                 return Err(AnswerReason::NotReferenced { joint, reference_state, by_rad });
             }
-            let range_rad = self.limits[joint].position_rad;
             let holds = servo.state == DriveState::Adopted;
             let position_rad = if holds { servo.hold_position_rad } else { servo.position_rad };
             let (error_rad, limit_rad) =
                 ((position_rad - servo.position_rad).abs(), self.rules.tracking_error_rad_max);
             if error_rad.is_nan() || error_rad > limit_rad {
                 return Err(AnswerReason::Tracking { joint, error_rad, limit_rad });
-            }
-            if !(range_rad[0]..=range_rad[1]).contains(&position_rad) {
-                return Err(AnswerReason::OutOfRange { joint, position_rad, range_rad });
             }
             pose_rad[joint] = position_rad;
         }
@@ -223,7 +226,7 @@ impl Supervisor {
         if paused && !cycle_state.can_ramp {
             Err(AnswerReason::TooManyRamps)
         } else if paused {
-            actions.speed = Some(SpeedChange::Target(self.speed));
+            actions.speed = Some(SpeedChange::Target(self.speed()));
             self.step(Event::ResumeRequested, cycle_state, actions);
             Ok(AnswerReason::Resuming)
         } else if self.phase == Phase::Moving {
@@ -277,15 +280,22 @@ impl Supervisor {
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
         let moving = self.phase == Phase::Moving;
-        if moving && self.stalled_since.is_none() {
-            if !cycle_state.can_ramp {
-                return Err(AnswerReason::TooManyRamps);
-            }
-            actions.speed = Some(SpeedChange::Target((percent / 100.0).clamp(0.0, 1.0)));
+        let changes = moving && self.stalled_since.is_none();
+        if changes && !cycle_state.can_ramp {
+            return Err(AnswerReason::TooManyRamps);
         }
         self.speed = (percent / 100.0).clamp(0.0, 1.0);
         self.speed_chosen = true;
-        Ok(AnswerReason::SpeedSet { percent, moving })
+        if changes {
+            actions.speed = Some(SpeedChange::Target(self.speed()));
+        }
+        let limit = self.inwards_speed() * 100.0;
+        let held = self.outside && percent > limit;
+        Ok(if held {
+            AnswerReason::SpeedHeld { percent, limit }
+        } else {
+            AnswerReason::SpeedSet { percent, moving }
+        })
     }
 
     fn clear_fault(

@@ -6,7 +6,7 @@
 //! not known has none, and is not energised.
 use crate::answer::AnswerReason;
 use crate::cycle_state::CycleState;
-use taustream_arm::revolution::{self, OffsetError as Possible, PERIOD_SHARE_MAX};
+use taustream_arm::revolution::{self, OUTSIDE_RAD_MAX, OffsetError as Possible, PERIOD_SHARE_MAX};
 use taustream_arm::{Feedback, Servo, Settings};
 use taustream_drivers::{DriveState, JointCommand, Nanos};
 use taustream_messages::ReferenceState;
@@ -76,11 +76,9 @@ impl Rule {
             (Feedback::Wraps, recorded) => {
                 match (revolution::only_offset_rad(reading_rad, self.period_rad, self.range_rad), recorded) {
                     (Ok(offset_rad), _) => known(ReferenceState::Encoder, offset_rad),
-                    (Err(Possible::None), _) => known(ReferenceState::OutOfRange, 0.0),
+                    (Err(Possible::None), None) => known(ReferenceState::OutOfRange, 0.0),
                     (Err(Possible::Several), None) => known(ReferenceState::NoRecord, 0.0),
-                    (Err(Possible::Several), Some(recorded)) => {
-                        self.by_record(reading_rad, recorded, adopted)
-                    }
+                    (Err(_), Some(recorded)) => self.by_record(reading_rad, recorded, adopted),
                 }
             }
         }
@@ -100,7 +98,8 @@ impl Rule {
 
     /// The offset when the operator sets a joint that reads `reading_rad` to `at_rad`.
     fn stated(&self, joint: usize, reading_rad: f64, at_rad: f64) -> Result<f64, AnswerReason> {
-        if !(self.range_rad[0]..=self.range_rad[1]).contains(&at_rad) {
+        let [low_rad, high_rad] = self.range_rad;
+        if !(low_rad - OUTSIDE_RAD_MAX..=high_rad + OUTSIDE_RAD_MAX).contains(&at_rad) {
             return Err(AnswerReason::ReferenceOutside { joint, at_rad, range_rad: self.range_rad });
         }
         match self.feedback {

@@ -17,6 +17,8 @@ use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Pause, PauseReason, Phase};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
+/// Highest speed override of a motion that begins outside the position limits.
+const INWARDS_SPEED_MAX: f64 = 0.25;
 /// How long the drives may take to come to rest after a stall before the arm stays paused, s.
 const STALL_REST_S: f64 = 1.0;
 /// How long after a stall a drive that has lost its master may say so, s: some tell by their next heartbeat but one.
@@ -65,6 +67,8 @@ pub struct Supervisor {
     pub(crate) referencing: Referencing,
     pub(crate) torque_off: bool,
     pub(crate) speed: f64,
+    /// The commanded pose, or the start of the motion that runs, is outside the position limits.
+    pub(crate) outside: bool,
     /// The speed was set since the start.
     pub(crate) speed_chosen: bool,
     /// Each enable begins at the first speed: a joint falls when commands stop.
@@ -109,6 +113,7 @@ impl Supervisor {
             torque_off: false,
             speed_chosen: false,
             begins_slowly: settings.servos.iter().any(|servo| servo.limp_risk_acknowledged),
+            outside: false,
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
             stalled_since: None,
             stall_gap_s: 0.0,
@@ -155,10 +160,15 @@ impl Supervisor {
     pub fn paused_by(&self) -> Option<Pause> {
         self.paused_by
     }
-    /// The speed override, 0 to 1.
+    /// The speed override, 0 to 1: what was chosen, and no more than [`Self::inwards_speed`] from outside the limits.
     #[must_use]
     pub fn speed(&self) -> f64 {
-        self.speed
+        if self.outside { self.speed.min(self.inwards_speed()) } else { self.speed }
+    }
+    /// The speed override of a motion that begins outside the position limits.
+    #[must_use]
+    pub fn inwards_speed(&self) -> f64 {
+        (self.rules.first_speed_percent / 100.0).clamp(0.0, INWARDS_SPEED_MAX)
     }
     /// What is known of the feedback.
     #[must_use]
@@ -200,6 +210,7 @@ impl Supervisor {
     ) -> Actions {
         let mut actions = Actions::default();
         self.watch.observe(cycle_state);
+        self.note_outside(cycle_state);
         self.evaluate_motion(cycle_state, &mut actions);
         self.evaluate_stall(cycle_state, &mut actions);
         self.evaluate_drives(cycle_state, &mut actions);
@@ -213,6 +224,28 @@ impl Supervisor {
         self.release_record(cycle_state);
         self.follow_measured(cycle_state, &mut actions);
         actions
+    }
+
+    /// A motion that begins outside counts as outside until it ends.
+    fn note_outside(&mut self, cycle_state: &CycleState) {
+        let runs = matches!(
+            self.phase,
+            Phase::Moving
+                | Phase::Pausing
+                | Phase::Paused
+                | Phase::Stopping
+                | Phase::FastStopping
+                | Phase::Braking
+        );
+        if !runs {
+            self.outside = self.first_outside(&cycle_state.commanded_rad).is_some();
+        }
+    }
+
+    /// The first joint of a pose that is outside its range by more than the tolerance.
+    pub(crate) fn first_outside(&self, pose_rad: &JointArray) -> Option<usize> {
+        let mut joints = self.limits.iter().zip(pose_rad).take(self.joints);
+        joints.position(|(limits, position_rad)| !limits.is_inside(*position_rad))
     }
 
     /// Applies an event to the table, and what every entry into a phase brings with it.
@@ -332,7 +365,7 @@ impl Supervisor {
         let Some(since) = self.stalled_since else { return };
         if self.watch.is_at_rest() && cycle_state.can_ramp {
             self.stalled_since = None;
-            actions.speed = Some(SpeedChange::Target(self.speed));
+            actions.speed = Some(SpeedChange::Target(self.speed()));
         } else if cycle_state.tick.wake_time.since_s(since) > STALL_REST_S {
             self.stalled_since = None;
             self.step(Event::StalledLong, cycle_state, actions);

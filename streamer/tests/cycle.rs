@@ -12,6 +12,8 @@ mod bus_faults;
 #[path = "cycle_suite/faults.rs"]
 mod faults;
 mod harness;
+#[path = "cycle_suite/limits.rs"]
+mod limits;
 #[path = "cycle_suite/motion.rs"]
 mod motion;
 #[path = "cycle_suite/partial_send.rs"]

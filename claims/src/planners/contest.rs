@@ -96,13 +96,16 @@ impl Contest {
                 let (duration_s, checks) = (found.proof.duration_s, found.checks);
                 Ok(Some(Run { planning_s, duration_s, tip_m, travel_rad, checks }))
             }
-            Err(PlanError::NotFound { .. } | PlanError::Unproven { .. }) => Ok(None),
+            Err(PlanError::NotFound { .. } | PlanError::Unproven { .. } | PlanError::Untimed { .. }) => {
+                Ok(None)
+            }
             Err(
                 error @ (PlanError::BadPose { .. }
                 | PlanError::OutsideLimits { .. }
                 | PlanError::InCollision { .. }
                 | PlanError::InsideMargin { .. }
                 | PlanError::Shape { .. }
+                | PlanError::TooSlow { .. }
                 | PlanError::NoMasses(_)),
             ) => Err(Stop::Refused(format!("problem {}: {error}", problem.id))),
         }

@@ -119,6 +119,26 @@ impl ReplanArgs {
     }
 }
 
+const RECOVER_HELP: &str = "\
+Examples:
+  taustream enable && taustream recover --wait
+
+A joint that was pushed outside its position limits is energised there, but may only move inwards. This leads every such
+joint straight to the nearest angle inside, at no more than a quarter of the planned speed; the other joints stand still.
+`taustream replan` does the same before it goes on to its goal.";
+
+/// `taustream recover`
+#[derive(Args, Debug)]
+#[command(after_help = RECOVER_HELP)]
+pub(crate) struct RecoverArgs {
+    /// How long planning may take, ms.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    pub(crate) deadline_ms: u32,
+    /// Return only when the motion has ended.
+    #[arg(long)]
+    pub(crate) wait: bool,
+}
+
 const RUN_HELP: &str = "\
 Examples:
   taustream run move.json --wait

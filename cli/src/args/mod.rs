@@ -7,7 +7,7 @@ mod planners;
 
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
-    CommandArgs, DemoArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
+    CommandArgs, DemoArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
 };
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
@@ -154,6 +154,8 @@ pub(crate) enum Action {
     Check(CheckArgs),
     /// Request a motion to a new goal from the running planner, and print the receipt.
     Replan(ReplanArgs),
+    /// Lead joints that are outside their position limits back inside.
+    Recover(RecoverArgs),
     /// Execute a saved trajectory from its base pose, after verification.
     Run(RunArgs),
     /// Energise the drives and hold the pose.

@@ -2,6 +2,7 @@
 pub(crate) mod client;
 pub(crate) mod command;
 pub(crate) mod follow;
+pub(crate) mod recover;
 pub(crate) mod reference;
 pub(crate) mod replan;
 pub(crate) mod run;

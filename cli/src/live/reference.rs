@@ -109,7 +109,7 @@ fn confirmed(
         }
         let [at_rad] = line.possible_rad.as_slice() else {
             let why = match line.possible_rad.len() {
-                0 => "its feedback allows no angle inside its range".to_owned(),
+                0 => "its feedback allows no angle in or near its range".to_owned(),
                 _ => format!("its feedback allows {}", angles(&line.possible_rad)),
             };
             let text =
@@ -179,7 +179,7 @@ fn angles(angles_rad: &[f64]) -> String {
     let list: Vec<String> = angles_rad.iter().map(|angle| format!("{angle:.4}")).collect();
     let more = if angles_rad.len() == ANGLES_MAX { ", .." } else { "" };
     if list.is_empty() {
-        "no angle of its range".to_owned()
+        "no angle in or near its range".to_owned()
     } else {
         format!("{}{more} rad", list.join(", "))
     }

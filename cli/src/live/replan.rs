@@ -102,18 +102,28 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         seed: wanted.seed,
         planner: wanted.planner.name().to_owned(),
     };
-    form.progress(format_args!("planning, {:.1} s at most ..", f64::from(args.deadline_ms) * 1e-3));
-    let planned = ask_while(&client, &arm, &request, &mut || Ok(())).map_err(|failure| {
+    go(form, (&client, arm), &request, args.wait).map_err(|failure| {
         match args.goal().0.degrees_hint(&settings.robot) {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))
             }
             _ => failure,
         }
-    })?;
-    let executed = if args.wait {
+    })
+}
+
+/// Asks the planner, prints the receipt, and waits for the end of the motion if requested.
+pub(crate) fn go(
+    form: Form,
+    (client, arm): (&Client, ArmName),
+    request: &CheckedPlanRequest,
+    wait: bool,
+) -> Result<(), Failure> {
+    form.progress(format_args!("planning, {:.1} s at most ..", f64::from(request.deadline_ms) * 1e-3));
+    let planned = ask_while(client, &arm, request, &mut || Ok(()))?;
+    let executed = if wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
-        Some(follow(&client, &arm, planned.trajectory_id, say_pauses(form))?)
+        Some(follow(client, &arm, planned.trajectory_id, say_pauses(form))?)
     } else {
         None
     };

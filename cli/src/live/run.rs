@@ -13,6 +13,7 @@ use std::path::Path;
 use std::time::Duration;
 use taustream_arm::{Settings, TrajectoryFile};
 use taustream_messages::{Phase, Report};
+use taustream_motion::digits::Amount;
 use taustream_planner::send::{SendError, send_trajectory};
 use taustream_planner::verify;
 
@@ -147,8 +148,9 @@ fn check_ready(
             let base: Vec<String> =
                 file.trajectory.base_rad().iter().take(report.joints()).map(f64::to_string).collect();
             Err(Failure::Refused(format!(
-                "the arm is not at the trajectory's base pose: {} is {by_rad:.6} rad away; go there first: taustream replan --wait --goal \"{}\"",
+                "the arm is not at the trajectory's base pose: {} is {} rad away; go there first: taustream replan --wait --goal \"{}\"",
                 arm.joint(joint),
+                Amount(by_rad),
                 base.join(",")
             )))
         }

@@ -17,6 +17,13 @@ struct JointLine {
     stop_jerk_rad_s3: f64,
 }
 
+/// A pair of links with a margin of its own.
+#[derive(Debug, Serialize)]
+struct MarginLine {
+    links: [String; 2],
+    margin_m: f64,
+}
+
 /// One link that has shapes.
 #[derive(Debug, Serialize)]
 struct LinkLine {
@@ -101,6 +108,12 @@ pub(super) struct CheckedRobot {
     may_touch_by_srdf: Vec<[String; 2]>,
     /// Pairs that may not touch and do so in most random poses.
     often_touching: Vec<OftenTouching>,
+    /// What links that may not touch keep from each other.
+    link_margin_m: f64,
+    /// Pairs that keep another distance.
+    link_margins: Vec<MarginLine>,
+    /// Pairs that are never further apart than their margin; they keep more than 0 m.
+    always_close: Vec<[String; 2]>,
     /// How long a pause or stop from full speed takes.
     pause_s: f64,
 }
@@ -139,6 +152,14 @@ impl CheckedRobot {
             may_touch_by_file: names(&robot.allowed_by_file),
             may_touch_by_srdf: names(&robot.allowed_by_srdf),
             often_touching: often_touching(robot),
+            link_margin_m: robot.margins.all_m,
+            link_margins: robot
+                .margins
+                .pairs
+                .iter()
+                .map(|((a, b), margin_m)| MarginLine { links: [link(*a), link(*b)], margin_m: *margin_m })
+                .collect(),
+            always_close: names(&robot.close_by_rule),
             pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
         }
     }
@@ -188,6 +209,7 @@ impl fmt::Display for CheckedRobot {
                 100.0 * share
             )?;
         }
+        self.margins(f)?;
         write!(
             f,
             "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
@@ -197,6 +219,20 @@ impl fmt::Display for CheckedRobot {
 }
 
 impl CheckedRobot {
+    /// What links keep from each other.
+    fn margins(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "  other links keep more than {} m from each other (link_margin_m)", self.link_margin_m)?;
+        for MarginLine { links: [a, b], margin_m } in &self.link_margins {
+            let zero = if *margin_m > 0.0 { "" } else { ": they may come as near as touching" };
+            writeln!(f, "  {a}-{b} keep more than {margin_m} m{zero}")?;
+        }
+        contacts(
+            f,
+            "of these, links that are NEVER further apart than their margin (a [[link_margin]] of their own would say so)",
+            &self.always_close,
+        )
+    }
+
     /// What is solid, and what is not.
     fn geometry(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some([base, tip]) = &self.base_and_tip {

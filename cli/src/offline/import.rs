@@ -44,6 +44,7 @@ struct Summary {
     clearance_at_s: f64,
     clearance_between: [String; 2],
     unmodelled_links: Vec<String>,
+    clearance_required_m: f64,
     peak_use: Vec<PeakUse>,
 }
 
@@ -70,7 +71,11 @@ impl fmt::Display for Summary {
             writeln!(f, "note          {note}")?;
         }
         let [a, b] = &self.clearance_between;
-        writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        writeln!(
+            f,
+            "clearance     {}",
+            clearance_words((self.clearance_m, self.clearance_required_m), self.clearance_at_s, (a, b))
+        )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         write!(f, "{}", PeakTable(&self.peak_use))?;
         match &self.file {
@@ -242,6 +247,7 @@ fn summarise(robot: &Robot, imported: &Imported, source: Source, args: &ImportAr
         clearance_at_s: imported.proof.clearance_at_s,
         clearance_between: [a, b],
         unmodelled_links: robot.unmodelled_links.clone(),
+        clearance_required_m: imported.proof.clearance_required_m,
         peak_use: peak_use(robot, &imported.proof.peaks),
     }
 }

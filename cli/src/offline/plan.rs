@@ -35,6 +35,7 @@ struct Summary {
     clearance_at_s: f64,
     clearance_between: [String; 2],
     unmodelled_links: Vec<String>,
+    clearance_required_m: f64,
     peak_use: Vec<PeakUse>,
     goal_rad: Vec<f64>,
     /// Where the tip was to go, when a position was requested.
@@ -51,7 +52,11 @@ impl fmt::Display for Summary {
             writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
         }
         let [a, b] = &self.clearance_between;
-        writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        writeln!(
+            f,
+            "clearance     {}",
+            clearance_words((self.clearance_m, self.clearance_required_m), self.clearance_at_s, (a, b))
+        )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
             writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off, in the pose")?;
@@ -179,6 +184,7 @@ fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &P
         clearance_at_s: found.proof.clearance_at_s,
         clearance_between: [a, b],
         unmodelled_links: robot.unmodelled_links.clone(),
+        clearance_required_m: found.proof.clearance_required_m,
         peak_use: peak_use(robot, &found.proof.peaks),
         goal_rad,
         target_m: position.map(|(target_m, _)| target_m),

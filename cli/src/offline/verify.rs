@@ -2,12 +2,14 @@
 use crate::args::MotionArgs;
 use crate::arm;
 use crate::failure::Failure;
-use crate::output::Form;
+use crate::output::{Form, note};
 use serde::Serialize;
 use std::fmt;
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, RobotJoint};
+use taustream_motion::digits::Decimals;
 use taustream_motion::limits::Peaks;
+use taustream_planner::enter::Entry;
 use taustream_planner::verify;
 
 /// Why every trajectory that passed the file's door is smooth: any sum of strokes with n >= 4 is C3.
@@ -25,6 +27,7 @@ struct Answer {
     clearance_at_s: f64,
     clearance_between: [String; 2],
     unmodelled_links: Vec<String>,
+    clearance_required_m: f64,
     continuity: &'static str,
     peak_use: Vec<PeakUse>,
 }
@@ -34,7 +37,11 @@ impl fmt::Display for Answer {
         let [a, b] = &self.clearance_between;
         writeln!(f, "verified      {} for robot {}", self.trajectory, self.robot)?;
         writeln!(f, "duration      {:.3} s, {}", self.duration_s, counted(self.strokes, "stroke"))?;
-        writeln!(f, "clearance     {}", clearance_words(self.clearance_m, self.clearance_at_s, (a, b)))?;
+        writeln!(
+            f,
+            "clearance     {}",
+            clearance_words((self.clearance_m, self.clearance_required_m), self.clearance_at_s, (a, b))
+        )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         writeln!(f, "continuity    {}", self.continuity)?;
         write!(f, "{}", PeakTable(&self.peak_use))
@@ -50,6 +57,9 @@ pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
     let proof = verify(&robot, &scene, &file.trajectory)
         .map_err(|v| Failure::Refused(format!("{}: not safe: {v}", path.display())))?;
     let (a, b) = proof.clearance_between;
+    if let Some(entry) = Entry::of(&robot, file.trajectory.base_rad()) {
+        note(format_args!("note: {}", entry.words));
+    }
     form.print(&Answer {
         verified: true,
         robot: robot.name.clone(),
@@ -60,6 +70,7 @@ pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
         clearance_at_s: proof.clearance_at_s,
         clearance_between: [a, b],
         unmodelled_links: robot.unmodelled_links.clone(),
+        clearance_required_m: proof.clearance_required_m,
         continuity: CONTINUITY,
         peak_use: peak_use(&robot, &proof.peaks),
     })
@@ -122,9 +133,16 @@ impl fmt::Display for PeakTable<'_> {
 }
 
 /// Clearance as text; infinite when nothing can collide.
-pub(crate) fn clearance_words(clearance_m: f64, at_s: f64, between: (&str, &str)) -> String {
+pub(crate) fn clearance_words(
+    (clearance_m, required_m): (f64, f64),
+    at_s: f64,
+    between: (&str, &str),
+) -> String {
     if clearance_m.is_finite() {
-        format!("{clearance_m:.4} m at t = {at_s:.3} s, between {} and {}", between.0, between.1)
+        let decimals = Decimals::apart(&[clearance_m, required_m], 4);
+        let (clearance, required) = (decimals.show(clearance_m), decimals.show(required_m));
+        let (a, b) = between;
+        format!("{clearance} m at t = {at_s:.3} s, between {a} and {b} (more than {required} m required)")
     } else {
         "unlimited: nothing in this scene can collide".to_owned()
     }

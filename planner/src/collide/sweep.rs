@@ -66,6 +66,8 @@ impl SweepRules {
         bracket_m: f64::INFINITY,
         first_contact: false,
     };
+    /// What the pose at an end of an edge must keep beyond every pair, so that an edge to it can be proven.
+    pub const EDGE_END_M: f64 = Self::EDGE.extra_m + Self::EDGE.resolution_m;
     /// For the final proof.
     pub const PROOF: Self =
         Self { extra_m: 0.0, resolution_m: 1e-6, checks_max: 400_000, bracket_m: 1e-3, first_contact: true };

@@ -20,7 +20,8 @@ use crate::timing::{SLACK, scale_to_fit};
 use crate::verify::{Proof, Violation, verify};
 use fit::{Candidate, candidates, scaled};
 use taustream_arm::{Robot, Scene};
-use taustream_motion::limits::{LimitViolation, POSITION_TOLERANCE_RAD, Peaks, check_motion};
+use taustream_motion::digits::OutsideRange;
+use taustream_motion::limits::{LimitViolation, Peaks, check_motion};
 use taustream_motion::profile::KError;
 use taustream_motion::spline::SplineError as CubicError;
 use taustream_motion::stroke::END_S_MAX;
@@ -129,9 +130,8 @@ pub enum ImportError {
     Seventh(#[from] SeventhError),
     /// A position that the joint cannot have.
     #[error(
-        "joint {} ({name}) is at {value_rad:.4} rad at t = {at_s:.3} s, {:.4} rad outside [{:.4}, {:.4}]; import a motion \
-         that stays inside",
-        joint + 1, (range_rad[0] - value_rad).max(value_rad - range_rad[1]), range_rad[0], range_rad[1]
+        "at t = {at_s:.3} s joint {} ({name}) at {}; import a motion that stays inside",
+        joint + 1, OutsideRange { position_rad: *value_rad, range_rad: *range_rad }
     )]
     OutsideLimits {
         /// Zero-based index of the joint.
@@ -295,9 +295,8 @@ fn check(robot: &Robot, reference: &Reference, tolerance_rad: f64) -> Result<(),
         let position_rad = reference.at(at_s);
         for (joint, (described, value_rad)) in robot.joints.iter().zip(position_rad).enumerate() {
             let range_rad = described.limits.position_rad;
-            let [low, high] = range_rad;
             // A NaN is inside of nothing.
-            if !(value_rad >= low - POSITION_TOLERANCE_RAD && value_rad <= high + POSITION_TOLERANCE_RAD) {
+            if !described.limits.is_inside(value_rad) {
                 return Err(ImportError::OutsideLimits {
                     joint,
                     name: name(joint),

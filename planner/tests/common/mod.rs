@@ -153,7 +153,7 @@ pub(crate) fn assert_safe(robot: &Robot, scene: &Scene, motion: &Trajectory, goa
         let q = at(i);
         let (spheres_m, links_m) = ur5_distances_m(robot, scene, &q);
         assert!(spheres_m > scene.margin_m, "{who}: {spheres_m} m from a sphere at {} s", i * STEP_S);
-        assert!(links_m > 0.0, "{who}: links {links_m} m apart at {} s", i * STEP_S);
+        assert!(links_m > robot.margins.all_m, "{who}: links {links_m} m apart at {} s", i * STEP_S);
         let next = at(i + 1.0);
         for (j, joint) in robot.joints.iter().enumerate() {
             let speed = (next[j] - q[j]).abs() / STEP_S;

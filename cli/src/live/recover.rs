@@ -1,0 +1,46 @@
+//! `taustream recover`: leads joints that are outside their position limits back inside.
+use super::client::Client;
+use super::replan::go;
+use crate::args::RecoverArgs;
+use crate::arm::{self, ArmName};
+use crate::failure::Failure;
+use crate::output::Form;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use taustream_messages::plan::{CheckedPlanRequest, When};
+use taustream_planner::PlannerKind;
+use taustream_planner::enter::Entry;
+
+/// Nothing had to be done.
+#[derive(Debug, Serialize)]
+struct Inside {
+    arm: String,
+    accepted: bool,
+}
+
+impl fmt::Display for Inside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "every joint of arm `{}` is inside its position limits; nothing to do", self.arm)
+    }
+}
+
+/// Plans from the commanded pose to the nearest one inside, and prints the receipt.
+pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Result<(), Failure> {
+    let settings = arm::settings(settings)?;
+    let arm = ArmName::of(&settings);
+    let client = Client::join(&arm.name)?;
+    let (report, _) = client.report()?;
+    let Some(entry) = Entry::of(&settings.robot, &report.command_rad) else {
+        return form.print(&Inside { arm: arm.name, accepted: false });
+    };
+    let request = CheckedPlanRequest {
+        joints: settings.robot.joints.len(),
+        goal_rad: entry.pose_rad,
+        when: When::AtOnce,
+        deadline_ms: args.deadline_ms,
+        seed: 1,
+        planner: PlannerKind::default().name().to_owned(),
+    };
+    go(form, (&client, arm), &request, args.wait)
+}
