@@ -99,6 +99,6 @@ mod tests {
             assert!(bytes(Path::new(path)).is_none(), "{path}");
         }
         assert!(bytes(Path::new("builtin:/settings/../robots/./ur5.toml")).is_some());
-        assert!(crate::Robot::load(Path::new("builtin:/robots/none.toml")).is_err());
+        assert!(Robot::load(Path::new("builtin:/robots/none.toml")).is_err());
     }
 }

@@ -8,7 +8,6 @@
 use crate::args::{Action, Cli};
 use crate::arm;
 use crate::failure::Failure;
-use clap::Parser;
 use rustix::fs::{MemfdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 use std::env;

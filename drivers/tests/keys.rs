@@ -3,6 +3,12 @@
 //! A reader names the keys that it knows when it meets one that it does not know, and says what a value must be when it
 //! meets a wrong one. So the page is made by giving unknown keys and wrong values to the readers; only the sentence on a
 //! key's meaning is written here. `TAUSTREAM_UPDATE_DOCS=1 cargo test -p taustream-drivers --test keys` writes the page.
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::wildcard_enum_match_arm,
+    reason = "helpers of a test fail by panicking"
+)]
 #[path = "keys/meanings.rs"]
 mod meanings;
 

@@ -4,7 +4,7 @@ use common::{assert_safe, pose, random_spheres, scene, sphere, ur5, ur5_distance
 use std::path::PathBuf;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, LimitSet};
 use taustream_planner::budget::Budget;
 use taustream_planner::optimize::{METHODS, Problem, Setup, by_name};
 use taustream_planner::refine::{PathProblem, refine};

@@ -215,6 +215,15 @@ impl AnswerReason {
                     name(joint)
                 )
             }
+            other => other.refused_by_state(names),
+        }
+    }
+
+    /// Refusals because of what buses, drives and the disk are in.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
+    fn refused_by_state(self, names: &Names) -> String {
+        let name = |joint| names.joint(joint);
+        match self {
             Self::BusPassive { bus } => format!(
                 "the controller of {} is still error-passive; check cable, termination and the power of the drives, or restart \
                  it: ip link set {1} down && ip link set {1} up",

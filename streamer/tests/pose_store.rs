@@ -185,7 +185,7 @@ fn request_is_answered_by_the_thread_with_what_is_wrong() {
     let (mut requester, recorder) = write_ahead::pair();
     let pose_store = PoseStore::start(scratch.store(&settings, recorder)).unwrap();
     let joint = JointNow { position_rad: 0.5, offset_rad: 2.5, reference_state: ReferenceState::Operator };
-    let mut ask = |requester: &mut Requester| {
+    let ask = |requester: &mut Requester| {
         let number = requester.request(&[joint; MAX_JOINTS]);
         loop {
             if let Some(answer) = requester.answer(number) {

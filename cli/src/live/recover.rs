@@ -42,5 +42,5 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Re
         seed: 1,
         planner: PlannerKind::default().name().to_owned(),
     };
-    go(form, (&client, arm), &request, args.wait)
+    go(form, (&client, &settings), &request, args.wait)
 }

@@ -10,6 +10,7 @@ use crate::words::receipt_sentence;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::{Outcome, PlanRequest, Receipt, Report};
@@ -102,7 +103,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         seed: wanted.seed,
         planner: wanted.planner.name().to_owned(),
     };
-    go(form, (&client, arm), &request, args.wait).map_err(|failure| {
+    go(form, (&client, &settings), &request, args.wait).map_err(|failure| {
         match args.goal().0.degrees_hint(&settings.robot) {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))
@@ -115,11 +116,12 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
 /// Asks the planner, prints the receipt, and waits for the end of the motion if requested.
 pub(crate) fn go(
     form: Form,
-    (client, arm): (&Client, ArmName),
+    (client, settings): (&Client, &Settings),
     request: &CheckedPlanRequest,
     wait: bool,
 ) -> Result<(), Failure> {
     form.progress(format_args!("planning, {:.1} s at most ..", f64::from(request.deadline_ms) * 1e-3));
+    let arm = ArmName::of(settings);
     let planned = ask_while(client, &arm, request, &mut || Ok(()))?;
     let executed = if wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
@@ -127,7 +129,7 @@ pub(crate) fn go(
     } else {
         None
     };
-    let unmodelled_links = settings.robot.unmodelled_links;
+    let unmodelled_links = settings.robot.unmodelled_links.clone();
     form.print(&Answer { arm: arm.name, planned, unmodelled_links, executed })
 }
 

@@ -184,7 +184,7 @@ fn check_prints_allowed_contacts_and_pause_times() {
     let text = scratch.run(&["check", "vcan6"]);
     for word in [
         "MAY TOUCH",
-        "link3-link5",
+        "link4-link6",
         "a pause or stop from full speed takes",
         "VIRTUAL",
         "without torque",
@@ -195,7 +195,7 @@ fn check_prints_allowed_contacts_and_pause_times() {
     let json = scratch.run(&["check", "vcan6", "--json"]).json();
     assert_eq!(json["servos"].as_array().map(Vec::len), Some(6));
     assert!(json["robot"]["pause_s"].as_f64().is_some_and(|s| s > 0.0 && s < 5.0), "{json}");
-    for shipped in ["ur5", "open", "pillars", "shelf"] {
+    for shipped in ["ur5", "open", "pillars", "shelf", "bracket"] {
         scratch.run(&["check", shipped]).done();
     }
 }

@@ -1,4 +1,5 @@
 //! The JSON answers beside the page that documents them, and text that a terminal must not get.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail by panicking")]
 use crate::common::{HOME, Scratch, stroke, trajectory};
 use std::collections::BTreeSet;
 use std::fs;

@@ -265,10 +265,13 @@ mod tests {
         }
     }
 
+    /// Objects of the drive, and the object that is named.
+    type Case<'c> = (&'c [(u16, u8, u32)], (u16, u8));
+
     #[test]
     fn drives_that_contradict_the_settings_are_refused_by_object_and_numbers() {
         let minus = |counts: i32| (-counts).cast_unsigned();
-        let cases: [(&[(u16, u8, u32)], (u16, u8)); 12] = [
+        let cases: [Case<'_>; 12] = [
             (&[(0x608F, 1, 65_536), (0x608F, 2, 1)], (0x608F, 1)),
             (&[(0x608F, 1, 131_072), (0x608F, 2, 4)], (0x608F, 1)),
             (&[(0x608F, 1, 131_072), (0x608F, 2, 0)], (0x608F, 1)),

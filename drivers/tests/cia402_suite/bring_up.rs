@@ -351,7 +351,9 @@ fn observing_starts_a_node_in_nmt_stopped_without_a_reset() {
 /// Method: the arm of these settings counts 131072 a motor revolution behind 101 revolutions.
 #[test]
 fn bring_up_of_a_drive_that_counts_otherwise_is_refused_by_object_and_numbers() {
-    let cases: [(&[(u16, u8, u32)], &str, [f64; 2]); 6] = [
+    /// Objects of the drive, the object that is named, and its two numbers.
+    type Case = (&'static [(u16, u8, u32)], &'static str, [f64; 2]);
+    let cases: [Case; 6] = [
         (&[(0x608F, 1, 65_536), (0x608F, 2, 1)], "0x608F", [65_536.0, 131_072.0]),
         (&[(0x6091, 1, 202), (0x6091, 2, 4)], "0x6091", [50.5, 101.0]),
         (&[(0x6092, 1, 360_000), (0x6092, 2, 1)], "0x6092", [360_000.0, 13_238_272.0]),

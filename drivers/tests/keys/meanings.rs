@@ -13,6 +13,21 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ),
     ("Robot files: joint", "One table for each joint, base to tip; with a URDF in any order."),
     ("Robot files: allowed_contacts", "Pairs of links that may touch: `[[\"link3\", \"link5\"]]`."),
+    (
+        "Robot files: unmodelled_links",
+        "Links that move and have no collision shape, acknowledged: every summary names them.",
+    ),
+    ("Robot files: base_capsules", "Shape of the base, with rows: up to 8 capsules in the base's frame."),
+    ("Robot files: base_capsules[].from_m", "One end of the capsule's axis."),
+    ("Robot files: base_capsules[].to_m", "The other end; equal ends make a ball."),
+    ("Robot files: base_capsules[].radius_m", "Radius of the capsule."),
+    (
+        "Robot files: joint[].link_capsules",
+        "Shape of the link behind the joint: up to 8 capsules in the frame of the row, instead of `link_radius_m`.",
+    ),
+    ("Robot files: joint[].link_capsules[].from_m", "One end of the capsule's axis."),
+    ("Robot files: joint[].link_capsules[].to_m", "The other end; equal ends make a ball."),
+    ("Robot files: joint[].link_capsules[].radius_m", "Radius of the capsule."),
     ("Robot files: payload", "Mass at the tip, for the energy of motions."),
     ("Robot files: gravity_m_s2", "Gravity in the base's frame; without it `[0, 0, -9.80665]`."),
     ("Robot files: payload.mass_kg", "Mass of the payload, kg."),
@@ -29,7 +44,7 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "Robot files: joint[].link_radius_m",
-        "Radius of the capsule between this frame's origin and the previous one; 0: no shape.",
+        "Radius of the capsule between this frame's origin and the previous one; 0: no shape. Or `link_capsules`.",
     ),
     (
         "Robot files: joint[].link_mass_kg",
@@ -191,14 +206,6 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: servo[].after_stall",
         "How the motion goes on after a stall that the drives do not bridge; `go-on` for MIT motors, else `freeze`.",
     ),
-    (
-        "Settings files: servo[].limp_risk_acknowledged",
-        "true: the joint falls when commands stop, its servo cannot hold, and its owner knows it; false.",
-    ),
-    (
-        "Settings files: servo[].overruled_objects",
-        "CiA 402: objects of the drive that are not compared with these settings, for example `[0x6091]`; none.",
-    ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
@@ -254,10 +261,6 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Watchdog on setpoints, 0 for none; `cycle.drive_watchdog_ms`.",
     ),
     ("Settings files: simulator.boot_ms", "Time from power-up to the first message; 20."),
-    (
-        "Settings files: simulator.objects",
-        "Other values of objects of the drives, for example `[\"joint=3,object=0x6091:01,value=50\"]`; none.",
-    ),
     ("Settings files: simulator.step_us", "Step of the simulated mechanics, us; 250."),
     (
         "Settings files: simulator.motor_position_range_rad",

@@ -187,8 +187,15 @@ impl Rows {
     /// The time in which something moves (s).
     pub(super) fn moving_s(&self) -> f64 {
         let rows = 0..self.t_s.len().saturating_sub(1);
-        let moves =
-            |row: &usize| (0..MAX_JOINTS).any(|joint| self.end(*row, joint) != self.end(row + 1, joint));
+        let moved = |from: f64, to: f64| (from - to).abs() > 0.0;
+        let moves = |row: &usize| {
+            (0..MAX_JOINTS).any(|joint| {
+                self.end(*row, joint)
+                    .into_iter()
+                    .zip(self.end(row + 1, joint))
+                    .any(|(from, to)| moved(from, to))
+            })
+        };
         rows.filter(moves).map(|row| self.chord(row, 0).0).sum()
     }
 
@@ -224,10 +231,13 @@ fn spline_slopes(chords: &[(f64, f64)]) -> Vec<f64> {
     slopes
 }
 
+/// Length and slope of a chord.
+type Chord = (f64, f64);
+
 /// The slope at a row, held back by the chords on both sides of it.
 fn held_back(
     slope: f64,
-    (before, after): (Option<(f64, f64)>, Option<(f64, f64)>),
+    (before, after): (Option<Chord>, Option<Chord>),
     at_rad: f64,
     [low_rad, high_rad]: [f64; 2],
 ) -> f64 {

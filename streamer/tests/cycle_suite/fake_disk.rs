@@ -147,12 +147,14 @@ impl Opened {
         let result = state.step(changes);
         // A power cut falls before or after what the operation does.
         let cut_after = state.dead && state.operations.is_multiple_of(2);
-        if result.is_err() && !cut_after {
-            return Err(result.unwrap_err());
+        match result {
+            Err(error) if !cut_after => Err(error),
+            result => {
+                let State { inodes, folders, .. } = &mut *state;
+                let done = does(inodes, folders.get_mut(&self.path).unwrap(), &mut self.newest);
+                result.map(|()| done)
+            }
         }
-        let State { inodes, folders, .. } = &mut *state;
-        let done = does(inodes, folders.get_mut(&self.path).unwrap(), &mut self.newest);
-        result.map(|()| done)
     }
 }
 
