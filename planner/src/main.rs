@@ -13,7 +13,7 @@ use std::time::Duration;
 use taustream_arm::daemon::Manager;
 use taustream_arm::log::start_log;
 use taustream_arm::{Faults, Kind, Scene, Settings, find};
-use taustream_messages::files::ArmFiles;
+use taustream_messages::files::{ArmFiles, Claim};
 use taustream_messages::service::Wire;
 use taustream_planner::arguments::Arguments;
 use taustream_planner::service::{Ending, OpenError, Service};
@@ -61,7 +61,7 @@ fn run(settings: &Settings) -> Result<()> {
     let mut said_ready = false;
     let mut failures = 0;
     while !stop.load(Ordering::Relaxed) {
-        match serve(settings, &runtime, &stop, &mut said_ready) {
+        match serve(settings, &runtime, &stop, &claim, &mut said_ready) {
             Ok(Ending::Stopped) => break,
             Ok(Ending::NamesGone) => failures = 0,
             Err(e) => {
@@ -88,10 +88,13 @@ fn serve(
     settings: &Settings,
     runtime: &Path,
     stop: &Arc<AtomicBool>,
+    claim: &Claim,
     said_ready: &mut bool,
 ) -> Result<Ending, OpenError> {
     let wire = Wire::join(&settings.name, "taustream-planner", runtime)?;
     let mut service = Service::open(&wire, &settings.robot, &settings.scene, stop)?;
+    // A planner that is killed from now on leaves nothing that the next one would have to clear under a living streamer.
+    claim.started();
     if !*said_ready {
         *said_ready = true;
         let (name, robot, obstacles) = (&settings.name, &settings.robot.name, settings.scene.obstacles.len());

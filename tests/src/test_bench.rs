@@ -5,6 +5,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde::Deserialize;
 use std::fs::{self, File};
 use std::io::Write;
+use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::thread::sleep;
@@ -149,7 +150,7 @@ pub struct TestBench {
     pub planner: Process,
     recorder: Process,
     reports: ReportSubscriber,
-    _wire: Wire,
+    wire: Wire,
 }
 
 /// Where a stage finds things.
@@ -222,7 +223,7 @@ impl TestBench {
             planner,
             recorder,
             reports,
-            _wire: wire,
+            wire,
         };
         bench.await_phase(Phase::Disabled)?;
         Ok(bench)
@@ -269,7 +270,14 @@ impl TestBench {
         let args = ["--settings", settings, "--link", "socketcan", "--state-dir", state];
         let program = self.programs.join("taustream-streamer");
         self.streamer = Process::start(&program, &args, &self.dir, "streamer-again")?;
-        self.streamer.await_words("taustream-streamer ready")
+        self.streamer.await_words("taustream-streamer ready")?;
+        // A streamer that was killed young clears the names of the services at its next start; readers join anew.
+        let wire = Wire::join(&self.settings.name, "scenario", &taustream_arm::runtime::directory()?)?;
+        let reports = wire.report_subscriber()?;
+        // Closed in earnest, the old ones would delete files of the same names that the streamer has made meanwhile.
+        let _kept = ManuallyDrop::new(std::mem::replace(&mut self.reports, reports));
+        let _kept = ManuallyDrop::new(std::mem::replace(&mut self.wire, wire));
+        Ok(())
     }
 
     /// What the recorder has written so far, in whole lines.
