@@ -82,6 +82,6 @@ mod tests {
     fn receipt_sentence_names_the_joint_of_a_rejection() {
         let rejected = Outcome::Rejected(Rejection::NotAtBase { joint: 1, by_rad: 0.25 });
         let text = receipt_sentence(Some(&rejected), &arm());
-        assert!(text.contains("0.250000 rad") && text.contains("`lift`"), "{text}");
+        assert!(text.contains("0.2500 rad") && text.contains("`lift`"), "{text}");
     }
 }

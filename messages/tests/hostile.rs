@@ -103,7 +103,7 @@ fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
         (Corrupted::Delta(f64::NAN), "delta_rad is not finite"),
         (Corrupted::Duration(0.0), "at least 0.001 s"),
         (Corrupted::Start(-1.0), "start_s is -1"),
-        (Corrupted::Base(f64::INFINITY), "base_rad of joint 0"),
+        (Corrupted::Base(f64::INFINITY), "base_rad of joint 1"),
         (Corrupted::Replaces(5), "replaces code 5"),
     ];
     for (corrupted, words) in cases {

@@ -26,7 +26,7 @@ fn imported_table_verifies_and_its_deviation_is_that_of_the_samples() {
     let table = scratch.run(&["sample", "a.json", "--rate-hz", "200"]);
     fs::write(scratch.dir.join("a.csv"), table.done()).unwrap();
     let again = scratch.run(&["import", "a.csv", "--robot", "ur5", "--scene", "open", "-o", "b.json"]);
-    for word in ["imported", "deviation     at most", "ignored columns: v1_rad_s", "written to    b.json"] {
+    for word in ["imported", "deviation     at most", "ignored columns: j1_rad_s3", "written to    b.json"] {
         assert!(again.done().contains(word), "no `{word}`: {}", again.out);
     }
     scratch.run(&["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "b.json"]).done();

@@ -82,7 +82,7 @@ fn trajectory_names_its_robot_and_degrees_have_their_unit() {
     assert_eq!(fs::read_to_string(scratch.dir.join("other.svg")).unwrap(), svg, "limits and views are drawn");
     let elsewhere = trajectory(&stroke("10", "0", "0.1")).replace("\"ur5\"", "\"../ur5\"");
     scratch.write("path.json", &elsewhere);
-    scratch.run(&["verify", "path.json", "--scene", "open"]).refused(2, &["path.json", "--robot"]);
+    scratch.run(&["verify", "path.json", "--scene", "open"]).refused(2, &["path.json", "robot = \"../ur5\""]);
     scratch.write("none.json", &elsewhere.replace("../ur5", "nobody"));
     scratch.run(&["verify", "none.json", "--scene", "open"]).refused(2, &["nobody", "--robot"]);
 

@@ -206,6 +206,20 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: servo[].after_stall",
         "How the motion goes on after a stall that the drives do not bridge; `go-on` for MIT motors, else `freeze`.",
     ),
+    (
+        "Settings files: servo[].limp_risk_acknowledged",
+        "true: the joint falls when commands stop, its servo cannot hold, and its owner knows it; false.",
+    ),
+    (
+        "Settings files: servo[].overruled_objects",
+        "CiA 402: objects of the drive that are not compared with these settings, for example `[0x6091]`; none.",
+    ),
+    (
+        "Settings files: simulator.objects",
+        "Other values of objects of the drives, for example `[\"joint=3,object=0x6091:01,value=50\"]`; none.",
+    ),
+    ("Robot files: link_margin_m", "Least distance of links that may not touch; 0.003."),
+    ("Robot files: link_margin", "A pair of links with a margin of its own: `links = [\"link1\", \"link4\"]`, `margin_m`."),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
