@@ -33,7 +33,9 @@ fn distance_m(world: &World, q: &JointArray) -> f64 {
 fn near_pillar(robot: &Robot, scene: &Scene, gap_m: f64) -> JointArray {
     let world = World::new(robot, scene).expect("builds");
     let at = |turn: f64| pose([-0.5 + turn, -0.7, 0.7, -1.57, -1.57, 0.0]);
-    let (mut free, mut near) = (0.0, 0.5);
+    let turns = (0..=100).map(|i| f64::from(i) * 0.01);
+    let nearest = turns.min_by(|a, b| distance_m(&world, &at(*a)).total_cmp(&distance_m(&world, &at(*b))));
+    let (mut free, mut near) = (0.0, nearest.expect("turns"));
     assert!(distance_m(&world, &at(free)) > gap_m && distance_m(&world, &at(near)) < gap_m);
     for _ in 0..60 {
         let middle = 0.5 * (free + near);

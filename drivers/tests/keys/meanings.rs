@@ -219,7 +219,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Other values of objects of the drives, for example `[\"joint=3,object=0x6091:01,value=50\"]`; none.",
     ),
     ("Robot files: link_margin_m", "Least distance of links that may not touch; 0.003."),
-    ("Robot files: link_margin", "A pair of links with a margin of its own: `links = [\"link1\", \"link4\"]`, `margin_m`."),
+    (
+        "Robot files: link_margin",
+        "A pair of links with a margin of its own: `links = [\"link1\", \"link4\"]`, `margin_m`.",
+    ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
     ("Settings files: servo[].mode", "Damiao: control mode."),

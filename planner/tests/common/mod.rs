@@ -1,12 +1,12 @@
 //! What the planner's tests share: shipped files, random scenes, and an independent check of motions.
 //!
 //! The check knows nothing of the planner: its own matrices from the Denavit-Hartenberg rows, its own point-to-segment
-//! distances, dense samples. It sees spheres and capsules only.
+//! distances, dense samples. It sees spheres and the capsules of the robot file only.
 #![expect(dead_code, reason = "every test binary includes this file and uses a part of it")]
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
-use taustream_arm::{Obstacle, Robot, Scene, Settings, Shape};
+use taustream_arm::{LinkShape, Obstacle, Robot, Scene, Settings, Shape};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 use taustream_planner::rng::SeededRng;
 
@@ -61,7 +61,6 @@ const UR5: [[f64; 3]; 6] = [
     [0.0, -std::f64::consts::FRAC_PI_2, 0.094_65],
     [0.0, 0.0, 0.082_3],
 ];
-pub(crate) const UR5_RADIUS_M: f64 = 0.06;
 
 type Matrix = [[f64; 4]; 4];
 
@@ -75,11 +74,11 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     c
 }
 
-/// Origins of the seven frames of a UR5.
-pub(crate) fn ur5_origins_m(q: &JointArray) -> Vec<[f64; 3]> {
+/// The seven frames of a UR5, base first.
+fn ur5_frames(q: &JointArray) -> Vec<Matrix> {
     let mut frame: Matrix =
         [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-    let mut origins = vec![[0.0; 3]];
+    let mut frames = vec![frame];
     for (angle, [a, alpha, d]) in q.iter().zip(UR5) {
         let ((st, ct), (sa, ca)) = (angle.sin_cos(), alpha.sin_cos());
         let row = [
@@ -89,9 +88,37 @@ pub(crate) fn ur5_origins_m(q: &JointArray) -> Vec<[f64; 3]> {
             [0.0, 0.0, 0.0, 1.0],
         ];
         frame = product(&frame, &row);
-        origins.push([frame[0][3], frame[1][3], frame[2][3]]);
+        frames.push(frame);
     }
-    origins
+    frames
+}
+
+/// A capsule of a link, in the base frame.
+struct Capsule {
+    link: usize,
+    ends_m: [[f64; 3]; 2],
+    radius_m: f64,
+}
+
+/// The shapes of the links in a pose; those of the base have link 0.
+fn ur5_capsules(robot: &Robot, q: &JointArray) -> Vec<Capsule> {
+    let frames = ur5_frames(q);
+    let place = |frame: &Matrix, p: [f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|i| frame[i][0] * p[0] + frame[i][1] * p[1] + frame[i][2] * p[2] + frame[i][3])
+    };
+    let capsule = |shape: &LinkShape| {
+        let (radius_m, length_m) = match shape.shape {
+            Shape::Capsule { radius_m, length_m } => (radius_m, length_m),
+            Shape::Sphere { radius_m } => (radius_m, 0.0),
+            _ => panic!("capsules only"),
+        };
+        let end = |side: f64| {
+            let p = shape.pose * Point3::new(0.0, 0.0, side * length_m);
+            place(&frames[shape.frame], [p.x, p.y, p.z])
+        };
+        Capsule { link: shape.link, ends_m: [end(-0.5), end(0.5)], radius_m }
+    };
+    robot.shapes.iter().map(capsule).collect()
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -119,22 +146,24 @@ fn segments_m(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Least distances of a UR5 in a pose: to spheres, and between links 1-3, 1-4, .. that may not touch.
+/// Least distances of a UR5 in a pose: of its moving links to spheres, and between links that may not touch.
 pub(crate) fn ur5_distances_m(robot: &Robot, scene: &Scene, q: &JointArray) -> (f64, f64) {
-    let o = ur5_origins_m(q);
+    let capsules = ur5_capsules(robot, q);
     let (mut spheres_m, mut links_m) = (f64::INFINITY, f64::INFINITY);
     for obstacle in &scene.obstacles {
         let Shape::Sphere { radius_m } = obstacle.shape else { panic!("spheres only") };
         let c = obstacle.pose.translation.vector;
-        for link in o.windows(2) {
-            let d = point_to_segment_m([c.x, c.y, c.z], link[0], link[1]);
-            spheres_m = spheres_m.min(d - radius_m - UR5_RADIUS_M);
+        for capsule in capsules.iter().filter(|capsule| capsule.link > 0) {
+            let [from, to] = capsule.ends_m;
+            let d = point_to_segment_m([c.x, c.y, c.z], from, to);
+            spheres_m = spheres_m.min(d - radius_m - capsule.radius_m);
         }
     }
-    for a in 1..=6 {
-        for b in a + 1..=6 {
-            if !robot.may_touch(a, b) {
-                links_m = links_m.min(segments_m(o[a - 1], o[a], o[b - 1], o[b]) - 2.0 * UR5_RADIUS_M);
+    for (i, a) in capsules.iter().enumerate() {
+        for b in capsules.iter().skip(i + 1) {
+            if a.link != b.link && !robot.may_touch(a.link, b.link) {
+                let ([a0, a1], [b0, b1]) = (a.ends_m, b.ends_m);
+                links_m = links_m.min(segments_m(a0, a1, b0, b1) - a.radius_m - b.radius_m);
             }
         }
     }
