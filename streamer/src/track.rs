@@ -214,6 +214,13 @@ impl Track {
             .any(|(joint, (position_rad, _))| ledger.awaits(joint, *position_rad, tick));
         cycle_state.end_reached &= all_sent;
         cycle_state.at_rest &= all_sent;
+        let all_unreachable =
+            cycle_state.unreachable.iter().take(self.joints).all(|unreachable| *unreachable);
+        if self.running.is_some() && all_unreachable {
+            // Joints that stand beside the path stay there: no setpoint can bring them back.
+            let now_s = self.seconds(self.next.axis);
+            cycle_state.at_rest = self.scale.requested() <= 0.0 && self.scale.is_settled(now_s);
+        }
         cycle_state.commanded_rad = *ledger.commanded_rad();
         let mut trial = self.scale;
         cycle_state.can_ramp = trial.request(1.0, self.seconds(self.sent.axis)).is_ok();

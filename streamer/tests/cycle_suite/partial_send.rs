@@ -100,3 +100,47 @@ fn pose_after_a_partly_taken_batch_is_the_one_that_each_drive_has() {
         assert_eq!(commanded_rad[joint], last_rad, "joint {joint}");
     }
 }
+
+/// Goal: a bus that takes a part of a cycle and then nothing ends in a fault. Joints stand beside each other then, and no
+/// setpoint can bring them together, so nobody waits for that. Seen on a real vcan0: fast-stopping for ever.
+#[test]
+fn bus_that_takes_a_part_and_then_nothing_ends_in_a_fault() {
+    let part: [Takes; 3] = [
+        |tick| {
+            if tick % 1_000 < 500 {
+                7
+            } else if tick % 1_000 == 500 {
+                2
+            } else {
+                0
+            }
+        },
+        |tick| {
+            if tick % 1_000 < 500 {
+                7
+            } else if tick % 1_000 == 500 {
+                4
+            } else {
+                0
+            }
+        },
+        |tick| {
+            if tick % 1_000 < 500 {
+                7
+            } else if tick % 1_000 == 500 {
+                6
+            } else {
+                0
+            }
+        },
+    ];
+    for (row, takes) in part.into_iter().enumerate() {
+        let mut harness = CycleHarness::new();
+        harness.move_it();
+        harness.run(300);
+        harness.script(|w| w.takes = Some(takes));
+        harness.run(1_200);
+        let cause = harness.cause().unwrap_or_else(|| panic!("row {row}: nobody noticed"));
+        assert_eq!((harness.phase(), cause.reason), (Phase::Fault, FaultReason::BusFault), "row {row}");
+    }
+}
