@@ -150,7 +150,7 @@ pub enum ImportError {
         "joint {} ({name}) jumps by {by_rad:.4} rad before t = {at_s:.3} s, at {speed_rad_s:.1} rad/s, {:.0} times its limit \
          of {limit_rad_s} rad/s{}",
         joint + 1, speed_rad_s / limit_rad_s,
-        if is_turn(*by_rad) { "; that is a full revolution: unwrap the angles" }
+        if is_turn(*by_rad) { "; that is a full revolution, a whole turn: unwrap the angles" }
         else { "; correct the table there, or split it" }
     )]
     Jump {
