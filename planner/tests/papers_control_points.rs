@@ -17,9 +17,8 @@ fn paper_cases_leave_both_ends_free_and_repeat() {
         let case = case(seed);
         assert_eq!((case.scene.obstacles.len(), &self::case(seed)), (3, &case));
         for end in case.ends_rad {
-            let (spheres_m, _) = common::ur5_distances_m(&ur5(), &case.scene, &end);
-            // The helper takes the link's radius off; the paper's limit is 0.1 m from the bare segment.
-            let bare_m = spheres_m + common::UR5_RADIUS_M;
+            // The paper's limit is 0.1 m from the bare segment.
+            let bare_m = common::ur5_segments_to_spheres_m(&case.scene, &end);
             assert!(bare_m >= 0.1 - 1e-9, "seed {seed}: an end is {bare_m} m from a sphere");
         }
     }

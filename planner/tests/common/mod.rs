@@ -93,6 +93,25 @@ fn ur5_frames(q: &JointArray) -> Vec<Matrix> {
     frames
 }
 
+/// Origins of the seven frames of a UR5.
+pub(crate) fn ur5_origins_m(q: &JointArray) -> Vec<[f64; 3]> {
+    ur5_frames(q).iter().map(|frame| [frame[0][3], frame[1][3], frame[2][3]]).collect()
+}
+
+/// Least distance of the bare segments between the origins to spheres, as the papers model an arm.
+pub(crate) fn ur5_segments_to_spheres_m(scene: &Scene, q: &JointArray) -> f64 {
+    let origins = ur5_origins_m(q);
+    let mut least_m = f64::INFINITY;
+    for obstacle in &scene.obstacles {
+        let Shape::Sphere { radius_m } = obstacle.shape else { panic!("spheres only") };
+        let c = obstacle.pose.translation.vector;
+        for link in origins.windows(2) {
+            least_m = least_m.min(point_to_segment_m([c.x, c.y, c.z], link[0], link[1]) - radius_m);
+        }
+    }
+    least_m
+}
+
 /// A capsule of a link, in the base frame.
 struct Capsule {
     link: usize,
