@@ -73,6 +73,7 @@ fn goal_at_a_limit_is_reached_inside_and_left_again() {
 #[test]
 fn start_outside_is_led_inwards_first_and_said() {
     let robot = ur5();
+    let mut led = 0;
     for seed in 0..12 {
         let mut rng = SeededRng::new(seed, 900);
         let mut start = pose(HOME);
@@ -88,7 +89,9 @@ fn start_outside_is_led_inwards_first_and_said() {
         let plan = match replan(&robot, &open(), &start, &goal) {
             Ok(plan) => plan,
             // The stretched pose may touch itself.
-            Err(PlanError::InCollision { .. } | PlanError::InsideMargin { .. }) => continue,
+            Err(
+                PlanError::InCollision { .. } | PlanError::InsideMargin { .. } | PlanError::NotFound { .. },
+            ) => continue,
             Err(e) => panic!("seed {seed}: {e}"),
         };
         assert!(plan.how.starts_with("led inwards first, from outside the limits: "), "{}", plan.how);
@@ -99,7 +102,9 @@ fn start_outside_is_led_inwards_first_and_said() {
         assert!(verify(&robot, &open(), &plan.trajectory).is_ok(), "seed {seed}");
         let end = plan.trajectory.end_rad();
         assert!(end.iter().zip(&goal).all(|(e, g)| (e - g).abs() < 1e-9), "seed {seed}");
+        led += 1;
     }
+    assert!(led >= 4, "{led} of 12 were led inwards");
 }
 
 #[test]
