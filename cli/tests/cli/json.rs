@@ -24,6 +24,7 @@ fn answers_have_the_keys_of_the_page_and_a_schema() {
     let scratch = Scratch::new();
     scratch.write("move.json", &trajectory(&stroke("10", "0", "0.1")));
     scratch.write("move.csv", &scratch.run(&["sample", "move.json", "--rate-hz", "50"]).out.clone());
+    scratch.write("balls.toml", "[[sphere]]\ncenter_m = [0.9, 0.9, 0.9]\nradius_m = 0.1\n");
     let cases: &[(&str, &[&str])] = &[
         (
             "plan",
@@ -42,7 +43,7 @@ fn answers_have_the_keys_of_the_page_and_a_schema() {
         ("import", &["import", "move.csv", "--robot", "ur5", "--scene", "open"]),
         ("sample", &["sample", "move.json", "--at", "0"]),
         ("plot", &["plot", "move.json"]),
-        ("cost", &["cost", "move.json", "--scene", "open"]),
+        ("cost", &["cost", "move.json", "--scene", "balls.toml"]),
         ("verify", &["verify", "move.json", "--scene", "open"]),
         ("check, a trajectory", &["check", "move.json"]),
         ("check, a scene", &["check", "pillars"]),
