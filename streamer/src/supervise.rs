@@ -538,6 +538,10 @@ impl Supervisor {
         }
         let mut pose_rad = cycle_state.commanded_rad;
         for (joint, servo) in self.servos(cycle_state) {
+            if cycle_state.unreachable[joint] {
+                // What was measured there is old.
+                continue;
+            }
             // What holds keeps its own target: following a sag would creep.
             let at_rad = if servo.hold_position_rad.is_finite() {
                 servo.hold_position_rad
