@@ -129,7 +129,9 @@ fn ur5_capsules(robot: &Robot, q: &JointArray) -> Vec<Capsule> {
         let (radius_m, length_m) = match shape.shape {
             Shape::Capsule { radius_m, length_m } => (radius_m, length_m),
             Shape::Sphere { radius_m } => (radius_m, 0.0),
-            _ => panic!("capsules only"),
+            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } | Shape::Hull { .. } => {
+                panic!("capsules only")
+            }
         };
         let end = |side: f64| {
             let p = shape.pose * Point3::new(0.0, 0.0, side * length_m);
