@@ -380,7 +380,11 @@ mod tests {
     fn allowed_contacts_of_the_file_hold_in_both_orders() {
         let text =
             std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml"));
-        let text = text.unwrap().replacen("[[\"link4\", \"link6\"]]", "[[\"link6\", \"link3\"]]", 1);
+        let text = text.unwrap().replacen(
+            "[[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
+            "[[\"link6\", \"link3\"]]",
+            1,
+        );
         let robot = Robot::from_toml(Path::new("r.toml"), &text).unwrap();
         assert_eq!(robot.allowed_by_file, [(3, 6)]);
         assert!(

@@ -165,35 +165,35 @@ const ROBOT_CASES: &[Case] = &[
     (Robot, "stop = {", "stop = { velocity_rad_s = 4.0, ", "joint[0].stop.velocity_rad_s", "no such key"),
     (
         Robot,
-        "allowed_contacts = [[\"link4\", \"link6\"]]",
+        "allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
         "allowed_contacts = [[\"link3\", \"link9\"]]",
         "allowed_contacts[0]",
         "\"link6\"",
     ),
     (
         Robot,
-        "allowed_contacts = [[\"link4\", \"link6\"]]",
+        "allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
         "allowed_contacts = [[\"link3\", \"link3\"]]",
         "allowed_contacts[0]",
         "two different links",
     ),
     (
         Robot,
-        "allowed_contacts = [[\"link4\", \"link6\"]]",
+        "allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
         "allowed_contacts = [[\"link3\"]]",
         "allowed_contacts[0]",
         "two different links",
     ),
     (
         Robot,
-        "allowed_contacts = [[\"link4\", \"link6\"]]",
+        "allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
         "allowed_contacts = [[\"base\", \"link2\"], [\"link2\", \"base\"]]",
         "allowed_contacts[1]",
         "each pair once",
     ),
     (
         Robot,
-        "allowed_contacts = [[\"link4\", \"link6\"]]",
+        "allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]",
         "allowed_contacts = \"all\"",
         "allowed_contacts",
         "a list of pairs",
@@ -360,8 +360,8 @@ fn joint_count_beside_one_to_eight_is_refused() {
     let text = Robot.good_text();
     let last = &text[text.rfind("[[joint]]").unwrap()..];
     // Pairs of links need their links.
-    let head =
-        text[..text.find("[[joint]]").unwrap()].replace("allowed_contacts = [[\"link4\", \"link6\"]]", "");
+    let head = text[..text.find("[[joint]]").unwrap()]
+        .replace("allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]", "");
     for count in [0, 9, 40] {
         let tables: Vec<String> = (0..count).map(|i| last.replace("wrist_3", &format!("j{i}"))).collect();
         let faults = faults_of(Robot, &format!("{head}{}", tables.join("\n")));
