@@ -298,7 +298,7 @@ fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
     }
 }
 
-/// The three motion limits, each from the table or else from the URDF. Nothing that moves metal has another default.
+/// The three motion limits, each from the table or else from the URDF. Nothing that moves an arm has another default.
 fn read_motion(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
     const EXPECTED: &str = "a table of velocity_rad_s, acceleration_rad_s2, jerk_rad_s3";
     let stated =

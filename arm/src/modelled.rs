@@ -9,7 +9,7 @@ use crate::{Fault, Faults, Robot};
 use parry3d_f64::math::Pose;
 use taustream_motion::chain;
 
-/// A centre of mass further outside than this is told; files round.
+/// A centre of mass further outside than this is reported; files round.
 const OUTSIDE_M: f64 = 1e-3;
 
 /// A link that the robot file lists as having no shape.

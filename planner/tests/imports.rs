@@ -195,7 +195,7 @@ fn coarse_table_of_a_verified_motion_is_imported_nearly_at_its_own_speed() {
     }
 }
 
-/// Velocities of another unit or joint are found out by the rows themselves, and left out aloud.
+/// Velocities of another unit or joint are found out by the rows themselves, and left out with a message.
 #[test]
 fn velocities_that_do_not_fit_their_rows_are_not_used() {
     let robot = ur5();

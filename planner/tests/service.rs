@@ -329,15 +329,26 @@ fn service_second_planner_of_an_arm_is_refused() {
     });
 }
 
-/// Walls that no way round the base leads past, and a goal behind them: a search that continues until its deadline.
-fn walled() -> Scene {
-    let wall = |name: &str, y: f64| {
+/// A goal with the upper arm upright, its middle at (-0.056, 0.119) m.
+const RINGED: [f64; 6] = [-2.7, -1.5708, 1.4, -1.57, -1.57, 0.0];
+
+/// A closed ring round the upper arm at [`RINGED`]: an arm cannot get into it, so a search continues until its deadline.
+fn ringed() -> Scene {
+    let side = |name: &str, [x, y]: [f64; 2], [width, depth]: [f64; 2]| {
         format!(
-            "[[box]]\nname = \"{name}\"\ncenter_m = [0.0, {y}, 0.5]\nsize_m = [0.06, 1.4, 4.0]\nrpy_rad = [0.0, 0.0, 0.0]\n"
+            "[[box]]\nname = \"{name}\"\ncenter_m = [{}, {}, 0.3]\nsize_m = [{width}, {depth}, 0.04]\nrpy_rad = [0.0, 0.0, 0.0]\n",
+            x - 0.056,
+            y + 0.119
         )
     };
-    let text = format!("margin_m = 0.01\n{}{}", wall("left", 0.86), wall("right", -0.86));
-    Scene::from_toml(std::path::Path::new("walled.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
+    let sides = [
+        side("left", [0.0, 0.108], [0.236, 0.02]),
+        side("right", [0.0, -0.108], [0.236, 0.02]),
+        side("front", [0.108, 0.0], [0.02, 0.236]),
+        side("back", [-0.108, 0.0], [0.02, 0.236]),
+    ];
+    let text = format!("margin_m = 0.01\n{}", sides.concat());
+    Scene::from_toml(std::path::Path::new("ringed.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 /// Goal: no client waits for a motion without a client. Method: a request with a deadline far beyond the timeout of the test is
@@ -346,12 +357,10 @@ fn walled() -> Scene {
 #[test]
 fn service_planning_ends_when_its_requester_goes_and_others_are_answered_meanwhile() {
     let played = Played::new(Phase::Holding);
-    with_service_in(&walled(), "cancelled", &played, |arm, _| {
+    with_service_in(&ringed(), "cancelled", &played, |arm, _| {
         let wire = join(arm, "client");
         let client = wire.plan_client().expect("port");
-        let mut behind = AWAY;
-        behind[0] -= 3.1;
-        let hard = CheckedPlanRequest { deadline_ms: 60_000, ..request(When::AtOnce, "rrt", pose(behind)) };
+        let hard = CheckedPlanRequest { deadline_ms: 60_000, ..request(When::AtOnce, "rrt", pose(RINGED)) };
         let pending = client.send_copy(PlanRequest::from(&hard)).expect("sent");
         let busy = loop {
             let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());

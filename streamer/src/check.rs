@@ -164,7 +164,7 @@ mod tests {
             (Corrupted::Delta(f64::NAN), "delta_rad is not finite"),
             (Corrupted::Duration(0.0), "duration_s is 0"),
             (Corrupted::Start(-1.0), "start_s is -1"),
-            (Corrupted::Base(f64::INFINITY), "base_rad of joint 0"),
+            (Corrupted::Base(f64::INFINITY), "base_rad of joint 1"),
             (Corrupted::Base(9.0), "limit of joint 1"),
             (Corrupted::Replaces(7), "replaces code 7"),
             (Corrupted::Digest(1), "wrong robot"),

@@ -271,7 +271,7 @@ def main():
             moved[len(mine) // 2, 1, 2] += 1e-4
             shrunk = [(faces[:, :, :] * 0.99, rounding) for faces, rounding in links[name]]
             if not differ(moved, other) or not differ(mine[1:], other) or outside_m(shrunk, other) <= TOLERANCE_M:
-                raise SystemExit(f"{what}, {file.name}: a doctored mesh was not seen")
+                raise SystemExit(f"{what}, {file.name}: a corrupted mesh was not seen")
     for what, facets in counted.items():
         print(f"{what}: {FILES_A_KIND} files, {facets} facets, the same on both sides")
     print(f"as links: nothing of any file stands out of its bodies (worst {worst_m:.1e} m)\nMESHES OK")

@@ -35,7 +35,7 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// A piece with a meaning. Names come from files, so nothing in them reaches the terminal that it would obey.
+    /// A piece with a meaning. Names come from files, so nothing in them reaches the terminal that it would execute.
     pub(crate) fn new(text: impl Into<String>, tone: Tone) -> Self {
         let text = text.into();
         Self { text: printable(&text).into_owned(), tone }

@@ -11,7 +11,8 @@ use crate::margin_exit::is_clear;
 use crate::objective::Objective;
 use crate::optimize::{METHODS, Method, Reading, Refusal};
 use crate::plan::{
-    CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, plan_until,
+    CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside,
+    plan_until,
 };
 use crate::verify::Contact;
 use crate::world::World;
@@ -201,7 +202,7 @@ pub fn one_try(
     let search = Search { world, budget: &budget, start_rad, target_m, reach_m, reading };
     let Some(rough) = search.run(method, seed)? else { return Ok(None) };
     let target_m = Vector3::from(target_m);
-    let pose = polish(robot, &rough, &target_m);
+    let pose = nearest_inside(robot, &polish(robot, &rough, &target_m));
     let is_there = error_m(robot, &pose, &target_m) <= ERROR_M_MAX;
     Ok(is_there.then(|| (pose, time_s(robot, &start_rad, &pose))))
 }
@@ -248,7 +249,7 @@ impl Poses {
                 break;
             };
             poses.tries += 1;
-            let pose = polish(robot, &rough, &target_m);
+            let pose = nearest_inside(robot, &polish(robot, &rough, &target_m));
             let error = error_m(robot, &pose, &target_m);
             nearest_m = nearest_m.min(error);
             if error > ERROR_M_MAX {
