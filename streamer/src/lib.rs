@@ -3,7 +3,7 @@
 //! The *real-time thread* runs [`cycle::run_cycle`], one straight line, and nothing else. Commands are taken by two threads that
 //! wait for nobody: [`commands`] out of shared memory, [`stop_socket`] from a socket that needs none; the latter feeds the
 //! watchdog. [`publisher`] takes trajectories, publishes reports and receipts and words the log; [`ports`] watches the names in
-//! shared memory; [`memory`] keeps the last pose and [`recorder`] the cycle log on disk, each on a thread of its own, as the log's
+//! shared memory; [`pose_store`] keeps the last pose and [`recorder`] the cycle log on disk, each on a thread of its own, as the log's
 //! lines are written (`taustream_arm::log`). Threads meet only in bounded queues of plain values and preallocated boxes; those of the
 //! real-time thread are wait-free, so it never waits, allocates or frees.
 //!

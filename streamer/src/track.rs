@@ -70,7 +70,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track that holds the zero pose until [`Self::set_pose`].
+    /// A track that holds the zero pose until [`Self::commit`].
     #[must_use]
     pub fn new(settings: &Settings) -> Self {
         let (limits, joints) = (settings.robot.limits(), settings.robot.joints.len());

@@ -76,9 +76,13 @@ def stl_ascii(rng, parts, one):
 def obj(rng, parts, style):
     lines = ["# by a test", "mtllib none.mtl"]
     count, normals = 0, 0
+    if style == "negative":
+        # trimesh counts back from the end of the file, not from the line: all corners first, so that both are the same.
+        lines += ["v " + " ".join(f"{c:.9e}" for c in corner) for corners, _ in parts for corner in corners]
     for i, (corners, faces) in enumerate(parts):
         lines.append({"objects": f"o part{i}", "groups": f"g part{i} side", "materials": f"usemtl m{i}"}.get(style, "s off"))
-        lines += ["v " + " ".join(f"{c:.9e}" for c in corner) for corner in corners]
+        if style != "negative":
+            lines += ["v " + " ".join(f"{c:.9e}" for c in corner) for corner in corners]
         if style == "normals":
             lines += ["vt 0.5 0.5", "vn 0 0 1"]
             normals += 1
@@ -86,7 +90,7 @@ def obj(rng, parts, style):
             lines += [f"l {count + 1} {count + 2}", f"p {count + 1}"]
         for face in faces:
             if style == "negative":
-                words = [str(k - len(corners)) for k in face]
+                words = [str(count + k - sum(len(corners) for corners, _ in parts)) for k in face]
             elif style == "normals":
                 words = [f"{count + k + 1}/{normals}/{normals}" for k in face]
             else:
@@ -120,10 +124,12 @@ def dae(rng, parts, style, unit=1.0):
             f'</accessor></technique_common></source><vertices id="v{i}"><input semantic="POSITION" source="#s{i}"/></vertices>'
             f"{body}</mesh></geometry>"
         )
-        turn = [rng.uniform(-1, 1) for _ in range(3)]
+        # pycollada takes the axis as it is; ours makes it a unit vector. Given one, both must agree.
+        turn = numpy.array([rng.uniform(-1, 1) for _ in range(3)])
+        turn /= numpy.linalg.norm(turn)
         shift = " ".join(f"{rng.uniform(-0.3, 0.3) / unit:.6f}" for _ in range(3))
         nodes.append(
-            f'<node id="node{i}"><translate>{shift}</translate><rotate>{turn[0]:.4f} {turn[1]:.4f} {turn[2]:.4f} '
+            f'<node id="node{i}"><translate>{shift}</translate><rotate>{turn[0]:.12f} {turn[1]:.12f} {turn[2]:.12f} '
             f'{rng.uniform(-170, 170):.3f}</rotate><node id="inner{i}"><matrix>0 -1 0 {0.1 / unit:.6f} 1 0 0 0 0 0 0.5 0 0 0 0 1</matrix>'
             f'<instance_geometry url="#g{i}"/></node><node id="again{i}"><scale>0.5 0.7 0.9</scale>'
             f'<instance_geometry url="#g{i}"/></node></node>'

@@ -2,7 +2,7 @@
 //!
 //! Every block of shell commands in a Markdown file says in its fence how it is tested: `sh run` blocks are run here, by
 //! `bash`, in an empty directory, with the built programs on the path; `sh checkout` blocks hold commands of the source
-//! tree that another step runs, and each of their lines must be one of [`CHECKOUT_LINES`]. A block that says neither fails
+//! tree that another step runs, and each of their lines must be one of the lines listed in this file. A block that says neither fails
 //! the run, and so does a command in an indented block, which cannot say it.
 use anyhow::{Context, Result, bail, ensure};
 use std::fmt::Write as _;

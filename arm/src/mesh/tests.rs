@@ -90,6 +90,15 @@ fn mesh_of_several_solids_objects_or_groups_has_the_facets_of_all() {
     }
 }
 
+/// Goal: a negative index counts back from its line, not from the end of the file.
+#[test]
+fn obj_negative_indices_count_back_from_the_line_that_they_stand_in() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 3 0 0\nv 4 0 0\nv 4 1 0\nf -3 -2 -1\n";
+    let mesh = read_bytes("obj", text.as_bytes(), 1.0).unwrap();
+    let corners = mesh.triangles.iter().map(|t| t.map(|corner| mesh.vertices_m[corner as usize].x));
+    assert_eq!(corners.collect::<Vec<_>>(), [[0.0, 1.0, 1.0], [3.0, 4.0, 4.0]]);
+}
+
 #[test]
 fn dae_is_read_with_its_nodes_and_unit() {
     for text in [DAE.to_owned(), format!("\u{feff}{DAE}"), DAE.replace("collada.org", "example.org")] {

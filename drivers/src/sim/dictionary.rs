@@ -10,7 +10,7 @@ use crate::codec::error_text;
 /// Longest value in bytes: text.
 pub(crate) const VALUE_MAX: usize = 64;
 
-/// An SDO abort code ([`words`]).
+/// An SDO abort code (CiA 301, 7.2.4.3.17).
 pub(crate) type AbortCode = u32;
 
 /// A value as it stands on the wire, least significant byte first.
