@@ -148,7 +148,13 @@ impl CommandLog {
             ),
         };
         let Some(line) = self.seen.take(line, now) else { return };
-        if is_warning { warn!("{line}") } else { info!("{line}") }
+        if let CommandEvent::Answered(answer) = event {
+            info!(accepted = answer.accepted, "{line}");
+        } else if is_warning {
+            warn!("{line}");
+        } else {
+            info!("{line}");
+        }
     }
 }
 

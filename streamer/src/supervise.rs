@@ -53,6 +53,7 @@ pub struct Supervisor {
     pub(crate) rules: Supervision,
     pub(crate) limits: [JointLimits; MAX_JOINTS],
     pub(crate) joints: usize,
+    period_s: f64,
     tolerated_s: f64,
     stall_resume_s: f64,
     watchdog_s: f64,
@@ -79,7 +80,7 @@ pub struct Supervisor {
     stall_gap_s: f64,
     /// Why the arm is paused, or about to be.
     paused_by: Option<Pause>,
-    /// The newest gap that the drives do not bridge: when it ended, and how long it was, s.
+    /// The newest stall of this loop that the drives do not bridge: when it ended, and how long it was, s.
     stall: Option<(Nanos, f64)>,
     pub(crate) resetting_since: Option<Nanos>,
     /// Failed buses are being restarted, for this `clear-fault`.
@@ -96,11 +97,13 @@ impl Supervisor {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
         let (cycle, rules) = (&settings.cycle, &settings.supervision);
+        let period_s = f64::from(cycle.period_us) * 1e-6;
         Self {
             rules: *rules,
             limits,
             joints,
-            tolerated_s: f64::from(cycle.tolerated_gap_periods) * f64::from(cycle.period_us) * 1e-6,
+            period_s,
+            tolerated_s: f64::from(cycle.tolerated_gap_periods) * period_s,
             stall_resume_s: f64::from(cycle.stall_resume_ms) * 1e-3,
             watchdog_s: f64::from(cycle.drive_watchdog_ms) * 1e-3,
             watch: Watch::new(settings),
@@ -343,8 +346,10 @@ impl Supervisor {
     fn evaluate_stall(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         let energised = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep)
             && self.phase != Phase::Fault;
-        if cycle_state.gap_s > self.tolerated_s {
-            self.stall = Some((cycle_state.tick.wake_time, cycle_state.gap_s));
+        // Not the gap between setpoints: a failed bus makes one, too, while this loop runs.
+        let loop_gap_s = (cycle_state.tick.skipped + 1) as f64 * self.period_s;
+        if loop_gap_s > self.tolerated_s {
+            self.stall = Some((cycle_state.tick.wake_time, loop_gap_s));
         }
         if energised && cycle_state.gap_s > self.watchdog_s {
             let cause = Cause::new(FaultReason::Stall).amount(cycle_state.gap_s, self.watchdog_s);

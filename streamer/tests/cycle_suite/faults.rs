@@ -319,6 +319,25 @@ fn drive_that_lost_its_master_in_a_stall_of_the_loop_is_not_blamed() {
     }
 }
 
+/// Goal: the time that a failed bus was silent is no stall of this loop: the drive's own words stay.
+#[test]
+fn drive_that_lost_its_master_while_its_bus_was_down_is_no_stall_of_the_loop() {
+    let mut harness = CycleHarness::new();
+    harness.enable();
+    harness.run(100);
+    harness.script(|w| w.link_fault = Some(LinkFault::Down));
+    harness.run_until(Phase::Fault, 40);
+    harness.run(600);
+    harness.script(|w| w.link_fault = None);
+    assert!(harness.queue_request(Command::ClearFault).is_none());
+    assert!(harness.restore_buses());
+    assert!(harness.step_to_answer().accepted);
+    harness.script(|w| (w.forced[3], w.lost_master) = (Some(DriveState::Fault), Some(3)));
+    harness.run_until(Phase::Fault, 400);
+    let cause = harness.cause().unwrap();
+    assert_eq!((cause.reason, cause.joint), (FaultReason::DriveFault, Some(3)), "{cause:?}");
+}
+
 /// Goal: a drive's fault shows what tripped: its statusword then, and its code even when that comes later.
 #[test]
 fn drive_fault_keeps_the_statusword_that_tripped_and_gets_its_code_later() {

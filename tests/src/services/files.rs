@@ -15,11 +15,25 @@ ExecStart=/bin/bash /opt/probe.sh
 WatchdogSec=0
 Restart=no
 ";
+/// What `taustream doctor` asks for: frames must not wait behind ordinary programs on their way through the kernel.
+const CAN_SOFTIRQ_UNIT: &str = "\
+[Service]
+Type=oneshot
+ExecStart=/bin/sh /opt/can-softirq.sh
+[Install]
+WantedBy=multi-user.target
+";
+const CAN_SOFTIRQ: &str = r#"
+for thread in /proc/[0-9]*; do
+    case "$(cat "$thread/comm")" in ksoftirqd/*) chrt --fifo --pid 90 "${thread#/proc/}" ;; esac
+done
+"#;
 /// The pose at power-up of the arm's settings: arm up, elbow bent, clear of everything.
 const START: &str = "start_rad = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]";
 
 /// Units of Debian and of ours that are enabled, and what wants them.
-const ENABLED: [(&str, &str, &str); 3] = [
+const ENABLED: [(&str, &str, &str); 4] = [
+    ("multi-user.target", "can-softirq.service", "/etc/systemd/system/can-softirq.service"),
     ("multi-user.target", "systemd-networkd.service", "systemd-networkd.service"),
     ("multi-user.target", "taustream@arm1.target", "taustream@.target"),
     ("taustream@arm1.target", "taustream-servosim@arm1.service", "taustream-servosim@.service"),
@@ -46,6 +60,7 @@ pub fn lay_out(root: &Path, bench: &Path) -> Result<()> {
         }
     }
     write("etc/sysctl.d/taustream.conf", "kernel.sched_rt_runtime_us = -1\n")?;
+    write("etc/systemd/system/can-softirq.service", CAN_SOFTIRQ_UNIT)?;
     for (wanted_by, unit, file) in ENABLED {
         let wants = root.join(format!("etc/systemd/system/{wanted_by}.wants"));
         fs::create_dir_all(&wants)?;
@@ -55,6 +70,7 @@ pub fn lay_out(root: &Path, bench: &Path) -> Result<()> {
         write(&format!("etc/systemd/system/taustream-{service}@probe.service.d/probe.conf"), PROBE_UNIT)?;
     }
     write("opt/probe.sh", PROBE)?;
+    write("opt/can-softirq.sh", CAN_SOFTIRQ)?;
     fs::copy(std::env::current_exe()?, root.join("opt/services"))?;
     fs::set_permissions(root.join("opt/services"), Permissions::from_mode(0o755))?;
     Ok(())
