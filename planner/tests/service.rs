@@ -330,7 +330,7 @@ fn service_second_planner_of_an_arm_is_refused() {
 }
 
 /// A goal with the upper arm upright, its middle at (-0.056, 0.119) m.
-const RINGED: [f64; 6] = [-2.7, -1.5708, 1.4, -1.57, -1.57, 0.0];
+const RINGED: [f64; 6] = [-2.7, -1.57, 1.4, -1.57, -1.57, 0.0];
 
 /// A closed ring round the upper arm at [`RINGED`]: an arm cannot get into it, so a search continues until its deadline.
 fn ringed() -> Scene {
