@@ -3,6 +3,7 @@
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
 use crate::capsule::Capsule;
 use crate::document::{Node, Value, shown};
+use crate::limit_notices;
 use crate::link_margin::LinkMargins;
 use crate::mass::{self, Weight};
 use crate::modelled::{self, Listed};
@@ -10,7 +11,6 @@ use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row, RowKind};
 use crate::urdf::{self, JointInfo, StatedLimits, UrdfArm};
-use std::f64::consts::TAU;
 use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 
 /// One joint of the arm.
@@ -57,9 +57,6 @@ const POSITION_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
 const ACCELERATION_RAD_S2: Bounds = Bounds::above(0.0, 1e4, "rad/s^2");
 const JERK_RAD_S3: Bounds = Bounds::above(0.0, 1e7, "rad/s^3");
-
-/// Two revolutions.
-const DEGREES_FROM_RAD: f64 = 2.0 * TAU;
 
 /// Stop limits where the file gives none, as multiples of the motion limits.
 const STOP_ACCELERATION_RATIO: f64 = 2.0;
@@ -242,9 +239,10 @@ fn read_limits(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<Strin
         Some(stop) => read_stop(stop, motion.as_ref()),
         None => motion.map(default_stop),
     };
-    say_degrees(table, position_rad, notices);
+    limit_notices::of_range(table, position_rad, notices);
+    limit_notices::of_motion(table, motion.as_ref(), notices);
     if let (Some(stop), Known::Urdf(joint_info)) = (&stop, known) {
-        say_stops_beyond(joint_info, stop, notices);
+        limit_notices::of_stop(joint_info, stop, notices);
     }
     Some(JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? })
 }
@@ -387,42 +385,6 @@ fn read_limit(
     let zero = if stated == Some(0.0) { " (0 in a URDF means that nobody knew it)" } else { "" };
     motion.fault(key, &value, &format!("{}; state it here{zero}", bounds.words()));
     None
-}
-
-/// A range of more than two revolutions to a side is rare, and one of degrees is common.
-fn say_degrees(table: &Table<'_>, position_rad: Option<[f64; 2]>, notices: &mut Vec<String>) {
-    let Some([low, high]) = position_rad.filter(|range| range.iter().any(|rad| rad.abs() > DEGREES_FROM_RAD))
-    else {
-        return;
-    };
-    notices.push(format!(
-        "{} = [{low}, {high}] are {:.1} and {:.1} revolutions: LOOKS LIKE DEGREES; in rad these would be [{:.4}, {:.4}]",
-        table.path_of("position_rad"),
-        low / TAU,
-        high / TAU,
-        low.to_radians(),
-        high.to_radians()
-    ));
-}
-
-/// A stop may use more than a motion; where the URDF states less, that is said.
-fn say_stops_beyond(joint_info: &JointInfo, stop: &LimitSet, notices: &mut Vec<String>) {
-    let beyond = |what: &str, stop: f64, stated: Option<f64>| {
-        let stated = stated.filter(|stated| *stated > 0.0 && stop > *stated)?;
-        Some(format!("stop.{what} = {stop} is above the URDF's {stated}"))
-    };
-    let said = [
-        beyond("acceleration_rad_s2", stop.acceleration_rad_s2, joint_info.limits.acceleration),
-        beyond("jerk_rad_s3", stop.jerk_rad_s3, joint_info.limits.jerk),
-    ];
-    let said: Vec<String> = said.into_iter().flatten().collect();
-    if !said.is_empty() {
-        notices.push(format!(
-            "joint {}: {}; only pauses and stops use it",
-            shown(&joint_info.name),
-            said.join(", ")
-        ));
-    }
 }
 
 /// The design's ratios: where `a_m + v_m |sigma'| <= a_s`, they leave one whole motion acceleration for slowing down.

@@ -22,6 +22,7 @@ mod hull;
 mod identifiers;
 pub mod journal;
 pub mod last_pose;
+mod limit_notices;
 pub mod link_margin;
 pub mod log;
 pub mod lookup;

@@ -236,6 +236,29 @@ fn range_that_looks_like_degrees_is_said() {
 }
 
 #[test]
+fn motion_limits_that_are_hardly_meant_are_said() {
+    let plain = rows("dh", "", ["link_radius_m = 0.05"; 2]);
+    let motion = plain.lines().find(|line| line.starts_with("motion = ")).expect("limits");
+    for (limits, words) in [
+        (
+            "velocity_rad_s = 90.0, acceleration_rad_s2 = 4.0, jerk_rad_s3 = 20.0",
+            "in rad/s this would be 1.5708",
+        ),
+        (
+            "velocity_rad_s = 2.8e-8, acceleration_rad_s2 = 4.0, jerk_rad_s3 = 20.0",
+            "takes at least 35714286 s",
+        ),
+        ("velocity_rad_s = 1.0, acceleration_rad_s2 = 1e-4, jerk_rad_s3 = 20.0", "takes at least 200 s"),
+        ("velocity_rad_s = 1.0, acceleration_rad_s2 = 4.0, jerk_rad_s3 = 3.2e-5", "takes at least 100 s"),
+    ] {
+        let text = plain.replacen(motion, &format!("motion = {{ {limits} }}"), 1);
+        let robot = Robot::from_toml(Path::new("r.toml"), &text).unwrap_or_else(|faults| panic!("{faults}"));
+        let [notice] = robot.notices.as_slice() else { panic!("{limits}: {:?}", robot.notices) };
+        assert!(notice.starts_with("joint[0].motion.") && notice.contains(words), "{notice}");
+    }
+}
+
+#[test]
 fn pair_that_touches_in_most_poses_is_found_and_one_that_may_is_not() {
     let wide = "link_capsules = [{ from_m = [-0.25, 0, 0], to_m = [0, 0, 0], radius_m = 0.09 }]";
     let three = rows(

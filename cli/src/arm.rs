@@ -4,6 +4,7 @@ use crate::output::note;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile, shipped};
+use taustream_messages::Report;
 use taustream_messages::service::is_arm_name;
 use taustream_streamer::names::{BusName, Names, ServoName};
 
@@ -25,6 +26,8 @@ pub(crate) struct ArmName {
     pub(crate) buses: Vec<BusName>,
     /// The servos, base to tip; empty when the settings could not be read.
     pub(crate) servos: Vec<ServoName>,
+    /// Links that move and have no shape, as the robot file acknowledges.
+    pub(crate) unmodelled_links: Vec<String>,
 }
 
 impl ArmName {
@@ -39,10 +42,16 @@ impl ArmName {
         Names { joints, buses, servos, ..Names::default() }
     }
 
+    /// The names where the buses are those of this report: local links have no cable to look at.
+    pub(crate) fn names_in(&self, report: &Report) -> Names {
+        self.names().with_local(report.buses().iter().map(|bus| bus.local != 0))
+    }
+
     /// The arm of settings that were read as a whole.
     pub(crate) fn of(settings: &Settings) -> Self {
         let Names { joints, buses, servos, .. } = Names::of(settings);
-        Self { name: settings.name.clone(), joints, buses, servos }
+        let unmodelled_links = settings.robot.unmodelled_links.clone();
+        Self { name: settings.name.clone(), joints, buses, servos, unmodelled_links }
     }
 
     /// The arm that settings name. A fault elsewhere in them must not keep anybody from stopping the arm: the name

@@ -10,7 +10,18 @@ pub(crate) fn fault_sentence(report: &Report, arm: &ArmName) -> String {
             code => format!("unknown fault code {code}; use command line and streamer of one release"),
         };
     };
-    arm.names().fault(&cause)
+    arm.names_in(report).fault(&cause)
+}
+
+/// How often the computer stalled and what that did to the joints; `None` where it did not.
+pub(crate) fn stalls_sentence(stalls: u64) -> Option<String> {
+    let gaps = if stalls == 1 { "gap" } else { "gaps" };
+    (stalls > 0).then(|| {
+        format!(
+            "{stalls} {gaps} between setpoints longer than the drives bridge: the computer was busy; there the joints may have left \
+             the stop limits (`after_stall` in the settings)"
+        )
+    })
 }
 
 /// Why the arm is paused, and how it continues; `None` for an arm that is not.

@@ -33,6 +33,10 @@ pub struct BusReport {
     pub receive_lost: u64,
     /// Frames passed to the link whose echo was lost in this computer, since the link was opened.
     pub echoes_missing: u64,
+    /// 1 for a local link: there is no bus, and no cable to look at.
+    pub local: u32,
+    /// Zero.
+    pub reserved: u32,
 }
 
 impl BusReport {

@@ -134,7 +134,7 @@ pub enum PlanError {
         range_rad: [f64; 2],
     },
     /// The arm touches something in a given pose.
-    #[error("{which} in collision: {contact}; choose another {which} or correct the scene")]
+    #[error("{which} in collision: {contact}; choose another {which}{}", contact.correction())]
     InCollision {
         /// Which pose.
         which: PoseOf,

@@ -37,6 +37,8 @@ pub struct Contact {
     pub distance_m: f64,
     /// The distance that they must keep: the scene's margin for obstacles, the robot's between links.
     pub required_m: f64,
+    /// Both are links of the arm.
+    pub of_links: bool,
 }
 
 impl Contact {
@@ -45,11 +47,24 @@ impl Contact {
     pub fn touches(&self) -> bool {
         self.distance_m <= 0.0
     }
+
+    /// Which file says otherwise when the two do not touch in truth, to follow a remedy.
+    pub(crate) fn correction(&self) -> String {
+        let (a, b) = &self.between;
+        if self.of_links {
+            format!(
+                "; if the real links do not touch there, their shapes are too large: list the pair in the robot file, \
+                 allowed_contacts = [[{a:?}, {b:?}]], and it is checked no more"
+            )
+        } else {
+            " or correct the scene".to_owned()
+        }
+    }
 }
 
 impl std::fmt::Display for Contact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { between: (a, b), distance_m, required_m } = self;
+        let Self { between: (a, b), distance_m, required_m, .. } = self;
         if self.touches() {
             return write!(f, "{a} touches {b}");
         }

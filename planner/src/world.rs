@@ -270,7 +270,8 @@ impl<'a> World<'a> {
     /// A contact as text.
     #[must_use]
     pub fn contact_of(&self, pair: &Pair, distance_m: f64) -> Contact {
-        Contact { between: self.names(pair), distance_m, required_m: pair.required_m }
+        let of_links = matches!(pair.other, Other::Link(_));
+        Contact { between: self.names(pair), distance_m, required_m: pair.required_m, of_links }
     }
 
     /// The names of a pair.

@@ -81,6 +81,16 @@ impl Buses {
         links.join(", ")
     }
 
+    /// Which of them are local links.
+    #[must_use]
+    pub fn local(&self) -> [bool; BUSES_MAX] {
+        let mut local = [false; BUSES_MAX];
+        for (local, bus) in local.iter_mut().zip(&self.0) {
+            *local = bus.link.as_ref().is_some_and(|link| link.is_local());
+        }
+        local
+    }
+
     pub(crate) fn links_mut(&mut self) -> impl Iterator<Item = &mut dyn CanLink> {
         self.0.iter_mut().flat_map(|bus| &mut bus.link).map(|link| &mut **link as &mut dyn CanLink)
     }

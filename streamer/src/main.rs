@@ -18,6 +18,7 @@ use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
 use taustream_streamer::intake::{self, Shutdown, ShutdownHandle};
+use taustream_streamer::names::Names;
 use taustream_streamer::pose_store::{self, PoseRecords, PoseStore};
 use taustream_streamer::recorder::Recorder;
 use taustream_streamer::threads::Threads;
@@ -51,6 +52,7 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
     let runtime = taustream_arm::runtime::directory()?;
     let buses = open_buses(settings, arguments.link, &runtime)?;
     let described = buses.describe();
+    let names = Names::of(settings).with_local(buses.local());
     let (queues, command_queue) = intake::pair();
     let shutdown_handle = command_queue.shutdown_handle();
     let recording = arguments.cycle_log.is_some();
@@ -68,7 +70,8 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
         }
     };
     let candidates = recording.then_some(candidates);
-    let threads = Threads::start(settings, &runtime, (command_queue, readers), (pose_store, candidates))?;
+    let threads =
+        Threads::start(settings, names, &runtime, (command_queue, readers), (pose_store, candidates))?;
     forward_signals(shutdown_handle)?;
 
     let outcome = run_real_time(core, settings, arguments.allow_non_realtime, &described);

@@ -65,6 +65,15 @@ impl Names {
         }
     }
 
+    /// The same names where these buses are local links: nobody is sent to look at a cable.
+    #[must_use]
+    pub fn with_local(mut self, local: impl IntoIterator<Item = bool>) -> Self {
+        for (bus, local) in self.buses.iter_mut().zip(local) {
+            bus.has_cable &= !local;
+        }
+        self
+    }
+
     /// Whether a bus has a cable; one of which nothing is known may.
     fn has_cable(&self, bus: usize) -> bool {
         self.buses.get(bus).is_none_or(|b| b.has_cable)

@@ -94,6 +94,8 @@ pub struct Surroundings {
     pub pose_store: PoseStore,
     /// The cycle log, if one is kept.
     pub candidates: Option<Sender<Candidate>>,
+    /// Names of joints and buses, for the log.
+    pub names: Names,
 }
 
 impl Publisher {
@@ -103,7 +105,7 @@ impl Publisher {
     /// When a thread or a histogram is not to be had.
     pub fn new(settings: &Settings, around: Surroundings) -> std::io::Result<Self> {
         let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).map_err(std::io::Error::other);
-        let Surroundings { port, readers, command_log, obstacles, pose_store, candidates } = around;
+        let Surroundings { port, readers, command_log, obstacles, pose_store, candidates, names } = around;
         Ok(Self {
             port,
             readers,
@@ -111,7 +113,7 @@ impl Publisher {
             obstacles,
             pose_store,
             candidates,
-            names: Names::of(settings),
+            names,
             robot: settings.robot.name.clone(),
             digest_hex: settings.robot.digest_hex(),
             checker: Checker::start(&settings.robot)?,

@@ -11,7 +11,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusFault, LAYOUT_VERSION, Phase, Report, RobotDigest};
+use taustream_messages::{BusFault, BusReport, LAYOUT_VERSION, Phase, Report, RobotDigest};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Reports that may wait for the service thread.
@@ -238,7 +238,8 @@ impl Reporter {
     #[must_use]
     pub fn new(
         digest: RobotDigest,
-        (joints, buses): (usize, usize),
+        joints: usize,
+        local: &[bool],
         cycle: &taustream_arm::settings::CycleSettings,
         queues: Writers,
     ) -> Self {
@@ -247,10 +248,15 @@ impl Reporter {
         let ticks = (1e9 / (cycle.report_rate_hz * period_ns as f64)).round().clamp(1.0, 1e9);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 1e9")]
         let every_ticks = ticks as u64;
+        let mut buses = [BusReport::default(); BUSES_MAX];
+        for (bus, local) in buses.iter_mut().zip(local) {
+            bus.local = u32::from(*local);
+        }
         let counts = Report {
             layout_version: LAYOUT_VERSION,
             joint_count: u32::try_from(joints).unwrap_or(u32::MAX),
-            bus_count: u32::try_from(buses).unwrap_or(u32::MAX),
+            bus_count: u32::try_from(local.len()).unwrap_or(u32::MAX),
+            buses,
             robot_digest: digest,
             ..Report::default()
         };

@@ -47,11 +47,12 @@ impl Threads {
     /// When shared memory refuses, for instance because a streamer serves this arm already.
     pub fn start(
         settings: &Settings,
+        names: Names,
         runtime: &Path,
         (command_queue, readers): (CommandQueue, Readers),
         (pose_store, candidates): (PoseStore, Option<Sender<Candidate>>),
     ) -> Result<Self, StartError> {
-        let names = Names { directories: pose_store.directories().clone(), ..Names::of(settings) };
+        let names = Names { directories: pose_store.directories().clone(), ..names };
         let (command_events, command_reader) = log::events();
         let (socket_events, socket_reader) = log::events();
         let command_log = CommandLog::new(vec![command_reader, socket_reader], names.clone());
@@ -68,9 +69,16 @@ impl Threads {
             rounds: Arc::clone(&rounds),
         };
         let (port, events) = (command_queue.socket, socket_events);
-        let socket = StopThread { port, pulse, names, events, command_rounds: rounds, arm: arm.clone() };
+        let socket = StopThread {
+            port,
+            pulse,
+            names: names.clone(),
+            events,
+            command_rounds: rounds,
+            arm: arm.clone(),
+        };
         let port = command_queue.trajectories;
-        let around = Surroundings { port, readers, command_log, obstacles, pose_store, candidates };
+        let around = Surroundings { port, readers, command_log, obstacles, pose_store, candidates, names };
         let mut publisher = Publisher::new(settings, around)?;
 
         let (mut watch, ends) = PortWatch::new(&arm, runtime, 2);

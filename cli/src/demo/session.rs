@@ -181,7 +181,8 @@ impl<'a> Session<'a> {
         let seen = self.seen.into_inner();
         let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
         Ok(Summary::new(&last, self.moves, (self.faults, self.pauses.into_inner()), seen.samples)
-            .with_tracking_error(moved))
+            .with_tracking_error(moved)
+            .with_unmodelled_links(&self.arm.unmodelled_links))
     }
 
     /// A failure while the arm is in a fault is reported with the fault: it is the cause.

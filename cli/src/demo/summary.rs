@@ -1,7 +1,9 @@
 //! What the demo says at its end.
 use crate::live::follow::Executed;
 use crate::live::replan::Planned;
+use crate::offline::verify::Unmodelled;
 use crate::plot::recording::Sample;
+use crate::words::stalls_sentence;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::HashMap;
@@ -71,6 +73,8 @@ pub(crate) struct Summary {
     executed_counted_in_cycles: bool,
     /// Pictures that were written.
     pub(crate) plots: Vec<PathBuf>,
+    /// Links that move and have no shape.
+    unmodelled_links: Vec<String>,
     /// What the pictures show.
     #[serde(skip)]
     pub(crate) samples: Vec<Sample>,
@@ -106,11 +110,18 @@ impl Summary {
             cycle_ns_p99: last.cycle_ns_p99,
             executed_counted_in_cycles: false,
             plots: Vec::new(),
+            unmodelled_links: Vec::new(),
             samples,
             moves,
         };
         summary.add_up();
         summary
+    }
+
+    /// Adds the links of which nothing is known.
+    pub(crate) fn with_unmodelled_links(mut self, unmodelled_links: &[String]) -> Self {
+        self.unmodelled_links = unmodelled_links.to_vec();
+        self
     }
 
     /// Adds the largest tracking error of any cycle.
@@ -183,6 +194,7 @@ impl fmt::Display for Summary {
             )?;
         }
         let counted = if self.executed_counted_in_cycles { "counted in cycles" } else { "to one report" };
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         writeln!(f, "planned duration         {:.3} s", self.planned_s)?;
         writeln!(f, "executed duration        {:.3} s ({counted})", self.executed_s)?;
         writeln!(f, "least clearance          {:.4} m", self.clearance_m)?;
@@ -203,6 +215,9 @@ impl fmt::Display for Summary {
             self.lateness_ns_p99 / 1000,
             self.lateness_ns_max / 1000
         )?;
+        if let Some(sentence) = stalls_sentence(self.stalls) {
+            writeln!(f, "stalls                   {sentence}")?;
+        }
         for pause in &self.pauses {
             writeln!(f, "resumed                  {pause}")?;
         }

@@ -363,7 +363,7 @@ fn still_there(report: &Report, phase: Phase, arm: &ArmName) -> String {
     if phase == Phase::Fault {
         return format!(" ({})", fault_sentence(report, arm));
     }
-    let names = arm.names();
+    let names = arm.names_in(report);
     let errors = report.drive_error.iter().enumerate().take(report.joints());
     let found =
         errors.filter(|(_, code)| **code != 0).map(|(joint, code)| names.drive_error(joint, *code)).next();

@@ -4,7 +4,7 @@ use crate::arm::ArmName;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Form;
-use crate::words::{fault_sentence, pause_sentence};
+use crate::words::{fault_sentence, pause_sentence, stalls_sentence};
 use serde::Serialize;
 use std::fmt;
 use std::thread;
@@ -31,17 +31,10 @@ impl fmt::Display for Executed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let error_mrad = self.tracking_error_rad_max * 1e3;
         write!(f, "executed      in {:.3} s, largest tracking error {error_mrad:.3} mrad", self.executed_s)?;
-        let unit = match self.stalls {
-            0 => return Ok(()),
-            1 => "gap",
-            _ => "gaps",
-        };
-        write!(
-            f,
-            "\nstalls        {} {unit} between setpoints longer than the drives bridge: the computer was busy; there the \
-             drives may have left the limits (`after_stall` in the settings)",
-            self.stalls
-        )
+        match stalls_sentence(self.stalls) {
+            None => Ok(()),
+            Some(sentence) => write!(f, "\nstalls        {sentence}"),
+        }
     }
 }
 

@@ -2,8 +2,9 @@
 use super::client::Client;
 use crate::arm::ArmName;
 use crate::failure::Failure;
+use crate::offline::verify::Unmodelled;
 use crate::output::Form;
-use crate::words::{fault_sentence, pause_sentence};
+use crate::words::{fault_sentence, pause_sentence, stalls_sentence};
 use serde::Serialize;
 use std::fmt;
 use taustream_arm::text::counted;
@@ -105,6 +106,8 @@ pub(crate) struct Status {
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
     buses: Vec<BusStatus>,
+    /// Links that move and have no shape: nothing keeps them from being hit.
+    unmodelled_links: Vec<String>,
     /// Number of the report; gaps are reports that this reader missed.
     sequence: u64,
     tick: u64,
@@ -166,6 +169,7 @@ impl Status {
             motion,
             joints: joints(r, arm),
             buses: buses(r, arm),
+            unmodelled_links: arm.unmodelled_links.clone(),
             sequence: r.sequence,
             tick: r.tick,
             time_ns: r.time_ns,
@@ -197,7 +201,7 @@ fn paused(r: &Report) -> Option<PauseStatus> {
 fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
     let at = |array: &[f64], joint: usize| array.get(joint).copied().unwrap_or(f64::NAN);
     let word = |array: &[u32], joint: usize| array.get(joint).copied().unwrap_or(0);
-    let names = arm.names();
+    let names = arm.names_in(r);
     (0..r.joints())
         .map(|j| JointStatus {
             name: arm.joints.get(j).cloned().unwrap_or_else(|| format!("joint{}", j + 1)),
@@ -223,7 +227,7 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
 }
 
 fn buses(r: &Report, arm: &ArmName) -> Vec<BusStatus> {
-    let names = arm.names();
+    let names = arm.names_in(r);
     let status = |(index, bus): (usize, &BusReport)| {
         let name = names.buses.get(index).cloned().unwrap_or_default();
         let error = ErrorFrame { class: bus.error_class, data: bus.error_data };
@@ -261,7 +265,7 @@ impl Status {
         for joint in self.joints.iter().filter(|joint| !joint.referenced) {
             writeln!(f, "joint {} is not referenced: {}", joint.name, joint.reference)?;
         }
-        Ok(())
+        write!(f, "{}", Unmodelled(&self.unmodelled_links))
     }
 }
 
@@ -350,6 +354,9 @@ impl fmt::Display for Status {
             "cycle {}: late {}, skipped {}, stalls {}, guard trips {}",
             self.cycles, self.cycles_late, self.cycles_skipped, self.stalls, self.guard_trips
         )?;
+        if let Some(sentence) = stalls_sentence(self.stalls) {
+            writeln!(f, "stalls since its start: {sentence}")?;
+        }
         writeln!(
             f,
             "lateness (us): p50 {}, p99 {}, p99.9 {}, max {}; time in the cycle: p99 {}, max {}",

@@ -137,7 +137,7 @@ pub(super) fn table(r: &Report, arm: &ArmName, scale: Option<&Scale>, columns: u
     let shown = shown(columns, scale.is_some());
     let heading: String = shown.iter().map(|c| c.fit(c.heading())).collect();
     let mut lines = vec![Line::of(format!("  {heading}"), Tone::Quiet)];
-    let names = arm.names();
+    let names = arm.names_in(r);
     for joint in 0..r.joints() {
         let at = |array: &[f64]| array.get(joint).copied().unwrap_or(f64::NAN);
         let word = |array: &[u32]| array.get(joint).copied().unwrap_or(0);

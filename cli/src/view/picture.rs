@@ -89,7 +89,7 @@ impl Picture {
 
     /// How each bus is, and what it lost.
     fn buses(&self, r: &Report) -> impl Iterator<Item = Line> {
-        let names = self.arm.names();
+        let names = self.arm.names_in(r);
         r.buses().iter().enumerate().map(move |(index, bus)| {
             let is_well = bus.bus_fault == 0 && bus.silent == 0;
             Line(vec![
@@ -127,7 +127,7 @@ impl Picture {
 
 /// What each drive that has an error says.
 fn drive_errors(r: &Report, arm: &ArmName) -> impl Iterator<Item = String> {
-    let names = arm.names();
+    let names = arm.names_in(r);
     let codes: Vec<u32> = r.drive_error.iter().copied().take(r.joints()).collect();
     let errors = codes.into_iter().enumerate().filter(|(_, code)| *code != 0);
     errors.map(move |(joint, code)| names.drive_error(joint, code))

@@ -247,7 +247,13 @@ fn poses_that_cannot_be_are_refused_with_joint_or_contact() {
                 &["goal outside limits", "looks like degrees", "1.5708"],
             ),
             // The arm straight down through the table.
-            (&plan("open", "HOME", "0,1.57,0,0,0,0"), 1, &["goal in collision"]),
+            (&plan("open", "HOME", "0,1.57,0,0,0,0"), 1, &["goal in collision", "correct the scene"]),
+            // The elbow folded into the upper arm.
+            (
+                &plan("open", "HOME", "0,-1.57,3.1,-1.57,-1.57,0"),
+                1,
+                &["goal in collision", "if the real links do not touch there", "allowed_contacts = [[\"link"],
+            ),
         ],
     );
 }

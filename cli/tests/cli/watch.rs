@@ -208,7 +208,7 @@ fn watch_on_a_terminal_draws_in_colour_and_leaves_on_q() {
     let stage = Stage::new("tty");
     let picture = |colour: &str| {
         let program = env!("CARGO_BIN_EXE_taustream");
-        let typed = format!("stty cols 120 rows 30; exec {program} watch --settings settings.toml");
+        let typed = format!("stty cols 120 rows 30; exec '{program}' watch --settings settings.toml");
         let mut script = stage.scratch.program("script", &["-qec", &typed, "/dev/null"]);
         script
             .env("TAUSTREAM_RUNTIME_DIR", &stage.runtime)

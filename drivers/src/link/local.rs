@@ -110,6 +110,10 @@ fn connect(meeting: &Meeting) -> Result<OwnedFd, OpenError> {
 }
 
 impl CanLink for LocalMaster {
+    fn is_local(&self) -> bool {
+        true
+    }
+
     fn send(&mut self, frames: &[CanFrame]) -> Sent {
         if self.gone {
             return Sent { count: 0, fault: Some(LinkFault::Gone) };
@@ -221,6 +225,10 @@ fn watch(events: &OwnedFd, socket: &OwnedFd) -> rustix::io::Result<()> {
 }
 
 impl CanLink for LocalServos {
+    fn is_local(&self) -> bool {
+        true
+    }
+
     fn send(&mut self, frames: &[CanFrame]) -> Sent {
         let all = Sent { count: frames.len(), fault: None };
         let Some(master) = &self.master else { return all };

@@ -59,6 +59,11 @@ pub trait CanLink: Send {
     /// What it is, for messages: "socketcan vcan0" or "local link vcan0".
     fn describe(&self) -> String;
 
+    /// Whether it joins programs of this computer without any bus between them, as a local link does.
+    fn is_local(&self) -> bool {
+        false
+    }
+
     /// Descriptor that polls readable while `receive` has work, new peers of a local link included: an epoll
     /// instance where one descriptor does not do. For servers, which wait; the cycle never does. `None` when there
     /// is nothing to wait on (a link in memory).

@@ -122,7 +122,7 @@ pub enum PositionError {
         /// To how many of them motions were planned.
         planned: usize,
         /// Why not to the last of them.
-        error: PlanError,
+        error: Box<PlanError>,
     },
     /// The clock was over before there was a motion.
     #[error("the deadline was over before a motion was found; give it more time")]
@@ -341,7 +341,7 @@ fn best_motion(
             let error_m = error_m(task.robot, &end_rad, &Vector3::from(task.target_m));
             Ok(Reached { plan, pose_rad, error_m, tries: poses.tries, poses: found })
         }
-        (None, Some(error)) => Err(PositionError::NoMotion { poses: found, planned, error }),
+        (None, Some(error)) => Err(PositionError::NoMotion { poses: found, planned, error: Box::new(error) }),
         (None, None) => Err(PositionError::NoTime),
     }
 }
