@@ -67,8 +67,8 @@ impl Booted<'_> {
         scratch.write("driver.sh", DRIVER.as_bytes())?;
         scratch.write("command.sh", &script)?;
         let mut words: Vec<OsString> = vec!["systemd.show_status=0".into()];
-        words.push(word("ubd0r=", self.image)?);
-        words.push(word("machine_out=", self.output)?);
+        words.push(word("ubd0r=", self.image, &scratch.path().join("image"))?);
+        words.push(word("machine_out=", self.output, &scratch.path().join("output"))?);
         let machine = Machine::new().limit_s(self.limit_s);
         let status = machine.boot(&scratch, &words, stop, (std::io::stdout(), std::io::stderr()));
         Ok(status?)
@@ -104,10 +104,12 @@ fn pack(archive: &Path, directories: &[&Path]) -> Result<()> {
     Ok(())
 }
 
-/// A word of the kernel's command line, which has no way to quote.
-fn word(key: &str, path: &Path) -> Result<OsString> {
+/// A word of the kernel's command line, which has no way to quote: a link in the scratch directory, whose name needs none,
+/// stands for the path.
+fn word(key: &str, path: &Path, link: &Path) -> Result<OsString> {
     let path: PathBuf = path.canonicalize().with_context(|| format!("{} is not there", path.display()))?;
-    let text = path.to_str().filter(|text| !text.contains(|c: char| c.is_whitespace() || c == ','));
-    let text = text.with_context(|| format!("{} must have no blank and no comma", path.display()))?;
-    Ok(format!("{key}{text}").into())
+    symlink(&path, link).with_context(|| format!("cannot link {}", path.display()))?;
+    let mut word = OsString::from(key);
+    word.push(link);
+    Ok(word)
 }
