@@ -67,8 +67,8 @@ impl Booted<'_> {
         scratch.write("driver.sh", DRIVER.as_bytes())?;
         scratch.write("command.sh", &script)?;
         let mut words: Vec<OsString> = vec!["systemd.show_status=0".into()];
-        words.push(word("ubd0r=", self.image, &scratch.path().join("image"))?);
-        words.push(word("machine_out=", self.output, &scratch.path().join("output"))?);
+        words.push(word("ubd0r=", self.image, &scratch.path().join("image.link"))?);
+        words.push(word("machine_out=", self.output, &scratch.path().join("output.link"))?);
         let machine = Machine::new().limit_s(self.limit_s);
         let status = machine.boot(&scratch, &words, stop, (std::io::stdout(), std::io::stderr()));
         Ok(status?)
