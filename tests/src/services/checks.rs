@@ -31,7 +31,7 @@ const LAST: Check = ("journal", recovery::journal);
 const CORRUPTED: Duration = Duration::from_secs(8);
 
 /// How often a check is tried on a host that stalls the machine.
-const TRIES: usize = 3;
+const TRIES: usize = 2;
 
 /// Where drop-ins of this boot go.
 const DROP_INS: &str = "/run/systemd/system";
