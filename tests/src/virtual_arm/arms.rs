@@ -14,8 +14,7 @@ pub struct SimulatedArm {
     replaced: &'static [(&'static str, &'static str)],
 }
 
-const FD_RATES: (&str, &str) =
-    ("virtual = true", "bitrate_bit_s = 1000000\ndata_bitrate_bit_s = 5000000");
+const FD_RATES: (&str, &str) = ("virtual = true", "bitrate_bit_s = 1000000\ndata_bitrate_bit_s = 5000000");
 
 /// Every arm.
 pub const ALL: [SimulatedArm; 7] = [

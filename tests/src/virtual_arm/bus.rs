@@ -215,12 +215,11 @@ impl VirtualBus {
         if self.disturbance.unacknowledged || self.disturbance.interface != Interface::Up {
             return None;
         }
-        let delivered = match &mut self.wire {
-            Some(wire) => wire.next_by(until)?,
-            None => {
-                let (_, frame) = *self.queued.front()?;
-                Delivered { at: until, sender: Sender::Master, frame }
-            }
+        let delivered = if let Some(wire) = &mut self.wire {
+            wire.next_by(until)?
+        } else {
+            let (_, frame) = *self.queued.front()?;
+            Delivered { at: until, sender: Sender::Master, frame }
         };
         let tick = match delivered.sender {
             Sender::Drive => {

@@ -262,7 +262,10 @@ impl Joint {
                 }
                 // From one code to its neighbour a constant angle never goes.
                 if stands && step_rad > self.rounding_rad {
-                    found.push((Rule::Standing, format!("the setpoint of a standing arm moves {step_rad:e} rad")));
+                    found.push((
+                        Rule::Standing,
+                        format!("the setpoint of a standing arm moves {step_rad:e} rad"),
+                    ));
                 }
             }
             None => {

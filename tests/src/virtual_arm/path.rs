@@ -34,6 +34,9 @@ impl Path {
 
     /// Compares a cycle's claim with the path; what is wrong with it. `tolerance_rad` is that of a trajectory's base.
     pub(crate) fn check(&mut self, cycle: &CycleRecord, joints: usize, limits: [f64; 2]) -> Option<String> {
+        if !cycle.joint_sent.iter().any(|sent| *sent) {
+            return None; // Nothing of it left: the next cycle takes its place.
+        }
         let [period_s, tolerance_rad] = limits;
         let id = cycle.trajectory_id;
         if self.running.as_ref().is_none_or(|(running, _)| *running != id) {
@@ -54,7 +57,7 @@ impl Path {
             }
         }
         let on_path: JointArray = second_formula(trajectory, cycle.s);
-        let wrong = (0..joints).find_map(|joint| {
+        let wrong = (0..joints).filter(|joint| cycle.joint_sent[*joint]).find_map(|joint| {
             let (is_rad, off_rad) = (cycle.position_rad[joint], cycle.off_path_rad[joint]);
             // An arm that stands after a stall stands where each joint was sent last.
             if held && self.sent_rad[joint].is_some_and(|sent_rad| sent_rad.to_bits() == is_rad.to_bits()) {
@@ -67,7 +70,9 @@ impl Path {
                 format!("joint {} is {beside_rad:e} rad beside its path, stated {off_rad:e}", joint + 1)
             })
         });
-        for (joint, sent_rad) in self.sent_rad.iter_mut().enumerate().filter(|(joint, _)| cycle.joint_sent[*joint]) {
+        for (joint, sent_rad) in
+            self.sent_rad.iter_mut().enumerate().filter(|(joint, _)| cycle.joint_sent[*joint])
+        {
             *sent_rad = Some(cycle.position_rad[joint]);
         }
         wrong

@@ -35,18 +35,13 @@ pub struct ArmView {
 
 /// Phases in which setpoints move.
 pub(crate) fn moves(phase: Phase) -> bool {
-    matches!(
-        phase,
-        Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking
-    )
+    matches!(phase, Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking)
 }
 
 /// Follows the phases.
 #[derive(Clone, Debug)]
 pub(crate) struct PhaseRules {
     stop_ticks: u64,
-    /// A stall parts the joints, whose setpoints take turns; a fade-out of one ramp brings them together.
-    stall_parts: bool,
     brake_ticks: u64,
     lost_cycles_max: u64,
     /// An operator's `enable` was accepted and not used up.
@@ -79,7 +74,6 @@ impl PhaseRules {
         };
         Self {
             stop_ticks: ticks(ramp_duration_s(&limits, joints)),
-            stall_parts: settings.buses.iter().any(|bus| bus.traffic.stagger),
             brake_ticks: ticks(brakes_s.fold(0.0, f64::max)),
             lost_cycles_max: u64::from(settings.lost_cycles_max()),
             permitted: false,
@@ -108,13 +102,14 @@ impl PhaseRules {
             self.energising = Some(view.tick);
         }
         self.check_energised(view, &mut wrong);
-        if view.skipped > 0 && self.stall_parts {
+        if view.skipped > 0 {
+            // A stall parts joints whose setpoints take turns, or were lost; a fade-out of one ramp brings them together.
             self.in_phase = 0;
         }
         let stops = matches!(view.phase, Phase::Pausing | Phase::Stopping | Phase::FastStopping);
         let brakes = view.phase == Phase::Braking;
         let most = stops.then_some(self.stop_ticks).or(brakes.then_some(self.brake_ticks));
-        if let Some(most) = most.filter(|most| self.in_phase > *most && view.skipped == 0) {
+        if let Some(most) = most.filter(|most| self.in_phase > *most) {
             wrong.push(format!("{:?} for {} cycles; it ends within {most}", view.phase, self.in_phase));
             self.in_phase = 0;
         }

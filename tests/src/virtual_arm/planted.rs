@@ -1,7 +1,7 @@
 //! Drivers that do what no driver may do, so that the checker can be seen to find it.
 use taustream_drivers::drivers::BusDriver;
 use taustream_drivers::{
-    CanFrame, CanId, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
+    CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -9,10 +9,11 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 const AFTER_CYCLES: u32 = 200;
 const JOINT: usize = 0;
 const MOVING_RAD_S: f64 = 0.3;
-/// Cycles that a driver which ignores a stop goes on.
-const RUNS_ON_CYCLES: u32 = 400;
-/// Cycles after which a driver energises by itself.
-const ENERGISES_AFTER: u32 = 1_000;
+/// Share of its largest speed below which a joint is about to stop, and cycles that a driver which ignores it goes on.
+const STOPPING_SHARE: f64 = 0.3;
+const RUNS_ON_CYCLES: u32 = 1_500;
+/// Cycles of drives that are ready to be energised, after which a driver energises them by itself.
+const ENERGISES_AFTER: u32 = 10;
 
 /// What the driver does wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +41,7 @@ pub enum PlantedFault {
 pub struct PlantedDriver {
     driver: BusDriver,
     fault: PlantedFault,
-    cycles: u32,
+    ready: u32,
     moving: u32,
     last: [JointCommand; MAX_JOINTS],
     sent_rad: f64,
@@ -55,7 +56,7 @@ impl PlantedDriver {
         Self {
             driver,
             fault,
-            cycles: 0,
+            ready: 0,
             moving: 0,
             last: [JointCommand::default(); MAX_JOINTS],
             sent_rad: 0.0,
@@ -84,14 +85,14 @@ impl PlantedDriver {
         }
     }
 
-    /// Goes on at the largest speed of the motion as soon as the joint is commanded to slow down to nearly nothing.
+    /// Goes on at its speed when the joint is about to stop.
     fn run_on(&mut self, command: &JointCommand) -> f64 {
         let speed_rad_s = command.velocity_rad_s;
+        let slow = speed_rad_s.abs() < STOPPING_SHARE * self.speed_rad_s.abs();
         if self.runs_on.is_none() && speed_rad_s.abs() >= self.speed_rad_s.abs() {
             self.speed_rad_s = speed_rad_s;
-        } else if self.runs_on.is_none() && self.moving > 0 && speed_rad_s.abs() < 0.8 * self.speed_rad_s.abs() {
-            self.runs_on = Some(RUNS_ON_CYCLES);
-            self.speed_rad_s = speed_rad_s;
+        } else if self.runs_on.is_none() && self.moving > 0 && slow {
+            (self.runs_on, self.speed_rad_s) = (Some(RUNS_ON_CYCLES), speed_rad_s);
         }
         match &mut self.runs_on {
             Some(left) if *left > 0 => {
@@ -111,8 +112,10 @@ impl ServoDriver for PlantedDriver {
         commands: &[JointCommand; MAX_JOINTS],
         out: &mut FrameBatch,
     ) {
-        self.cycles += 1;
-        let alone = self.fault == PlantedFault::EnergisedAlone && self.cycles > ENERGISES_AFTER;
+        let mut joints = self.driver.joints().iter();
+        let ready = joints.all(|joint| self.driver.status(*joint).state == DriveState::Disabled);
+        self.ready += u32::from(ready);
+        let alone = self.fault == PlantedFault::EnergisedAlone && self.ready > ENERGISES_AFTER;
         let drive_target = if alone { DriveTarget::Enabled } else { drive_target };
         let mut spoiled = *commands;
         if drive_target == DriveTarget::Enabled && self.driver.joints().contains(&JOINT) {

@@ -74,15 +74,20 @@ impl Rates {
         let step_s = width as f64 * self.step_s;
         let check = |quantity, order: usize, difference: f64, limits: [f64; 2]| {
             let power = (0..order).fold(1.0, |power, _| power * step_s);
-            let off = (1_u32 << order) as f64 * self.rounding_rad;
+            let off = f64::from(1_u32 << order) * self.rounding_rad;
             let value = difference.abs() / power;
             let tolerance = off / power;
             let span = order * width;
             let steady = self.newest.iter().take(span + 1).all(|sample| sample.steady);
             let [motion, stop] = limits;
             let limit = if steady { motion } else { stop };
-            (value > limit * (1.0 + SLACK) + SLACK + tolerance)
-                .then_some(Excess { quantity, value, limit, step_s, of_motion: steady })
+            (value > limit * (1.0 + SLACK) + SLACK + tolerance).then_some(Excess {
+                quantity,
+                value,
+                limit,
+                step_s,
+                of_motion: steady,
+            })
         };
         let (q0, q1) = (at(0)?, at(1)?);
         let (m, s) = (&self.motion, &self.stop);
@@ -124,9 +129,8 @@ mod tests {
         for rounding_rad in [0.0, 2.4e-7, 1.9e-4] {
             // Amplitude 1/w^k at rate w has a peak of 1 in the k-th derivative.
             for (limit, order, rate) in [(3.0, 1, 2.0), (15.0, 2, 8.0), (150.0, 3, 12.0)] {
-                let wave = |share: f64| {
-                    move |t: f64| share * limit / f64::powi(rate, order) * (rate * t).sin()
-                };
+                let wave =
+                    |share: f64| move |t: f64| share * limit / f64::powi(rate, order) * (rate * t).sin();
                 assert_eq!(run(rounding_rad, true, wave(0.999)), None, "order {order}, {rounding_rad}");
                 // The widest difference averages over 0.27 s, a fast wave by more than the rounding leaves.
                 let beyond = if rounding_rad > 1e-6 { 1.6 } else { 1.05 };

@@ -134,7 +134,8 @@ impl Run {
         self.operator.recover();
         let ready = self.steps(RECOVERY_MS, |run| run.operator.is_ready(run.world.phase()));
         if !ready {
-            let text = format!("still {:?} after {RECOVERY_MS} ms of recovery", self.world.phase());
+            let drives = self.world.drives_in_words();
+            let text = format!("still {:?} after {RECOVERY_MS} ms of recovery; {drives}", self.world.phase());
             return self.report(text);
         }
         self.operated = false;
@@ -155,8 +156,12 @@ impl Run {
         let (at_rad, joints) = (self.world.position_rad(), self.world.settings.robot.joints.len());
         let off = (0..joints).find(|joint| (at_rad[*joint] - goal_rad[*joint]).abs() > GOAL_RAD);
         if let Some(joint) = off {
-            let text =
-                format!("joint {} is at {} rad, its goal at {} rad", joint + 1, at_rad[joint], goal_rad[joint]);
+            let text = format!(
+                "joint {} is at {} rad, its goal at {} rad",
+                joint + 1,
+                at_rad[joint],
+                goal_rad[joint]
+            );
             self.report(text);
         }
     }

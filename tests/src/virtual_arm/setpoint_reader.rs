@@ -138,9 +138,7 @@ impl Reading {
             Kind::Counts(encoding) => {
                 (id == RPDO1 + u32::from(encoding.node_id)).then(|| target(data))?.map(|at| encoding.rad(at))
             }
-            Kind::Mit(motor) => {
-                (id == u32::from(motor.node_id)).then(|| motor.commanded_rad(data)).flatten()
-            }
+            Kind::Mit(motor) => (id == u32::from(motor.node_id)).then(|| motor.commanded_rad(data)).flatten(),
             Kind::PosVel { node_id, sign, zero_rad } => {
                 let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
                 let is_setpoint = id == POS_VEL + u32::from(node_id) && data.len() == 8;

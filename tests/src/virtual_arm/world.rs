@@ -185,6 +185,19 @@ impl World {
         self.measure(SimulatedServo::position_rad)
     }
 
+    /// What the drives are and report.
+    #[must_use]
+    pub fn drives_in_words(&self) -> String {
+        let joints = self.settings.robot.joints.len();
+        let word = |joint: usize| {
+            let is = self.simulator.drive(joint).map_or(String::new(), SimulatedServo::describe);
+            let said =
+                self.newest.map_or((0, 0), |report| (report.drive_status[joint], report.drive_error[joint]));
+            format!("joint {}: {is}, reported {:#06x}, error {:#x}", joint + 1, said.0, said.1)
+        };
+        (0..joints).map(word).collect::<Vec<_>>().join("; ")
+    }
+
     fn measure(&self, value: fn(&SimulatedServo) -> f64) -> JointArray {
         std::array::from_fn(|joint| self.simulator.drive(joint).map_or(0.0, value))
     }
@@ -234,7 +247,8 @@ impl World {
     /// One cycle, when its time has come; the answers that it gave.
     pub fn step(&mut self) -> Vec<Answered> {
         let mut wake = Nanos(self.schedule.deadline().0 + self.rng.whole(0, LATE_NS_MAX));
-        if let Some((_, late_ms)) = self.stalls.pop_front_if(|(at_ms, _)| BEGIN_NS + *at_ms * 1_000_000 <= wake.0)
+        if let Some((_, late_ms)) =
+            self.stalls.pop_front_if(|(at_ms, _)| BEGIN_NS + *at_ms * 1_000_000 <= wake.0)
         {
             wake.0 += late_ms * 1_000_000;
             self.tell(&format!("the loop stalls for {late_ms} ms"));
@@ -458,4 +472,3 @@ fn either(begins: bool, interface: Interface) -> Interface {
 pub fn shipped(driver: BusDriver) -> Box<dyn ServoDriver> {
     Box::new(driver)
 }
-
