@@ -1,7 +1,7 @@
 //! What no arm may do, checked on the setpoints that reached its drives and on its phases.
 //!
 //! Every rule is stated by the limits of the robot and by the settings; tolerances are those of the encoding
-//! ([`super::setpoint_reader::SetpointReader::rounding_rad`]) and of finite differences ([`super::rates`]).
+//! ([`SetpointReader::rounding_rad`]) and of finite differences (`rates.rs`).
 use super::path::Path;
 use super::phase_rules::{ArmView, PhaseRules, moves};
 use super::rates::Rates;

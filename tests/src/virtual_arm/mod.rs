@@ -12,7 +12,7 @@ pub mod link;
 pub mod motion;
 pub mod operator;
 mod path;
-mod phase_rules;
+pub mod phase_rules;
 pub mod plan;
 pub mod planted;
 pub mod random;
