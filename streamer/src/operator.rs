@@ -340,6 +340,9 @@ impl Supervisor {
         let faulty = |s: &ServoStatus| matches!(s.state, DriveState::Fault | DriveState::Refused);
         if self.servos(cycle_state).any(|(_, s)| faulty(s)) {
             self.resetting_since = Some(cycle_state.tick.wake_time);
+            // Every drive is off. One that restarted, or lost its master, after `torque-off` is looked at again only when the
+            // target is disabled: under torque off its fault would stay for ever.
+            self.torque_off = false;
             return Ok(AnswerReason::Resetting);
         }
         self.clear(Event::ClearedOff, cycle_state, actions);

@@ -7,6 +7,8 @@
 //!
 //! [`booted`] boots a whole Debian ([`debian`]) with systemd in that machine, and [`services`] tries the installed services
 //! there.
+//!
+//! [`virtual_arm`] needs none of these: it simulates the whole system in virtual time, from a seed.
 #![deny(unsafe_code)]
 
 pub mod booted;
@@ -30,3 +32,4 @@ pub mod setpoints;
 pub mod slice;
 pub mod test_bench;
 pub mod traffic;
+pub mod virtual_arm;

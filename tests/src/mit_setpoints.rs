@@ -39,6 +39,15 @@ pub struct MotorEncoding {
     pub gains: [f64; 2],
 }
 
+impl MotorEncoding {
+    /// The link angle that a command holds; none for a special command.
+    #[must_use]
+    pub fn commanded_rad(&self, data: &[u8]) -> Option<f64> {
+        let code = Command::of(data)?.position;
+        Some(value(code, 16, [-self.reach[0], self.reach[0]]) * self.sign + self.zero_rad)
+    }
+}
+
 /// The motors of an arm; none when one of its servos is something else.
 #[must_use]
 pub fn encodings(settings: &Settings) -> Option<Vec<MotorEncoding>> {

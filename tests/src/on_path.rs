@@ -120,7 +120,7 @@ fn is_on_path(phase: &str) -> bool {
 }
 
 /// Positions by the definition of Tau-J*, written without a line of the product's sampler.
-fn second_formula(trajectory: &Trajectory, t_s: f64) -> JointArray {
+pub(crate) fn second_formula(trajectory: &Trajectory, t_s: f64) -> JointArray {
     let mut q = *trajectory.base_rad();
     for Stroke { start_s, duration_s, n, delta_rad } in trajectory.strokes() {
         let s = ((t_s - start_s) / duration_s).clamp(0.0, 1.0);

@@ -131,6 +131,27 @@ fn torque_off_in_any_phase_reaches_the_drives_in_the_next_cycle() {
     harness.run_until(Phase::Disabled, 60);
 }
 
+/// Goal: a drive that restarts after torque off can be cleared. Drivers look at such a drive again when the target is
+/// disabled, and not before.
+#[test]
+fn drive_that_is_lost_after_torque_off_is_cleared() {
+    let mut harness = CycleHarness::new();
+    harness.move_it();
+    harness.accept(Command::TorqueOff);
+    harness.script(|w| w.forced[2] = Some(DriveState::Fault));
+    harness.run(20);
+    assert_eq!(harness.world.lock().unwrap().drive_target, Some(DriveTarget::TorqueOff));
+    assert_eq!(harness.ask(Command::ClearFault).why, AnswerReason::Resetting);
+    harness.run(1);
+    assert_eq!(harness.world.lock().unwrap().drive_target, Some(DriveTarget::Disabled));
+    assert_eq!(harness.phase(), Phase::Fault, "it is not cleared before its drives are");
+    harness.script(|w| w.forced[2] = None);
+    harness.run_until(Phase::Disabled, 60);
+    harness.run(40);
+    harness.accept(Command::Enable);
+    harness.run_until(Phase::Holding, 50);
+}
+
 #[test]
 fn disable_is_refused_while_moving_and_done_at_rest() {
     let mut harness = CycleHarness::new();

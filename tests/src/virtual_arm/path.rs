@@ -1,0 +1,80 @@
+//! Whether setpoints lie on the path of the trajectory that was accepted.
+use crate::on_path::second_formula;
+use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
+use taustream_streamer::report::CycleRecord;
+
+/// Difference between two formulas for one position, and rounding of sums of angles.
+const FORMULA_RAD: f64 = 1e-9;
+
+/// The trajectory that runs, and how far it has come.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Path {
+    offered: Vec<(u64, Trajectory)>,
+    running: Option<(u64, Trajectory)>,
+    last: Option<(u64, f64)>,
+    /// What each joint was sent last.
+    sent_rad: [Option<f64>; MAX_JOINTS],
+    /// Joints may be beside the path by what the log states: a stall or a loss has parted them.
+    parted: bool,
+    /// A joint may stand still beside the path: its setpoints were lost.
+    lost: bool,
+}
+
+impl Path {
+    /// A trajectory was offered under this id.
+    pub(crate) fn offer(&mut self, id: u64, trajectory: Trajectory) {
+        self.offered.push((id, trajectory));
+    }
+
+    /// The loop stood still, or frames of a cycle were lost.
+    pub(crate) fn part(&mut self, lost: bool) {
+        self.parted = true;
+        self.lost |= lost;
+    }
+
+    /// Compares a cycle's claim with the path; what is wrong with it. `tolerance_rad` is that of a trajectory's base.
+    pub(crate) fn check(&mut self, cycle: &CycleRecord, joints: usize, limits: [f64; 2]) -> Option<String> {
+        if !cycle.joint_sent.iter().any(|sent| *sent) {
+            return None; // Nothing of it left: the next cycle takes its place.
+        }
+        let [period_s, tolerance_rad] = limits;
+        let id = cycle.trajectory_id;
+        if self.running.as_ref().is_none_or(|(running, _)| *running != id) {
+            let at = self.offered.iter().position(|(offered, _)| *offered == id);
+            let Some(at) = at else { return Some(format!("moves on trajectory {id}, never offered")) };
+            self.running = Some(self.offered.swap_remove(at));
+            self.offered.clear();
+            (self.last, self.parted, self.lost) = (None, false, false);
+        }
+        let (_, trajectory) = self.running.as_ref()?;
+        let held = self.last.is_some_and(|(_, s)| s.to_bits() == cycle.s.to_bits()) && cycle.sigma <= 0.0;
+        if let Some((tick, s)) = self.last.replace((cycle.tick, cycle.s)) {
+            #[expect(clippy::cast_precision_loss, reason = "periods of one run")]
+            let elapsed_s = cycle.tick.saturating_sub(tick) as f64 * period_s;
+            let advanced_s = cycle.s - s;
+            if advanced_s < -FORMULA_RAD || advanced_s > elapsed_s + FORMULA_RAD {
+                return Some(format!("trajectory time advances {advanced_s} s in {elapsed_s} s"));
+            }
+        }
+        let on_path: JointArray = second_formula(trajectory, cycle.s);
+        let wrong = (0..joints).filter(|joint| cycle.joint_sent[*joint]).find_map(|joint| {
+            let (is_rad, off_rad) = (cycle.position_rad[joint], cycle.off_path_rad[joint]);
+            // An arm that stands after a stall stands where each joint was sent last.
+            if held && self.sent_rad[joint].is_some_and(|sent_rad| sent_rad.to_bits() == is_rad.to_bits()) {
+                return None;
+            }
+            let beside_rad = is_rad - on_path[joint];
+            let explained = self.parted || beside_rad.abs() <= tolerance_rad + FORMULA_RAD;
+            let as_stated = (beside_rad - off_rad).abs() <= FORMULA_RAD || self.lost;
+            (!explained || !as_stated).then(|| {
+                format!("joint {} is {beside_rad:e} rad beside its path, stated {off_rad:e}", joint + 1)
+            })
+        });
+        for (joint, sent_rad) in
+            self.sent_rad.iter_mut().enumerate().filter(|(joint, _)| cycle.joint_sent[*joint])
+        {
+            *sent_rad = Some(cycle.position_rad[joint]);
+        }
+        wrong
+    }
+}

@@ -1,0 +1,156 @@
+//! The setpoints that a frame holds for each joint, read by decoders that share nothing with the product's.
+use crate::mit_setpoints::MotorEncoding;
+use crate::setpoints::{Encoding, target};
+use taustream_arm::{DamiaoMode, Protocol, Settings};
+use taustream_drivers::CanFrame;
+use taustream_drivers::sim::ServoSimulator;
+
+/// RPDO1 and RPDO2 of node 0.
+const RPDO1: u32 = 0x200;
+const RPDO2: u32 = 0x300;
+/// Identifiers of the `POS_VEL` mode begin here.
+const POS_VEL: u32 = 0x100;
+/// Half the distance between two neighbouring numbers of 32 bits below 8 rad.
+const FLOAT_HALF_RAD: f64 = 2.4e-7;
+
+/// One setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadSetpoint {
+    /// Joint of the arm.
+    pub joint: usize,
+    /// The commanded link angle.
+    pub position_rad: f64,
+}
+
+/// How the setpoints of one servo are encoded.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// Counts in an RPDO of its own, or in a frame that two drives share.
+    Counts(Encoding),
+    /// 16 bits of an MIT command.
+    Mit(MotorEncoding),
+    /// A number of 32 bits.
+    PosVel { node_id: u8, sign: f64, zero_rad: f64 },
+}
+
+/// One servo on its bus.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    joint: usize,
+    bus: usize,
+    kind: Kind,
+}
+
+/// The servos of an arm.
+#[derive(Clone, Debug)]
+pub struct SetpointReader {
+    servos: Vec<Reading>,
+    packed: Vec<bool>,
+    every: Vec<u64>,
+}
+
+impl SetpointReader {
+    /// From an arm's settings.
+    #[must_use]
+    pub fn new(settings: &Settings) -> Self {
+        let motors = crate::mit_setpoints::encodings(settings).unwrap_or_default();
+        let reading = |servo: &taustream_arm::Servo| {
+            let kind = match servo.protocol {
+                Protocol::Cia402(cia402) => Kind::Counts(Encoding {
+                    joint: servo.joint,
+                    node_id: servo.node_id,
+                    counts_per_rad: servo.sign * cia402.gear_ratio * cia402.counts_per_rev
+                        / std::f64::consts::TAU,
+                    zero_rad: servo.zero_offset_rad,
+                }),
+                Protocol::Damiao(damiao) => match damiao.mode {
+                    DamiaoMode::Mit { .. } => {
+                        Kind::Mit(*motors.iter().find(|motor| motor.joint == servo.joint)?)
+                    }
+                    DamiaoMode::PosVel => Kind::PosVel {
+                        node_id: servo.node_id,
+                        sign: servo.sign,
+                        zero_rad: servo.zero_offset_rad,
+                    },
+                },
+            };
+            Some(Reading { joint: servo.joint, bus: servo.bus, kind })
+        };
+        Self {
+            servos: settings.servos.iter().filter_map(reading).collect(),
+            packed: settings.buses.iter().map(|bus| bus.traffic.packed).collect(),
+            every: settings.buses.iter().map(|bus| u64::from(bus.traffic.setpoint_every.max(1))).collect(),
+        }
+    }
+
+    /// The setpoints in a master's frame on a bus.
+    #[must_use]
+    pub fn read(&self, bus: usize, frame: &CanFrame) -> Vec<ReadSetpoint> {
+        let (id, data) = (frame.id().raw(), frame.data());
+        let own = self.servos.iter().filter(|servo| servo.bus == bus);
+        let mut found: Vec<ReadSetpoint> = own.clone().filter_map(|servo| servo.read(id, data)).collect();
+        if self.packed.get(bus) == Some(&true) && data.len() == 8 {
+            let counts: Vec<(usize, Encoding)> = own
+                .filter_map(|servo| match servo.kind {
+                    Kind::Counts(encoding) => Some((servo.joint, encoding)),
+                    Kind::Mit(_) | Kind::PosVel { .. } => None,
+                })
+                .collect();
+            let pair = counts.chunks_exact(2).find(|pair| RPDO2 + u32::from(pair[0].1.node_id) == id);
+            for ((joint, encoding), bytes) in pair.into_iter().flatten().zip(data.chunks_exact(4)) {
+                let counts = bytes.try_into().map(i32::from_le_bytes).unwrap_or_default();
+                found.push(ReadSetpoint { joint: *joint, position_rad: encoding.rad(counts) });
+            }
+        }
+        found
+    }
+
+    /// Largest difference between a commanded angle and the one that its frame holds: rounding.
+    #[must_use]
+    pub fn rounding_rad(&self, joint: usize) -> f64 {
+        let servo = self.servos.iter().find(|servo| servo.joint == joint);
+        servo.map_or(0.0, |servo| match servo.kind {
+            Kind::Counts(encoding) => 0.5 / encoding.counts_per_rad.abs(),
+            // The range is twice the reach, in 65535 steps.
+            Kind::Mit(motor) => motor.reach[0] / 65_535.0,
+            Kind::PosVel { .. } => FLOAT_HALF_RAD,
+        })
+    }
+
+    /// Cycles from one setpoint of a joint to its next.
+    #[must_use]
+    pub fn every(&self, joint: usize) -> u64 {
+        let servo = self.servos.iter().find(|servo| servo.joint == joint);
+        servo.and_then(|servo| self.every.get(servo.bus)).copied().unwrap_or(1)
+    }
+
+    /// The bus of a joint.
+    #[must_use]
+    pub fn bus(&self, joint: usize) -> Option<usize> {
+        self.servos.iter().find(|servo| servo.joint == joint).map(|servo| servo.bus)
+    }
+}
+
+impl Reading {
+    /// The setpoint in a frame of its own.
+    fn read(&self, id: u32, data: &[u8]) -> Option<ReadSetpoint> {
+        let position_rad = match self.kind {
+            Kind::Counts(encoding) => {
+                (id == RPDO1 + u32::from(encoding.node_id)).then(|| target(data))?.map(|at| encoding.rad(at))
+            }
+            Kind::Mit(motor) => (id == u32::from(motor.node_id)).then(|| motor.commanded_rad(data)).flatten(),
+            Kind::PosVel { node_id, sign, zero_rad } => {
+                let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
+                let is_setpoint = id == POS_VEL + u32::from(node_id) && data.len() == 8;
+                is_setpoint.then(|| f64::from(f32::from_le_bytes(bytes)) * sign + zero_rad)
+            }
+        }?;
+        Some(ReadSetpoint { joint: self.joint, position_rad })
+    }
+}
+
+/// Whether the drive of a joint follows commands with torque now.
+#[must_use]
+pub fn is_enabled(simulator: &ServoSimulator, joint: usize) -> bool {
+    simulator.drive(joint).is_some_and(taustream_drivers::sim::SimulatedServo::is_enabled)
+}
