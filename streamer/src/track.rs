@@ -182,7 +182,7 @@ impl Track {
                 setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), cycle_state.scale);
                 cycle_state.off_path_rad = self.approach.add_to(&mut setpoint, approach_s);
                 cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
-                keep_stopped(ledger, &mut setpoint);
+                keep_stopped(ledger, &mut setpoint, &mut cycle_state.off_path_rad);
             }
             let now_s = self.seconds(self.next.axis);
             let approached = self.approach.has_ended(self.seconds(self.next.approach));
@@ -300,8 +300,9 @@ impl Track {
 }
 
 /// A drive that has stopped for want of setpoints gets none but that of where it stands: any other would be a step.
-fn keep_stopped(ledger: &Ledger, setpoint: &mut Setpoint) {
+fn keep_stopped(ledger: &Ledger, setpoint: &mut Setpoint, off_path_rad: &mut JointArray) {
     for (joint, last) in ledger.joints().iter().enumerate().filter(|(_, last)| last.stopped) {
+        off_path_rad[joint] += last.position_rad[0] - setpoint.position_rad[joint];
         setpoint.position_rad[joint] = last.position_rad[0];
         setpoint.velocity_rad_s[joint] = 0.0;
         setpoint.acceleration_rad_s2[joint] = 0.0;

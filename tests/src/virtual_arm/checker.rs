@@ -158,13 +158,13 @@ impl Checker {
 
     /// The loop stood still before this cycle.
     pub fn stalled(&mut self) {
-        self.path.part(false);
+        self.path.part();
     }
 
     /// What the streamer claims of a cycle.
     pub fn cycle(&mut self, cycle: &CycleRecord) {
         if cycle.lost.iter().any(|lost| *lost > 0) {
-            self.path.part(true);
+            self.path.part();
         }
         let on_path = cycle.trajectory_id != 0
             && matches!(

@@ -16,8 +16,6 @@ pub(crate) struct Path {
     sent_rad: [Option<f64>; MAX_JOINTS],
     /// Joints may be beside the path by what the log states: a stall or a loss has parted them.
     parted: bool,
-    /// A joint may stand still beside the path: its setpoints were lost.
-    lost: bool,
 }
 
 impl Path {
@@ -27,9 +25,8 @@ impl Path {
     }
 
     /// The loop stood still, or frames of a cycle were lost.
-    pub(crate) fn part(&mut self, lost: bool) {
+    pub(crate) fn part(&mut self) {
         self.parted = true;
-        self.lost |= lost;
     }
 
     /// Compares a cycle's claim with the path; what is wrong with it. `tolerance_rad` is that of a trajectory's base.
@@ -44,7 +41,7 @@ impl Path {
             let Some(at) = at else { return Some(format!("moves on trajectory {id}, never offered")) };
             self.running = Some(self.offered.swap_remove(at));
             self.offered.clear();
-            (self.last, self.parted, self.lost) = (None, false, false);
+            (self.last, self.parted) = (None, false);
         }
         let (_, trajectory) = self.running.as_ref()?;
         let held = self.last.is_some_and(|(_, s)| s.to_bits() == cycle.s.to_bits()) && cycle.sigma <= 0.0;
@@ -65,7 +62,7 @@ impl Path {
             }
             let beside_rad = is_rad - on_path[joint];
             let explained = self.parted || beside_rad.abs() <= tolerance_rad + FORMULA_RAD;
-            let as_stated = (beside_rad - off_rad).abs() <= FORMULA_RAD || self.lost;
+            let as_stated = (beside_rad - off_rad).abs() <= FORMULA_RAD;
             (!explained || !as_stated).then(|| {
                 format!("joint {} is {beside_rad:e} rad beside its path, stated {off_rad:e}", joint + 1)
             })
