@@ -301,7 +301,7 @@ fn present(names: &Names, joint: usize) -> &'static str {
 #[must_use]
 pub fn state_word(state: DriveState) -> &'static str {
     match state {
-        DriveState::Absent => "no feedback",
+        DriveState::Absent => "not heard",
         DriveState::Configuring => "being configured",
         DriveState::EnergisedUnowned => "energised, unowned",
         DriveState::Adopted => "holding from before this start",
