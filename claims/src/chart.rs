@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Most points of one curve; more cannot be seen and make the file heavy.
 const POINTS_MAX: usize = 1200;
 /// Share of the horizontal axis that is left to the legend.
-const LEGEND_SHARE: f64 = 0.16;
+const LEGEND_SHARE: f64 = 0.22;
 /// Least value that a logarithmic axis shows: what is below is rounding.
 const LOG_LEAST: f64 = 1e-16;
 /// Colours distinguished by colour-blind eyes too (Okabe and Ito).
