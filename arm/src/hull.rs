@@ -53,10 +53,10 @@ pub(crate) fn of(points_m: &[Point3<f64>]) -> Result<Hull, f64> {
     build(points_m, &[0.0])
 }
 
-/// The same for a piece that was cut out of a mesh. Many of its points lie in one plane up to rounding, where a hull is hard to
-/// build: then its corners are moved a little, which the rounding makes good.
+/// The same for a piece that was cut out of a mesh. Many of its points lie on one line or in one plane up to rounding, which leads to
+/// faces without area, or to no hull at all: so its corners are moved a little, which the rounding makes good.
 pub(crate) fn of_piece(points_m: &[Point3<f64>]) -> Result<Hull, f64> {
-    build(points_m, &[0.0, 1e-7, SCATTER, 1e-3])
+    build(points_m, &[1e-7, SCATTER, 1e-3])
 }
 
 /// By how much points of the unit cube are moved to leave common planes.
@@ -81,13 +81,15 @@ fn polyhedron(points: &[Vector], cube: &Cube, mut extreme: Vec<Vector>) -> Optio
         let (corners, triangles) = convex_mesh(&extreme, f64::INFINITY)?;
         let corners: Vec<Vector> = corners.into_iter().map(|c| cube.outside(c)).collect();
         let furthest = keep_outside(&mut outside, &corners, &triangles);
-        let rounding_m = furthest.map_or(0.0, |(_, distance_m)| distance_m) + ROUNDING_M_MIN;
+        let far_m = ROUNDING_SHARE * cube.half_m.max_element();
         match furthest {
-            Some((point, distance_m)) if distance_m > ROUNDING_SHARE * cube.half_m.max_element() => {
-                extreme.push(cube.inside(point));
-            }
+            Some((point, distance_m)) if distance_m > far_m => extreme.push(cube.inside(point)),
             _ => {
-                ConvexPolyhedron::from_convex_mesh(corners.clone(), &triangles)?;
+                // A hull of more points may have lost others by arithmetic: all of them are measured again.
+                let furthest = keep_outside(&mut points.to_vec(), &corners, &triangles);
+                let rounding_m = furthest.map_or(0.0, |(_, distance_m)| distance_m) + ROUNDING_M_MIN;
+                ConvexPolyhedron::from_convex_mesh(corners.clone(), &triangles)
+                    .filter(|_| rounding_m <= far_m + ROUNDING_M_MIN)?;
                 return Some(Hull { vertices_m: to_points(&corners), triangles, rounding_m, is_box: false });
             }
         }
@@ -247,17 +249,29 @@ const BOX_FACES: [[u32; 3]; 12] = [
     [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5],
 ];
 
-/// Leaves the points outside of the polyhedron, which only grows, and tells the furthest of them and its distance.
+/// Leaves the points outside of the polyhedron, which only grows, and returns the furthest of them and its distance.
 fn keep_outside(points: &mut Vec<Vector>, corners: &[Vector], faces: &[[u32; 3]]) -> Option<(Vector, f64)> {
-    let planes: Vec<Plane> = faces.iter().filter_map(|face| plane(corners, face)).collect();
-    points.retain(|p| planes.iter().any(|plane| plane.outside(*p) > 0.0));
-    let triangles = faces.iter().filter_map(|face| triangle(corners, face));
-    let triangles: Vec<Triangle> = triangles.map(|[a, b, c]| Triangle::new(a, b, c)).collect();
-    let distance_m = |p: &Vector| {
-        triangles.iter().map(|t| t.distance_to_local_point(*p, true)).fold(f64::INFINITY, f64::min)
+    let face = |face| {
+        let [a, b, c] = triangle(corners, face)?;
+        Some((plane(corners, face)?, Triangle::new(a, b, c)))
     };
-    let measured = points.iter().map(|p| (*p, distance_m(p)));
-    measured.max_by(|(_, a), (_, b)| a.total_cmp(b))
+    let faces: Vec<(Plane, Triangle)> = faces.iter().filter_map(face).collect();
+    points.retain(|p| faces.iter().any(|(plane, _)| plane.outside(*p) > 0.0));
+    let to_face_m = |face: &Triangle, p: Vector| face.distance_to_local_point(p, true);
+    let mut furthest: Option<(Vector, f64)> = None;
+    for p in points.iter().copied() {
+        let seen = faces.iter().map(|(plane, face)| (plane.outside(p), face));
+        let Some((_, most)) = seen.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { continue };
+        // The nearest face is no further than this one: most points need no look at all faces.
+        if furthest.is_some_and(|(_, far_m)| to_face_m(most, p) < far_m) {
+            continue;
+        }
+        let distance_m = faces.iter().map(|(_, face)| to_face_m(face, p)).fold(f64::INFINITY, f64::min);
+        if furthest.is_none_or(|(_, far_m)| distance_m >= far_m) {
+            furthest = Some((p, distance_m));
+        }
+    }
+    furthest
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Forked links: what lives in their gap can be planned for, because they count as convex parts and not as one hull.
-#![expect(clippy::unwrap_used, reason = "helpers of tests; a failure in them fails the test")]
+//! Forked links: a link in their gap can be planned for, because they count as convex parts and not as one hull.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 mod common;
 use common::pose;
 use std::fmt::Write as _;

@@ -27,7 +27,7 @@
 //!
 //! # The same everywhere
 //!
-//! Volumes are compared with a tolerance, so that among cuts of equal merit the first one wins on every machine.
+//! Volumes are compared with a tolerance, so that among cuts of equal merit the first one is taken on every machine.
 mod cut;
 mod escape;
 mod extremes;
@@ -75,15 +75,22 @@ pub(crate) fn of(points_m: &[Point3<f64>], triangles: &[[usize; 3]]) -> Result<C
     let volume_m3 = whole.volume_m3();
     let points = points_m.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
     let mesh = Piece { points, triangles: triangles.to_vec() };
-    let least_m3 = SAVED_SHARE_MIN * volume_m3;
-    let Some(first) = Part::of(&mesh, mesh.clone(), Cell::EVERYWHERE) else {
+    let parts = cut_up(&mesh, SAVED_SHARE_MIN * volume_m3);
+    if parts.len() < 2 {
         return Ok(ConvexParts { hulls: vec![whole], volume_share: 1.0 });
-    };
-    let mut parts = vec![first];
+    }
+    let hulls: Vec<Hull> = parts.into_iter().map(|part| part.hull).collect();
+    let volume_share = hulls.iter().map(Hull::volume_m3).sum::<f64>() / volume_m3;
+    Ok(ConvexParts { hulls, volume_share })
+}
+
+/// The mesh in pieces, each cut saving `least_m3` or more; nothing when the mesh itself is too thin.
+fn cut_up(mesh: &Piece, least_m3: f64) -> Vec<Part> {
+    let mut parts: Vec<Part> = Part::of(mesh, mesh.clone(), Cell::EVERYWHERE).into_iter().collect();
     while parts.len() < PARTS_MAX {
         let Some((index, cut)) = most_saving(&parts, least_m3) else { break };
         let Some(part) = parts.get_mut(index) else { break };
-        match part.divide(&mesh, cut).filter(|sides| part.saved_m3(sides) >= KEPT_SHARE * least_m3) {
+        match part.divide(mesh, cut).filter(|sides| part.saved_m3(sides) >= KEPT_SHARE * least_m3) {
             Some((below, above)) => {
                 *part = below;
                 parts.push(above);
@@ -91,12 +98,7 @@ pub(crate) fn of(points_m: &[Point3<f64>], triangles: &[[usize; 3]]) -> Result<C
             None => part.cut = None,
         }
     }
-    if parts.len() == 1 {
-        return Ok(ConvexParts { hulls: vec![whole], volume_share: 1.0 });
-    }
-    let hulls: Vec<Hull> = parts.into_iter().map(|part| part.hull).collect();
-    let volume_share = hulls.iter().map(Hull::volume_m3).sum::<f64>() / volume_m3;
-    Ok(ConvexParts { hulls, volume_share })
+    parts
 }
 
 /// The part whose cut saves most, when that is `least_m3` or more.

@@ -91,7 +91,7 @@ fn put_origin(out: &mut Vec<u8>, Origin { xyz_m, rpy_rad }: &Origin) {
 }
 
 /// A mesh that counts as its convex hull, and one that counts as several convex parts. Less was proven of the second: parts
-/// touch less often than hulls do, and pairs that touch always are not compared. Another way of cutting needs another number.
+/// touch less often than hulls do, and pairs that touch always are not compared. Another method of cutting needs another number.
 const ONE_HULL: u8 = 4;
 const CONVEX_PARTS: u8 = 5;
 
