@@ -29,7 +29,7 @@
 //! | u32 | number of links; per link: string name; u8 0, or 1 with f64 mass and the origin of its `<inertial>` |
 //! | u32 | number of joints; per joint: string name; u8 type (0 fixed, 1 revolute, 2 continuous, 3 prismatic, 4 planar, 5 floating); u32 parent; u32 child; origin; 3 x f64 axis |
 //! | u32 | number of joints that are held; per joint: u32 joint; f64 position |
-//! | u32 | number of solid parts; per part: u32 link; origin; u8 kind; the mesh file's SHA-256 (32) for a mesh; numbers: sphere (0) radius, box (1) 3 sizes, cylinder (2) and capsule (3) radius and length, mesh (4) 3 scales |
+//! | u32 | number of solid parts; per part: u32 link; origin; u8 kind; the mesh file's SHA-256 (32) for a mesh; numbers: sphere (0) radius, box (1) 3 sizes, cylinder (2) and capsule (3) radius and length, mesh as one hull (4) and as convex parts (5) 3 scales |
 //! | u32 | number of pairs that the SRDF lets touch; per pair 2 x u32, as above |
 //! | then, only when rows have masses or there is a payload: | |
 //! | u8 | 1 when rows have masses, otherwise 0; with 1, per joint f64 mass and 3 x f64 centre of its link |

@@ -33,40 +33,85 @@ pub(crate) struct Hull {
     pub(crate) is_box: bool,
 }
 
+impl Hull {
+    /// Volume of the polyhedron, without the rounding.
+    pub(crate) fn volume_m3(&self) -> f64 {
+        let corners: Vec<Vector> = self.vertices_m.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
+        volume(&corners, &self.triangles)
+    }
+}
+
+/// What a closed polyhedron encloses, its faces counter-clockwise from outside: the cones from its first corner to its faces.
+pub(crate) fn volume(corners: &[Vector], faces: &[[u32; 3]]) -> f64 {
+    let apex = corners.first().copied().unwrap_or(Vector::ZERO);
+    let triangles = faces.iter().filter_map(|face| triangle(corners, face));
+    triangles.map(|[a, b, c]| (a - apex).dot((b - apex).cross(c - apex)) / 6.0).sum()
+}
+
 /// The hull of finite points; an error says why there is none: how thick they are.
 pub(crate) fn of(points_m: &[Point3<f64>]) -> Result<Hull, f64> {
+    build(points_m, &[0.0])
+}
+
+/// The same for a piece that was cut out of a mesh. Many of its points lie on one line or in one plane up to rounding, which leads to
+/// faces without area, or to no hull at all: so its corners are moved a little, which the rounding makes good.
+pub(crate) fn of_piece(points_m: &[Point3<f64>]) -> Result<Hull, f64> {
+    build(points_m, &[1e-7, SCATTER, 1e-3])
+}
+
+/// By how much points of the unit cube are moved to leave common planes.
+pub(crate) const SCATTER: f64 = 1e-5;
+
+fn build(points_m: &[Point3<f64>], scatters: &[f64]) -> Result<Hull, f64> {
     let points: Vec<Vector> = points_m.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
     let cube = Cube::around(&points);
     let thickness_m = 2.0 * cube.half_m.min_element();
     if thickness_m.is_nan() || thickness_m < THICKNESS_M_MIN {
         return Err(thickness_m);
     }
-    let mut extreme = extreme_points(&points.iter().map(|p| cube.inside(*p)).collect::<Vec<_>>());
-    let mut outside = points;
+    let extreme = extreme_points(&points.iter().map(|p| cube.inside(*p)).collect::<Vec<_>>());
+    let built = scatters.iter().find_map(|by| polyhedron(&points, &cube, scattered(&extreme, *by)));
+    Ok(built.unwrap_or_else(|| cube.hull()))
+}
+
+/// The polyhedron of the extreme points and, if these leave out too much, some more; none when arithmetic finds none.
+fn polyhedron(points: &[Vector], cube: &Cube, mut extreme: Vec<Vector>) -> Option<Hull> {
+    let mut outside = points.to_vec();
     for _ in 0..ROUNDS_MAX {
-        let found =
-            try_convex_hull(&extreme).ok().filter(|(corners, faces)| is_closed_and_convex(corners, faces));
-        let Some((corners, triangles)) = found else { break };
+        let (corners, triangles) = convex_mesh(&extreme, f64::INFINITY)?;
         let corners: Vec<Vector> = corners.into_iter().map(|c| cube.outside(c)).collect();
         let furthest = keep_outside(&mut outside, &corners, &triangles);
-        let rounding_m = furthest.map_or(0.0, |(_, distance_m)| distance_m) + ROUNDING_M_MIN;
+        let far_m = ROUNDING_SHARE * cube.half_m.max_element();
         match furthest {
-            Some((point, distance_m)) if distance_m > ROUNDING_SHARE * cube.half_m.max_element() => {
-                extreme.push(cube.inside(point));
+            Some((point, distance_m)) if distance_m > far_m => extreme.push(cube.inside(point)),
+            _ => {
+                // A hull of more points may have lost others by arithmetic: all of them are measured again.
+                let furthest = keep_outside(&mut points.to_vec(), &corners, &triangles);
+                let rounding_m = furthest.map_or(0.0, |(_, distance_m)| distance_m) + ROUNDING_M_MIN;
+                ConvexPolyhedron::from_convex_mesh(corners.clone(), &triangles)
+                    .filter(|_| rounding_m <= far_m + ROUNDING_M_MIN)?;
+                return Some(Hull { vertices_m: to_points(&corners), triangles, rounding_m, is_box: false });
             }
-            _ if ConvexPolyhedron::from_convex_mesh(corners.clone(), &triangles).is_some() => {
-                return Ok(Hull { vertices_m: to_points(&corners), triangles, rounding_m, is_box: false });
-            }
-            _ => break,
         }
     }
-    let corner = |i: u32| {
-        let side = |bit: u32| if i & (1 << bit) == 0 { -1.0 } else { 1.0 };
-        cube.outside(Vector::new(side(0), side(1), side(2)))
-    };
-    let corners: Vec<Vector> = (0..8).map(corner).collect();
-    let (vertices_m, triangles) = (to_points(&corners), BOX_FACES.to_vec());
-    Ok(Hull { vertices_m, triangles, rounding_m: ROUNDING_M_MIN, is_box: true })
+    None
+}
+
+/// The convex hull of points; none when arithmetic finds none that leaves no point further outside than `outside`.
+pub(crate) fn convex_mesh(points: &[Vector], outside: f64) -> Option<(Vec<Vector>, Vec<[u32; 3]>)> {
+    let (corners, faces) =
+        try_convex_hull(points).ok().filter(|(corners, faces)| is_closed_and_convex(corners, faces))?;
+    let planes = faces.iter().filter_map(|face| plane(&corners, face));
+    let furthest = planes.flat_map(|plane| points.iter().map(move |p| plane.outside(*p))).fold(0.0, f64::max);
+    (furthest <= outside).then_some((corners, faces))
+}
+
+/// Points moved by up to half of `by` along each axis, each to somewhere else, the same everywhere.
+pub(crate) fn scattered(points: &[Vector], by: f64) -> Vec<Vector> {
+    // Multiples of these have parts behind the point that fall everywhere.
+    let steps = Vector::new(0.618_033_988_75, 0.414_213_562_37, 0.732_050_807_57);
+    let moved = |(i, point): (usize, &Vector)| *point + (steps * i as f64).fract() * by - 0.5 * by;
+    points.iter().enumerate().map(moved).collect()
 }
 
 /// A box around the points, along their longest diagonal and the widest direction across it. Seen as a cube, even a
@@ -110,6 +155,16 @@ impl Cube {
         let [x, y, z] = self.axes;
         let m = inside * self.half_m;
         self.middle + x * m.x + y * m.y + z * m.z
+    }
+    /// The box itself.
+    fn hull(&self) -> Hull {
+        let corner = |i: u32| {
+            let side = |bit: u32| if i & (1 << bit) == 0 { -1.0 } else { 1.0 };
+            self.outside(Vector::new(side(0), side(1), side(2)))
+        };
+        let corners: Vec<Vector> = (0..8).map(corner).collect();
+        let (vertices_m, triangles) = (to_points(&corners), BOX_FACES.to_vec());
+        Hull { vertices_m, triangles, rounding_m: ROUNDING_M_MIN, is_box: true }
     }
 }
 
@@ -194,17 +249,29 @@ const BOX_FACES: [[u32; 3]; 12] = [
     [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5],
 ];
 
-/// Leaves the points outside of the polyhedron, which only grows, and tells the furthest of them and its distance.
+/// Leaves the points outside of the polyhedron, which only grows, and returns the furthest of them and its distance.
 fn keep_outside(points: &mut Vec<Vector>, corners: &[Vector], faces: &[[u32; 3]]) -> Option<(Vector, f64)> {
-    let planes: Vec<Plane> = faces.iter().filter_map(|face| plane(corners, face)).collect();
-    points.retain(|p| planes.iter().any(|plane| plane.outside(*p) > 0.0));
-    let triangles = faces.iter().filter_map(|face| triangle(corners, face));
-    let triangles: Vec<Triangle> = triangles.map(|[a, b, c]| Triangle::new(a, b, c)).collect();
-    let distance_m = |p: &Vector| {
-        triangles.iter().map(|t| t.distance_to_local_point(*p, true)).fold(f64::INFINITY, f64::min)
+    let face = |face| {
+        let [a, b, c] = triangle(corners, face)?;
+        Some((plane(corners, face)?, Triangle::new(a, b, c)))
     };
-    let measured = points.iter().map(|p| (*p, distance_m(p)));
-    measured.max_by(|(_, a), (_, b)| a.total_cmp(b))
+    let faces: Vec<(Plane, Triangle)> = faces.iter().filter_map(face).collect();
+    points.retain(|p| faces.iter().any(|(plane, _)| plane.outside(*p) > 0.0));
+    let to_face_m = |face: &Triangle, p: Vector| face.distance_to_local_point(p, true);
+    let mut furthest: Option<(Vector, f64)> = None;
+    for p in points.iter().copied() {
+        let seen = faces.iter().map(|(plane, face)| (plane.outside(p), face));
+        let Some((_, most)) = seen.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { continue };
+        // The nearest face is no further than this one: most points need no look at all faces.
+        if furthest.is_some_and(|(_, far_m)| to_face_m(most, p) < far_m) {
+            continue;
+        }
+        let distance_m = faces.iter().map(|(_, face)| to_face_m(face, p)).fold(f64::INFINITY, f64::min);
+        if furthest.is_none_or(|(_, far_m)| distance_m >= far_m) {
+            furthest = Some((p, distance_m));
+        }
+    }
+    furthest
 }
 
 #[cfg(test)]

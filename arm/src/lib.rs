@@ -11,6 +11,7 @@ mod capsule;
 pub mod closed_form;
 mod consistency;
 mod contact;
+mod convex_parts;
 pub mod daemon;
 mod description;
 pub mod digest;

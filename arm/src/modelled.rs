@@ -5,7 +5,7 @@ use crate::mass::LinkMass;
 use crate::reader::{FaultList, Table};
 use crate::robot::LinkShape;
 use crate::scene::Shape;
-use crate::{Fault, Faults, Robot};
+use crate::{Fault, Faults, Robot, hull};
 use parry3d_f64::math::Pose;
 use taustream_motion::chain;
 
@@ -95,19 +95,39 @@ impl Robot {
     }
 }
 
+/// The shapes of a link, with parts that stand together as their common hull: a mass is centred in the gap of a fork.
+fn filled<'a>(own: impl Iterator<Item = &'a LinkShape>) -> Vec<LinkShape> {
+    let mut filled: Vec<LinkShape> = Vec::new();
+    for shape in own {
+        if let Some(last) = filled.last_mut()
+            && last.pose == shape.pose
+            && let (Shape::Hull { vertices_m: first, .. }, Shape::Hull { vertices_m: second, rounding_m, .. }) =
+                (&last.shape, &shape.shape)
+            && let Ok(hull) = hull::of(&[first.as_slice(), second.as_slice()].concat())
+        {
+            let rounding_m = rounding_m.max(hull.rounding_m);
+            last.shape = Shape::Hull { vertices_m: hull.vertices_m, triangles: hull.triangles, rounding_m };
+        } else {
+            filled.push(shape.clone());
+        }
+    }
+    filled
+}
+
 /// What is said of masses whose centre is not inside of their link's shapes.
 pub(crate) fn masses_outside(links: &[String], shapes: &[LinkShape], masses: &[LinkMass]) -> Vec<String> {
     let here = Pose::identity();
     let mut said = Vec::new();
     for mass in masses {
-        let own = shapes.iter().filter(|shape| shape.link == mass.link && shape.frame == mass.frame);
+        let own = filled(shapes.iter().filter(|shape| shape.link == mass.link && shape.frame == mass.frame));
         let at = chain::Pose::translation(mass.center_m.x, mass.center_m.y, mass.center_m.z);
         let Some(point) = Body::new(&Shape::Sphere { radius_m: 0.0 }, &at) else { continue };
         let to_shape_m = |shape: &LinkShape| {
             let body = Body::new(&shape.shape, &shape.pose)?;
             Some(body.distance_m(&body.placed(&here), &point, &point.placed(&here)))
         };
-        let Some(outside_m) = own.filter_map(to_shape_m).reduce(f64::min).filter(|d| *d > OUTSIDE_M) else {
+        let Some(outside_m) = own.iter().filter_map(to_shape_m).reduce(f64::min).filter(|d| *d > OUTSIDE_M)
+        else {
             continue;
         };
         let (name, center) = (links.get(mass.link).map_or("", String::as_str), mass.center_m);

@@ -54,29 +54,33 @@ pub(crate) fn load(file: &Path, scale: Scale) -> Result<Mesh, Refusal> {
     parse(file, &ending, &bytes, scale).map_err(|(value, expected)| refusal(file, &value, &expected))
 }
 
-/// The corners of a mesh file, for its hull.
+/// The mesh of a link, for its convex bodies.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Cloud {
+pub(crate) struct LinkMesh {
     pub(crate) points_m: Vec<Point3<f64>>,
+    /// Corner indices, all of which exist. Some triangles may have no area.
+    pub(crate) triangles: Vec<[usize; 3]>,
     /// SHA-256 of the file.
     pub(crate) digest: [u8; 32],
     /// What the owner should know about how the file was read.
     pub(crate) remarks: Vec<String>,
 }
 
-/// Reads a mesh file for its corners alone, each coordinate scaled by its own factor. Triangles without an area, which
-/// programs leave behind in many meshes, do no harm here.
-pub(crate) fn load_points(file: &Path, scale: [f64; 3]) -> Result<Cloud, Refusal> {
+/// Reads the mesh of a link, each coordinate scaled by its own factor. Triangles without an area, which programs leave behind in
+/// many meshes, do no harm here.
+pub(crate) fn load_link(file: &Path, scale: [f64; 3]) -> Result<LinkMesh, Refusal> {
     let (ending, bytes) = read(file)?;
     let digest = digest::of_bytes(&bytes);
-    let cloud = triangles(file, &ending, &bytes).and_then(|read| {
+    let mesh = triangles(file, &ending, &bytes).and_then(|read| {
         check_count(&read.triangles)?;
         let points_m = place(read.corners, scale)?;
         check_size(&points_m, SIZE_M_MAX)?;
+        check_indices(&read.triangles, points_m.len())?;
         let up = read.up_axis.map(|up| format!("its up_axis {up} is not applied, as in rviz and MoveIt"));
-        Ok(Cloud { points_m, digest, remarks: read.remarks.into_iter().chain(up).collect() })
+        let remarks = read.remarks.into_iter().chain(up).collect();
+        Ok(LinkMesh { points_m, triangles: read.triangles, digest, remarks })
     });
-    cloud.map_err(|(value, expected)| refusal(file, &value, &expected))
+    mesh.map_err(|(value, expected)| refusal(file, &value, &expected))
 }
 
 /// The ending of a mesh file's name in small letters, and its bytes.
@@ -186,6 +190,16 @@ fn check_count(triangles: &[[usize; 3]]) -> Result<(), Refusal> {
         return Err((value, format!("at most {TRIANGLES_MAX}; simplify the mesh")));
     }
     Ok(())
+}
+
+fn check_indices(triangles: &[[usize; 3]], corners: usize) -> Result<(), Refusal> {
+    match triangles.iter().position(|triangle| triangle.iter().any(|corner| *corner >= corners)) {
+        None => Ok(()),
+        Some(i) => Err((
+            format!("has triangle {i} (from 0) with a corner that does not exist"),
+            format!("corners below {corners}"),
+        )),
+    }
 }
 
 /// The corners in metres, each of them finite and near.

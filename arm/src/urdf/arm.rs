@@ -2,17 +2,18 @@
 //!
 //! Links are gathered by the frame that they are rigid with: frame 0 is the base link, frame i the link behind the i-th
 //! joint of the arm, and the last frame the tip link. Joints off the chain do not move.
+use super::mesh_part::MeshPart;
 use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid, StatedLimits};
 use super::tree::Tree;
 use super::xml::{self, Context, Element};
 use super::{package, srdf};
 use crate::document::{self, Value, shown};
 use crate::mass::{LinkMass, Weight};
+use crate::mesh;
 use crate::modelled::Listed;
 use crate::reader::{FaultList, Table};
 use crate::robot::LinkShape;
 use crate::scene::{self, Shape};
-use crate::{hull, mesh};
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -37,7 +38,8 @@ pub(crate) struct JointInfo {
 pub(crate) struct SolidPart {
     pub(crate) link: usize,
     pub(crate) origin: Origin,
-    pub(crate) shape: Shape,
+    /// One; of a mesh, one or more hulls.
+    pub(crate) shapes: Vec<Shape>,
     /// Of a mesh: the hash of its file, and its scale.
     pub(crate) mesh: Option<([u8; 32], [f64; 3])>,
 }
@@ -235,16 +237,14 @@ impl UrdfArm {
     /// The solid parts in their frames.
     pub(crate) fn shapes(&self) -> Vec<LinkShape> {
         let placed = self.placed();
-        let shape = |part: &SolidPart| {
+        let mut shapes = Vec::new();
+        for part in &self.parts {
             let (frame, link_pose) = placed.get(part.link).copied().unwrap_or_default();
-            LinkShape {
-                link: part.link,
-                frame,
-                pose: link_pose * pose(&part.origin),
-                shape: part.shape.clone(),
-            }
-        };
-        self.parts.iter().map(shape).collect()
+            let pose = link_pose * pose(&part.origin);
+            let shape = |shape: &Shape| LinkShape { link: part.link, frame, pose, shape: shape.clone() };
+            shapes.extend(part.shapes.iter().map(shape));
+        }
+        shapes
     }
     /// The links' masses in their frames.
     pub(crate) fn masses(&self) -> Vec<LinkMass> {
@@ -356,8 +356,8 @@ fn read_parts(
     let all =
         model.links.iter().enumerate().flat_map(|(i, link)| link.parts.iter().map(move |p| (i, link, p)));
     for (link, of, part) in all {
-        let (shape, mesh) = match &part.solid {
-            Solid::Primitive(shape) => (shape.clone(), None),
+        let (shapes, mesh) = match &part.solid {
+            Solid::Primitive(shape) => (vec![shape.clone()], None),
             Solid::Mesh { named, scale } => {
                 let file = package::find(&keys.urdf, &keys.package_dirs, named);
                 let made = file.map_err(|expected| (shown(named), expected)).and_then(|file| {
@@ -367,7 +367,7 @@ fn read_parts(
                 match made {
                     Ok(made) => {
                         notices.push(format!("{}: {}", part.path, made.words));
-                        (made.shape, Some((made.digest, *scale)))
+                        (made.shapes, Some((made.digest, *scale)))
                     }
                     Err((value, expected)) if listed.iter().any(|listed| listed.name == of.name) => {
                         notices.push(format!("{}: not read ({value}: expected {expected})", part.path));
@@ -384,42 +384,9 @@ fn read_parts(
                 }
             }
         };
-        parts.push(SolidPart { link, origin: part.origin, shape, mesh });
+        parts.push(SolidPart { link, origin: part.origin, shapes, mesh });
     }
     fault_list.is_clean().then_some((parts, skipped, notices))
-}
-
-/// A mesh as a hull.
-#[derive(Clone)]
-struct MeshPart {
-    shape: Shape,
-    digest: [u8; 32],
-    words: String,
-}
-
-impl MeshPart {
-    fn load(file: &std::path::Path, scale: [f64; 3]) -> Result<Self, mesh::Refusal> {
-        let cloud = mesh::load_points(file, scale)?;
-        let hull = hull::of(&cloud.points_m).map_err(|thickness_m| {
-            let value = format!(
-                "{} has {} corners and is {thickness_m:.1e} m thick",
-                file.display(),
-                cloud.points_m.len()
-            );
-            (value, "a mesh with an inside: at least 4 corners that do not lie in one plane".to_owned())
-        })?;
-        let what = if hull.is_box { "the box around it" } else { "its convex hull" };
-        let remarks: String = cloud.remarks.iter().map(|remark| format!("; {remark}")).collect();
-        let words = format!(
-            "mesh {} counts as {what} ({} of {} corners, widened by {:.2} mm){remarks}",
-            file.display(),
-            hull.vertices_m.len(),
-            cloud.points_m.len(),
-            1e3 * hull.rounding_m
-        );
-        let hull::Hull { vertices_m, triangles, rounding_m, .. } = hull;
-        Ok(Self { shape: Shape::Hull { vertices_m, triangles, rounding_m }, digest: cloud.digest, words })
-    }
 }
 
 fn named_link(

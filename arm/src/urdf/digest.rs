@@ -90,20 +90,52 @@ fn put_origin(out: &mut Vec<u8>, Origin { xyz_m, rpy_rad }: &Origin) {
     xyz_m.iter().chain(rpy_rad).for_each(|number| put_number(out, *number));
 }
 
+/// A mesh that counts as its convex hull, and one that counts as several convex parts. Less was proven of the second: parts
+/// touch less often than hulls do, and pairs that touch always are not compared. Another method of cutting needs another number.
+const ONE_HULL: u8 = 4;
+const CONVEX_PARTS: u8 = 5;
+
 fn put_part(out: &mut Vec<u8>, part: &SolidPart) {
-    let SolidPart { link, origin, shape, mesh } = part;
+    let SolidPart { link, origin, shapes, mesh } = part;
     put_count(out, *link);
     put_origin(out, origin);
-    let (kind, numbers): (u8, Vec<f64>) = match (shape, mesh) {
-        (Shape::Sphere { radius_m }, _) => (0, vec![*radius_m]),
-        (Shape::Box { size_m }, _) => (1, size_m.to_vec()),
-        (Shape::Cylinder { radius_m, length_m }, _) => (2, vec![*radius_m, *length_m]),
-        (Shape::Capsule { radius_m, length_m }, _) => (3, vec![*radius_m, *length_m]),
-        (Shape::Mesh { .. } | Shape::Hull { .. }, Some((_, scale))) => (4, scale.to_vec()),
+    let (kind, numbers): (u8, Vec<f64>) = match (shapes.as_slice(), mesh) {
+        ([Shape::Sphere { radius_m }], _) => (0, vec![*radius_m]),
+        ([Shape::Box { size_m }], _) => (1, size_m.to_vec()),
+        ([Shape::Cylinder { radius_m, length_m }], _) => (2, vec![*radius_m, *length_m]),
+        ([Shape::Capsule { radius_m, length_m }], _) => (3, vec![*radius_m, *length_m]),
         // Shapes of triangles come from files only.
-        (Shape::Mesh { .. } | Shape::Hull { .. }, None) => (4, Vec::new()),
+        ([_], mesh) => (ONE_HULL, mesh.map_or(Vec::new(), |(_, scale)| scale.to_vec())),
+        (_, mesh) => (CONVEX_PARTS, mesh.map_or(Vec::new(), |(_, scale)| scale.to_vec())),
     };
     out.push(kind);
     out.extend(mesh.iter().flat_map(|(digest, _)| digest));
     numbers.iter().for_each(|number| put_number(out, *number));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Goal: a mesh that counts as one hull keeps the bytes that it had before there were parts, and one that counts as parts has others.
+    #[test]
+    fn bytes_of_a_mesh_say_whether_it_counts_as_parts() {
+        let hull = || Shape::Hull { vertices_m: Vec::new(), triangles: Vec::new(), rounding_m: 0.0 };
+        let bytes = |shapes: Vec<Shape>| {
+            let mut out = Vec::new();
+            put_part(
+                &mut out,
+                &SolidPart { link: 3, origin: Origin::NONE, shapes, mesh: Some(([7; 32], [0.5; 3])) },
+            );
+            out
+        };
+        let mut expected = vec![3, 0, 0, 0];
+        expected.extend([0; 48]);
+        expected.push(4);
+        expected.extend([7; 32]);
+        expected.extend([0.5_f64.to_le_bytes(); 3].concat());
+        assert_eq!(bytes(vec![hull()]), expected);
+        expected[52] = 5;
+        assert_eq!(bytes(vec![hull(), hull()]), expected);
+    }
 }
