@@ -3,8 +3,9 @@
 use anyhow::{Error, Result};
 use std::time::Instant;
 
-/// How often a scenario is tried on a host that stalls the machine.
-const TRIES: usize = 2;
+/// How often a scenario is tried on a host that stalls the machine. Beside ordinary load on all processors one in 80 needed a
+/// second try.
+const TRIES: usize = 4;
 
 /// A scenario that did not end well.
 #[derive(Debug)]
@@ -66,7 +67,7 @@ mod tests {
     #[test]
     fn scenario_is_tried_again_after_a_stall_only() {
         assert_eq!(tries(false, 9), (1, false));
-        assert_eq!(tries(true, 9), (2, false));
+        assert_eq!(tries(true, 9), (4, false));
         assert_eq!(tries(true, 2), (2, true));
         assert_eq!(tries(false, 1), (1, true));
     }
