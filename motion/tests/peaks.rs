@@ -157,6 +157,8 @@ fn best_n_is_no_longer_than_any_other() {
             assert!(best_s <= joints_duration_s(&delta_rad, &limits, n), "seed {seed}, n {n}");
         }
     }
+    // Of equal ones the smallest: no move takes the least duration with any n.
+    assert_eq!(best_n(&[0.0; MAX_JOINTS], &ur5_limits()), (N_MIN, DURATION_S_MIN));
     // Measured before by other code: 1 rad at the UR5's limits takes 1.46 times the jerk-limited optimum of 0.628 s.
     let mut delta_rad = [0.0; MAX_JOINTS];
     delta_rad[0] = 1.0;

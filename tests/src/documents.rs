@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Commands of the source tree, and the step of `cargo xtask test` that covers each of them.
-const CHECKOUT_LINES: [(&str, &str); 8] = [
+const CHECKOUT_LINES: [(&str, &str); 9] = [
     ("cargo test --workspace --test virtual_arm", "tests"),
     ("cargo xtask demo", "the demo as an ordinary user"),
     ("cargo xtask test", "this run"),
@@ -20,6 +20,7 @@ const CHECKOUT_LINES: [(&str, &str); 8] = [
     ("cargo xtask uninstall", "the installed services under systemd"),
     ("sudo systemctl enable --now systemd-networkd", "the installed services under systemd"),
     ("sudo cp /usr/share/taustream/network/", "the installed services under systemd"),
+    ("cargo mutants -p taustream-motion", "nothing: it takes hours"),
 ];
 
 /// How a block is tested.

@@ -20,6 +20,9 @@ const COMMAND_VALID: Duration = Duration::from_millis(1_500);
 /// Longest wait for one report; the slowest settable rate is well above one a second.
 const REPORT_S_MAX: f64 = 2.0;
 
+/// Longest wait for a planner whose names a starting streamer has cleared: it notices and opens them again within two.
+const PLANNER_BACK_S: f64 = 3.0;
+
 /// Access to the services of one arm.
 pub(crate) struct Client {
     // Ports go before their node.
@@ -66,10 +69,21 @@ impl Client {
         limit_s: f64,
         meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
     ) -> Result<PlanReply, Failure> {
-        let client = self.wire.plan_client()?;
-        let pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
-        if pending.number_of_server_connections() == 0 {
-            return Err(self.wire.not_running(PLANNER).into());
+        // A streamer that has just started clears the arm's names, and a running planner opens its own again soon.
+        let back = Limit::after_s(PLANNER_BACK_S);
+        let (mut client, mut pending);
+        loop {
+            client = self.wire.plan_client()?;
+            pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
+            if pending.number_of_server_connections() > 0 {
+                break;
+            }
+            if back.is_over() {
+                return Err(self.wire.not_running(PLANNER).into());
+            }
+            meanwhile()?;
+            interrupt::check()?;
+            thread::sleep(Duration::from_millis(20));
         }
         let limit = Limit::after_s(limit_s);
         loop {
