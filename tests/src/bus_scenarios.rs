@@ -38,13 +38,18 @@ fn in_progress(bench: &mut TestBench, goals: &Goals) -> Result<()> {
 
 /// The fault that a bus brought, with what `status` says about it.
 fn bus_fault(bench: &mut TestBench, bus_fault: BusFault, words: &[&str]) -> Result<Report> {
+    bus_fault_among(bench, &[bus_fault], words)
+}
+
+/// The same where the moment decides which of several is noticed first.
+fn bus_fault_among(bench: &mut TestBench, expected: &[BusFault], words: &[&str]) -> Result<Report> {
     let report = bench.await_phase(Phase::Fault)?;
     let cause = report.cause();
     let found = cause.and_then(|c| BusFault::from_code(c.code));
     ensure!(
         cause.is_some_and(|c| c.reason == FaultReason::BusFault && c.bus == Some(0))
-            && found == Some(bus_fault),
-        "a bus fault by {bus_fault:?} was expected, the report says {cause:?}"
+            && found.is_some_and(|found| expected.contains(&found)),
+        "a bus fault by {expected:?} was expected, the report says {cause:?}"
     );
     ensure!(report.trajectory_s < report.trajectory_duration_s, "the motion had ended before the fault");
     let status = bench.cli_done(&["status"])?.stdout;
@@ -100,7 +105,9 @@ fn queue_full(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     in_progress(bench, goals)?;
     bench.run("tc", "qdisc add dev vcan0 root tbf rate 500kbit burst 160 limit 320")?;
     let words = ["transmit queue full (ENOBUFS)", "bus `arm` (vcan0)", "nothing is sent until `clear-fault`"];
-    let report = bus_fault(bench, BusFault::QueueFull, &words)?;
+    bench.await_report("the failed bus", |r, _| r.buses[0].silent == 1)?;
+    // One joint may have missed more setpoints than its drive bridges before whole cycles are lost.
+    let report = bus_fault_among(bench, &[BusFault::QueueFull, BusFault::SetpointsLost], &words)?;
     ensure!(report.buses[0].cycles_lost >= 3 && report.frames_lost > 0, "lost cycles are not counted");
     bench.run("tc", "qdisc del dev vcan0 root")?;
     return_path(bench, goals)
