@@ -227,10 +227,12 @@ fn unacknowledged(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.run("modprobe", "vcan echo=1")?;
     add_interface(bench, "vcan0")?;
     add_interface(bench, "vcan1")?;
+    // While nothing is sent: the kernel drops what is on its way when a queue is added.
+    bench.run("tc", "qdisc add dev vcan0 root netem delay 0ms limit 1000")?;
     return_path(bench, goals)?;
     bench.cli_done(&["speed", "20"])?;
     set_off(bench, goals, 2, 0.1)?;
-    bench.run("tc", "qdisc add dev vcan0 root netem delay 700ms limit 1000")?;
+    bench.run("tc", "qdisc change dev vcan0 root netem delay 700ms limit 1000")?;
     let report = bus_fault(bench, BusFault::Unconfirmed, &["frames are not acknowledged", "in flight"])?;
     ensure!(report.fault_value >= 7.0, "only {} frames in flight", report.fault_value);
     bench.await_report("the late frames to be on the wire", |r, _| r.buses[0].in_flight == 0)?;
