@@ -71,12 +71,11 @@ impl Client {
     ) -> Result<PlanReply, Failure> {
         // A streamer that has just started clears the arm's names, and a running planner opens its own again soon.
         let back = Limit::after_s(PLANNER_BACK_S);
-        let (mut client, mut pending);
-        loop {
-            client = self.wire.plan_client()?;
-            pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
+        let (_client, pending) = loop {
+            let client = self.wire.plan_client()?;
+            let pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
             if pending.number_of_server_connections() > 0 {
-                break;
+                break (client, pending);
             }
             if back.is_over() {
                 return Err(self.wire.not_running(PLANNER).into());
@@ -84,7 +83,7 @@ impl Client {
             meanwhile()?;
             interrupt::check()?;
             thread::sleep(Duration::from_millis(20));
-        }
+        };
         let limit = Limit::after_s(limit_s);
         loop {
             match pending.receive() {
