@@ -33,13 +33,7 @@ for ((i = 0; i < machine_interfaces; i++)); do
 done
 # No throttling of SCHED_FIFO: the default stops a real-time thread for 50 ms in each second of full load.
 echo -1 > /proc/sys/kernel/sched_rt_runtime_us
-# Frames go through the network's software interrupts. When the kernel hands those to its thread, they must not wait
-# behind ordinary programs: on a busy machine with one processor they did for 25 ms and more.
-for thread in /proc/[0-9]*; do
-    case "$(cat "$thread/comm" 2> /dev/null)" in
-        ksoftirqd/*) chrt --fifo --pid 90 "${thread#/proc/}" || fail "${thread#/proc/} cannot be raised" ;;
-    esac
-done
+/bin/bash $shared/can-softirq.sh || fail "the thread of software interrupts cannot be raised"
 echo vcan-machine > /proc/sys/kernel/hostname
 
 # The command writes into pipes, for a program that finds a terminal may behave otherwise.

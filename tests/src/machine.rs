@@ -24,6 +24,7 @@ use std::time::{Duration, Instant};
 const INIT: &str = include_str!("../machine/init.sh");
 /// Runs as process 1 from then on.
 const GUEST: &str = include_str!("../machine/guest.sh");
+const CAN_SOFTIRQ: &str = include_str!("../machine/can-softirq.sh");
 
 /// Time for boot, the guest's own time-out and power-off, on top of the command's limit.
 const BOOT_AND_HALT: Duration = Duration::from_secs(60);
@@ -242,6 +243,7 @@ impl Machine {
         scratch
             .write("init.sh", INIT.as_bytes())
             .and_then(|()| scratch.write("guest.sh", GUEST.as_bytes()))
+            .and_then(|()| scratch.write("can-softirq.sh", CAN_SOFTIRQ.as_bytes()))
             .and_then(|()| scratch.write("writable", &writable))
             .and_then(|()| scratch.write("command.sh", &command_script(&here, self.limit_s, command)))
             .map_err(failed)

@@ -6,6 +6,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 
 const PROBE: &str = include_str!("../../machine/probe.sh");
+const CAN_SOFTIRQ: &str = include_str!("../../machine/can-softirq.sh");
 /// The sandbox of a service, with another program in it. `+` would step out of it, so there is none.
 const PROBE_UNIT: &str = "\
 [Service]
@@ -19,15 +20,10 @@ Restart=no
 const CAN_SOFTIRQ_UNIT: &str = "\
 [Service]
 Type=oneshot
-ExecStart=/bin/sh /opt/can-softirq.sh
+ExecStart=/bin/bash /opt/can-softirq.sh
 [Install]
 WantedBy=multi-user.target
 ";
-const CAN_SOFTIRQ: &str = r#"
-for thread in /proc/[0-9]*; do
-    case "$(cat "$thread/comm")" in ksoftirqd/*) chrt --fifo --pid 90 "${thread#/proc/}" ;; esac
-done
-"#;
 /// The pose at power-up of the arm's settings: arm up, elbow bent, clear of everything.
 const START: &str = "start_rad = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]";
 

@@ -1,8 +1,9 @@
 //! What systemd thinks of the units, what the kernel enforces, and which threads are real-time.
-use super::guest::{done, number, run};
+use super::guest::{done, number, run, wait};
 use super::{PLANNER, SERVOSIM, STREAMER, stall};
 use anyhow::{Context, Result, ensure};
 use std::fs;
+use std::time::Duration;
 
 /// The most exposure, of 10, that `systemd-analyze security` may see.
 pub const EXPOSURE_MAX: f64 = 1.5;
@@ -22,6 +23,10 @@ const STREAMER_MAY: [&str; 8] = [
 const PLANNER_MAY: [&str; 4] = ["socket-unix", "write-runtime", "write-shm", "write-tmp"];
 /// Lines that the probe prints.
 const PROBES: usize = 28;
+/// Its last line.
+const PROBES_ENDED: &str = "probes ended";
+/// How long a line may take from a program that has ended to the journal.
+const JOURNAL_LIMIT: Duration = Duration::from_secs(30);
 
 /// `systemd-analyze verify` has nothing to say.
 ///
@@ -72,8 +77,9 @@ pub fn exposure(unit: &str) -> Result<f64> {
 pub fn enforced() -> Result<String> {
     // Outside of any sandbox everything goes: a probe that cannot succeed would prove nothing.
     let control = done(&["bash", "/opt/probe.sh"])?;
-    let failed: Vec<&str> = control.lines().filter(|line| !line.ends_with(" yes")).collect();
-    ensure!(failed.is_empty() && control.lines().count() == PROBES, "without a sandbox: {failed:?}");
+    let results = results(control.lines());
+    let failed: Vec<&(&str, bool)> = results.iter().filter(|(_, yes)| !yes).collect();
+    ensure!(failed.is_empty() && results.len() == PROBES, "without a sandbox: {failed:?}");
     let streamer = probe("taustream-streamer@probe.service", &STREAMER_MAY)?;
     let planner = probe("taustream-planner@probe.service", &PLANNER_MAY)?;
     Ok(format!("{streamer} and {planner} probes"))
@@ -85,16 +91,12 @@ pub fn enforced() -> Result<String> {
 /// Every difference.
 pub fn probe(unit: &str, may: &[&str]) -> Result<usize> {
     done(&["systemctl", "start", unit])?;
-    let entries = super::guest::journal(unit)?;
-    let starts =
-        entries.iter().rposition(|e| e["MESSAGE"].as_str().is_some_and(|m| m.starts_with("Starting")));
-    let lines = entries.iter().skip(starts.unwrap_or(0)).filter_map(|entry| entry["MESSAGE"].as_str());
-    let results: Vec<(&str, bool)> = lines
-        .filter_map(|line| {
-            let (name, word) = line.split_once(' ')?;
-            matches!(word, "yes" | "no").then_some((name, word == "yes"))
-        })
-        .collect();
+    let mut lines = Vec::new();
+    wait(&format!("{unit}: the last line of the probe is in the journal"), JOURNAL_LIMIT, || {
+        lines = lines_since_start(unit)?;
+        Ok(lines.iter().any(|line| line == PROBES_ENDED))
+    })?;
+    let results = results(lines.iter().map(String::as_str));
     ensure!(results.len() == PROBES, "{unit}: {} of {PROBES} probes: {results:?}", results.len());
     let wrong: Vec<String> = results
         .iter()
@@ -103,6 +105,24 @@ pub fn probe(unit: &str, may: &[&str]) -> Result<usize> {
         .collect();
     ensure!(wrong.is_empty(), "{unit}: {}", wrong.join(", "));
     Ok(results.len())
+}
+
+/// What a unit has written to the journal since it was started last.
+fn lines_since_start(unit: &str) -> Result<Vec<String>> {
+    let entries = super::guest::journal(unit)?;
+    let messages: Vec<&str> = entries.iter().filter_map(|entry| entry["MESSAGE"].as_str()).collect();
+    let start = messages.iter().rposition(|message| message.starts_with("Starting")).unwrap_or(0);
+    Ok(messages.into_iter().skip(start).map(str::to_owned).collect())
+}
+
+/// The probes among the lines, each with what it found: allowed or not.
+fn results<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<(&'a str, bool)> {
+    lines
+        .filter_map(|line| {
+            let (name, word) = line.split_once(' ')?;
+            matches!(word, "yes" | "no").then_some((name, word == "yes"))
+        })
+        .collect()
 }
 
 /// The thread of the cycle is `SCHED_FIFO` with the priority of the settings, and no other is; memory is locked.
