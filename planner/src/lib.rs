@@ -22,6 +22,7 @@ pub mod pipeline;
 pub mod plan;
 pub mod position;
 pub mod refine;
+pub mod replacement;
 pub mod search;
 pub mod send;
 pub mod service;

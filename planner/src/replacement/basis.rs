@@ -1,0 +1,143 @@
+//! The strokes that a replacement may use, and what each of them adds to velocity, acceleration and jerk.
+//!
+//! Widths grow from the cut on and shrink towards the end: narrow strokes cancel what the kept ones do and end the motion
+//! crisply, wide ones carry it. The spacing is a fixed part of the width, so that the ripple of the sum stays small.
+use taustream_motion::stroke::{DURATION_S_MIN, Phi};
+
+/// Exponent of the new strokes.
+pub(super) const EXPONENT: u32 = 10;
+/// Strokes that start within the width of one.
+const PER_KERNEL: f64 = 12.0;
+/// How much wider strokes may be for each second from either end (1).
+const GROWTH: f64 = 0.6;
+/// Instants a spacing at which weights are fitted; a stroke starts at every fourth of them.
+const INSTANTS: u32 = 4;
+/// Instants that are checked for each of these.
+pub(super) const CHECKED: u32 = 3;
+/// More strokes than this are never useful.
+const STROKES_MAX: usize = 256;
+
+/// Widths of the strokes of a motion of a certain duration (s).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Widths {
+    /// When the last stroke ends, after the cut.
+    pub duration_s: f64,
+    /// Of the first stroke.
+    pub first_s: f64,
+    /// Of the widest strokes.
+    pub middle_s: f64,
+    /// Of the last stroke.
+    pub last_s: f64,
+}
+
+/// Start and width of one stroke, after the cut (s).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slot {
+    pub start_s: f64,
+    pub width_s: f64,
+}
+
+impl Slot {
+    fn end_s(self) -> f64 {
+        self.start_s + self.width_s
+    }
+}
+
+/// The slots for these widths: starts and ends rise, and the last stroke ends with the motion. Nothing when there would be
+/// too many.
+pub(super) fn slots(widths: &Widths) -> Option<Vec<Slot>> {
+    let mut slots: Vec<Slot> = Vec::new();
+    let mut start_s = 0.0;
+    loop {
+        let rising = widths.first_s + GROWTH * start_s;
+        // A stroke ends before the end of the motion, and its width counts from there.
+        let falling = (widths.last_s + GROWTH * (widths.duration_s - start_s)) / (1.0 + GROWTH);
+        let width_s = rising.min(falling).min(widths.middle_s);
+        if start_s + width_s > widths.duration_s * (1.0 + 1e-12) {
+            break;
+        }
+        if slots.len() >= STROKES_MAX {
+            return None;
+        }
+        slots.push(Slot { start_s, width_s });
+        start_s += width_s / PER_KERNEL;
+    }
+    let stretch = widths.duration_s / slots.last()?.end_s();
+    for slot in &mut slots {
+        slot.start_s *= stretch;
+        slot.width_s = (slot.width_s * stretch).max(DURATION_S_MIN);
+    }
+    Some(slots)
+}
+
+/// Instants after the cut, and what a stroke adds to velocity, acceleration and jerk at each of them.
+pub(super) struct Instants {
+    pub times_s: Vec<f64>,
+    /// Index of the first stroke that runs at an instant, and of its first share. One more than there are instants.
+    running: Vec<(usize, usize)>,
+    /// For each radian of the stroke.
+    shares: Vec<[f64; 3]>,
+    /// Most strokes that run at once.
+    pub most_running: usize,
+}
+
+impl Instants {
+    /// The instants at which weights are fitted.
+    pub(super) fn fitted(slots: &[Slot]) -> Self {
+        let mut times_s = Vec::new();
+        for pair in slots.windows(2) {
+            if let [a, b] = pair {
+                divide(&mut times_s, a.start_s, b.start_s, INSTANTS);
+            }
+        }
+        if let Some(last) = slots.last() {
+            // PER_KERNEL spacings.
+            divide(&mut times_s, last.start_s, last.end_s(), 12 * INSTANTS);
+        }
+        Self::new(slots, times_s)
+    }
+
+    /// These instants, and more between them: [`CHECKED`] for each.
+    pub(super) fn checked(&self, slots: &[Slot], end_s: f64) -> Self {
+        let mut times_s = Vec::new();
+        let next_s = self.times_s.iter().skip(1).chain(std::iter::once(&end_s));
+        for (from_s, to_s) in self.times_s.iter().zip(next_s) {
+            divide(&mut times_s, *from_s, *to_s, CHECKED);
+        }
+        Self::new(slots, times_s)
+    }
+
+    fn new(slots: &[Slot], times_s: Vec<f64>) -> Self {
+        let mut running = Vec::with_capacity(times_s.len() + 1);
+        let mut shares: Vec<[f64; 3]> = Vec::new();
+        let mut most_running = 0;
+        let mut first = 0;
+        for t_s in &times_s {
+            while slots.get(first).is_some_and(|slot| slot.end_s() <= *t_s) {
+                first += 1;
+            }
+            running.push((first, shares.len()));
+            for slot in slots.iter().skip(first).take_while(|slot| slot.start_s < *t_s) {
+                let rate = 1.0 / slot.width_s;
+                let phi = Phi::at(EXPONENT, ((t_s - slot.start_s) * rate).min(1.0));
+                shares.push([phi.d1 * rate, phi.d2 * rate * rate, phi.d3 * rate * rate * rate]);
+            }
+            most_running = most_running.max(shares.len() - running[running.len() - 1].1);
+        }
+        running.push((0, shares.len()));
+        Self { times_s, running, shares, most_running }
+    }
+
+    /// Index of the first stroke that runs at an instant, and the shares of those that run.
+    #[inline]
+    pub(super) fn shares(&self, instant: usize) -> (usize, &[[f64; 3]]) {
+        let (first, from) = self.running[instant];
+        let (_, to) = self.running[instant + 1];
+        (first, &self.shares[from..to])
+    }
+}
+
+fn divide(times_s: &mut Vec<f64>, from_s: f64, to_s: f64, parts: u32) {
+    let step_s = (to_s - from_s) / f64::from(parts);
+    times_s.extend((0..parts).map(|part| from_s + f64::from(part) * step_s));
+}
