@@ -46,6 +46,7 @@ pub mod settings;
 pub mod shipped;
 pub mod stall;
 pub mod state_dir;
+pub mod stopping;
 pub mod text;
 pub mod trajectory_file;
 pub mod trust;

@@ -2,6 +2,7 @@
 use crate::document::{self, Node};
 use crate::protocol::Protocol;
 use crate::reader::{Bounds, FaultList, Table};
+use crate::stopping::STOP_S_MAX;
 use crate::{AfterStall, Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
 use std::path::{Path, PathBuf};
 
@@ -156,6 +157,8 @@ pub struct Supervision {
     pub base_tolerance_rad: f64,
     /// Speed override at start, in percent.
     pub first_speed_percent: f64,
+    /// Longest stop of an arm that is accepted, s.
+    pub stop_s_max: f64,
 }
 
 /// Checked settings of one arm.
@@ -203,6 +206,8 @@ const RATE_HZ: Bounds = Bounds::within(1.0, 1000.0, "Hz");
 const AGE_S: Bounds = Bounds::above(0.0, 1.0, "s");
 const ERROR_RAD: Bounds = Bounds::above(0.0, 3.2, "rad");
 const TIMEOUT_S: Bounds = Bounds::within(0.1, 60.0, "s");
+/// The service manager waits 20 s for the streamer: for a stop, and for the drives and the disk after it.
+const STOP_S: Bounds = Bounds::above(0.0, 5.0, "s");
 /// The difference between base and commanded pose shifts the start of a verified motion, so it stays at an encoder's resolution.
 const TOLERANCE_RAD: Bounds = Bounds::within(0.0, 1e-6, "rad");
 const PERCENT: Bounds = Bounds::above(0.0, 100.0, "percent");
@@ -275,7 +280,8 @@ impl Settings {
             supervision: supervision?,
             simulator,
         };
-        if let Err(faults) = settings.robot.require_modelled() {
+        let stops = settings.robot.require_stops(settings.supervision.stop_s_max);
+        for faults in [settings.robot.require_modelled(), stops].into_iter().filter_map(Result::err) {
             fault_list.merge(faults);
         }
         consistency::check_jump(fault_list, &settings);
@@ -336,6 +342,7 @@ fn read_supervision(mut table: Table<'_>) -> Option<Supervision> {
     let drive_timeout_s = table.number_or("drive_timeout_s", default::DRIVE_TIMEOUT_S, &TIMEOUT_S);
     let base_tolerance_rad = table.number("base_tolerance_rad", &TOLERANCE_RAD);
     let first_speed_percent = table.number_or("first_speed_percent", default::FIRST_SPEED_PERCENT, &PERCENT);
+    let stop_s_max = table.number_or("stop_s_max", STOP_S_MAX, &STOP_S);
     table.done();
     Some(Supervision {
         feedback_age_s_max: feedback_age_s_max?,
@@ -345,6 +352,7 @@ fn read_supervision(mut table: Table<'_>) -> Option<Supervision> {
         drive_timeout_s: drive_timeout_s?,
         base_tolerance_rad: base_tolerance_rad?,
         first_speed_percent: first_speed_percent?,
+        stop_s_max: stop_s_max?,
     })
 }
 

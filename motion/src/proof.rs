@@ -76,7 +76,7 @@ pub(crate) fn check(
 /// q and its first four derivatives by time at one instant, all joints.
 type Jet = [JointArray; 5];
 
-struct Proof<'a> {
+pub(crate) struct Proof<'a> {
     trajectory: &'a Trajectory,
     limits: &'a [JointLimits; MAX_JOINTS],
     /// Of each stroke `c_k/T^k` for k = 0 to 3, and 5.
@@ -147,7 +147,7 @@ enum IntervalResult {
 }
 
 impl<'a> Proof<'a> {
-    fn new(trajectory: &'a Trajectory, limits: &'a [JointLimits; MAX_JOINTS]) -> Self {
+    pub(crate) fn new(trajectory: &'a Trajectory, limits: &'a [JointLimits; MAX_JOINTS]) -> Self {
         let zero = [0.0; MAX_JOINTS];
         Self {
             trajectory,
@@ -199,7 +199,7 @@ impl<'a> Proof<'a> {
     }
 
     /// Collects what runs between two neighbouring edges.
-    fn enter(&mut self, from_s: f64, to_s: f64) {
+    pub(crate) fn enter(&mut self, from_s: f64, to_s: f64) {
         self.size = [[0.0; MAX_JOINTS]; 4];
         self.fifth = [0.0; MAX_JOINTS];
         self.reached_rad = *self.trajectory.base_rad();
@@ -361,6 +361,20 @@ impl<'a> Proof<'a> {
             sum += derivative[joint].abs() * factor;
         }
         sum + self.fifth[joint] * factor * half_s / order
+    }
+
+    /// Proven lowest and highest velocity, acceleration and jerk of each joint within `half_s` of an instant, inside the
+    /// current piece.
+    pub(crate) fn ranges(&mut self, middle_s: f64, half_s: f64) -> [[[f64; 2]; MAX_JOINTS]; 3] {
+        let jet = self.jet(middle_s);
+        core::array::from_fn(|rate| {
+            core::array::from_fn(|joint| {
+                let value = jet[rate + 1][joint];
+                let reach =
+                    self.beyond(&jet, rate + 1, joint, half_s) + ROUNDING * self.size[rate + 1][joint];
+                [value - reach, value + reach]
+            })
+        })
     }
 
     /// Walks uphill from the beginning of a violation to its worst instant, so that the evidence shows how bad it is.

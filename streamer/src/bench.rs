@@ -17,6 +17,7 @@ mod wake;
 use crate::buses::{Bus, Buses};
 use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
 use crate::intake::{self, CommandQueue};
+use crate::prepared::PreparedTrajectory;
 use crate::report::{self, Readers};
 use crate::rt;
 use crate::tick::Schedule;
@@ -289,8 +290,7 @@ struct Bench {
     batch: FrameBatch,
     peers: Peers,
     link: String,
-    base_rad: JointArray,
-    joints: usize,
+    motion: PreparedTrajectory,
     generation: u64,
     ticks: u64,
     skipped: u64,
@@ -326,6 +326,16 @@ impl Bench {
         let batch = FrameBatch::new();
         let joints = settings.robot.joints.len();
         let (generation, ticks, skipped) = (0, 0, 0);
+        let motion = PreparedTrajectory::new(
+            CheckedTrajectory {
+                trajectory_id: 0,
+                generation: 0,
+                robot_digest: [0; 32],
+                replaces: Replaces::Rest,
+                trajectory: to_and_fro(&base_rad, joints).map_err(|e| BenchError::System(e.to_string()))?,
+            },
+            &settings.robot.limits(),
+        );
         let mut bench = Self {
             core,
             command_queue,
@@ -334,8 +344,7 @@ impl Bench {
             batch,
             peers,
             link,
-            base_rad,
-            joints,
+            motion,
             generation,
             ticks,
             skipped,
@@ -386,16 +395,8 @@ impl Bench {
         }
         let Some(mut filled) = self.command_queue.trajectories.empty_box() else { return };
         self.generation += 1;
-        let Ok(trajectory) = to_and_fro(&self.base_rad, self.joints) else {
-            return self.command_queue.trajectories.return_unused(filled);
-        };
-        *filled = CheckedTrajectory {
-            trajectory_id: self.generation,
-            generation: self.generation,
-            robot_digest: [0; 32],
-            replaces: Replaces::Rest,
-            trajectory,
-        };
+        (*filled).clone_from(&self.motion);
+        filled.rename(self.generation, self.generation);
         self.command_queue.trajectories.offer(filled);
     }
 

@@ -1,6 +1,7 @@
 //! Checking of trajectories, on a thread of its own: bounded work, but long beside a command that says stop.
 //!
 //! What is decided here needs no race: layout, numbers, robot, joints, limits. The cycle decides the rest.
+use crate::prepared::PreparedTrajectory;
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -23,7 +24,7 @@ pub struct Checked {
     /// Until when its sender waits.
     pub valid_until: Nanos,
     /// The trajectory, or why it is refused.
-    pub result: Result<Box<CheckedTrajectory>, Rejection>,
+    pub result: Result<Box<PreparedTrajectory>, Rejection>,
 }
 
 /// What a trajectory is checked against.
@@ -45,7 +46,7 @@ impl Rules {
     ///
     /// # Errors
     /// The first thing that is wrong with it.
-    pub fn check(&self, message: &TrajectoryMessage) -> Result<Box<CheckedTrajectory>, Rejection> {
+    pub fn check(&self, message: &TrajectoryMessage) -> Result<Box<PreparedTrajectory>, Rejection> {
         let checked =
             CheckedTrajectory::try_from(message).map_err(|e| Rejection::Malformed(e.to_string()))?;
         if let Replaces::Cut { at_s, .. } = checked.replaces {
@@ -66,7 +67,7 @@ impl Rules {
             limit: v.limit,
             what: quantity_word(v.quantity).to_owned(),
         })?;
-        Ok(Box::new(checked))
+        Ok(Box::new(PreparedTrajectory::new(checked, &self.limits)))
     }
 }
 

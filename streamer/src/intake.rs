@@ -8,12 +8,13 @@
 use crate::answer::CommandAnswer;
 use crate::buses::Links;
 use crate::cycle_state::{COMMANDS_MAX, CycleState, PendingCommand, Restored, TrajectoryResult};
+use crate::prepared::PreparedTrajectory;
 use rtrb::{Consumer, Producer, PushError, RingBuffer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use taustream_drivers::Nanos;
 use taustream_messages::{CheckedTrajectory, Command, Replaces};
-use taustream_motion::{MAX_JOINTS, Trajectory};
+use taustream_motion::{JointLimits, MAX_JOINTS, Trajectory};
 
 /// Boxes in circulation: one runs, one waits, two are being checked or answered.
 const BOXES: usize = 4;
@@ -29,7 +30,7 @@ const COMMAND_PORTS: usize = 2;
 pub type Answers = [Option<CommandAnswer>; COMMANDS_MAX + 2];
 
 /// A trajectory in its box.
-pub type Boxed = Box<CheckedTrajectory>;
+pub type Boxed = Box<PreparedTrajectory>;
 
 /// How the streamer is asked to end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -156,13 +157,14 @@ fn blank_boxes() -> Vec<Boxed> {
     let mut boxes = Vec::with_capacity(BOXES);
     // One joint and no stroke: a trajectory that the checks of `Trajectory` always let pass.
     while let (true, Ok(trajectory)) = (boxes.len() < BOXES, Trajectory::new(1, [0.0; MAX_JOINTS], &[])) {
-        boxes.push(Box::new(CheckedTrajectory {
+        let blank = CheckedTrajectory {
             trajectory_id: 0,
             generation: 0,
             robot_digest: [0; 32],
             replaces: Replaces::Rest,
             trajectory,
-        }));
+        };
+        boxes.push(Box::new(PreparedTrajectory::new(blank, &[JointLimits::default(); MAX_JOINTS])));
     }
     boxes
 }

@@ -29,6 +29,7 @@ mod operator;
 pub mod phases;
 pub mod ports;
 pub mod pose_store;
+pub mod prepared;
 pub mod publisher;
 mod record_first;
 pub mod recorder;

@@ -6,10 +6,10 @@ use crate::cycle_state::{Cause, CycleState, PendingCommand};
 use crate::intake::Shutdown;
 use crate::phases::Event;
 use crate::supervise::{Actions, Supervisor, is_energised};
-use crate::track::SpeedChange;
 use crate::watch::REST_RAD_S;
 use taustream_drivers::{DriveState, ServoStatus};
 use taustream_messages::{Command, FaultReason, Phase};
+use taustream_motion::stopping::SpeedRequest;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 impl Supervisor {
@@ -226,7 +226,7 @@ impl Supervisor {
         if paused && !cycle_state.can_ramp {
             Err(AnswerReason::TooManyRamps)
         } else if paused {
-            actions.speed = Some(SpeedChange::Target(self.speed()));
+            actions.speed = Some(SpeedRequest::Change(self.speed()));
             self.step(Event::ResumeRequested, cycle_state, actions);
             Ok(AnswerReason::Resuming)
         } else if self.phase == Phase::Moving {
@@ -287,7 +287,7 @@ impl Supervisor {
         self.speed = (percent / 100.0).clamp(0.0, 1.0);
         self.speed_chosen = true;
         if changes {
-            actions.speed = Some(SpeedChange::Target(self.speed()));
+            actions.speed = Some(SpeedRequest::Change(self.speed()));
         }
         let limit = self.inwards_speed() * 100.0;
         let held = self.outside && percent > limit;

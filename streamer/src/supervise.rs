@@ -9,12 +9,12 @@ use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
 use crate::record_first::{LEAVE_RECORD_S_MAX, Records};
 use crate::referencing::Referencing;
-use crate::track::SpeedChange;
 use crate::watch::Watch;
 use taustream_arm::Settings;
 use taustream_arm::settings::Supervision;
 use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Pause, PauseReason, Phase};
+use taustream_motion::stopping::{SpeedRequest, StopRules};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// Highest speed override of a motion that begins outside the position limits.
@@ -23,8 +23,8 @@ const INWARDS_SPEED_MAX: f64 = 0.25;
 const STALL_REST_S: f64 = 1.0;
 /// How long after a stall a drive that has lost its master may say so, s: some tell by their next heartbeat but one.
 const STALL_BLAME_S: f64 = 1.0;
-/// How long leaving orderly may take: the longest ramp, the drives' time-out and a margin, s.
-const SHUTDOWN_S_MAX: f64 = 10.0;
+/// How long leaving orderly may take after the longest stop of the arm: the drives' time-out, the record and a margin, s.
+const SHUTDOWN_AT_REST_S_MAX: f64 = 10.0;
 /// How long torque off is repeated before leaving at once, s.
 const SHUTDOWN_AT_ONCE_S: f64 = 0.05;
 
@@ -32,7 +32,7 @@ const SHUTDOWN_AT_ONCE_S: f64 = 0.05;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Actions {
     /// How the speed along the path changes.
-    pub speed: Option<SpeedChange>,
+    pub speed: Option<SpeedRequest>,
     /// The trajectory is dropped and the last pose held.
     pub drop_trajectory: bool,
     /// This pose becomes the commanded one.
@@ -87,6 +87,7 @@ pub struct Supervisor {
     pub(crate) restoring: Option<u64>,
     pub(crate) shutting_down: Shutdown,
     shutdown_since: Nanos,
+    shutdown_s_max: f64,
     pub(crate) records: Records,
 }
 
@@ -126,6 +127,7 @@ impl Supervisor {
             restoring: None,
             shutting_down: Shutdown::No,
             shutdown_since: Nanos(0),
+            shutdown_s_max: StopRules::new(&limits, joints).longest_stop_s() + SHUTDOWN_AT_REST_S_MAX,
             records,
         }
     }
@@ -273,8 +275,12 @@ impl Supervisor {
             Phase::Holding | Phase::Fault | Phase::Disabling | Phase::Locked => {
                 actions.drop_trajectory = true;
             }
-            Phase::Stopping | Phase::FastStopping | Phase::Pausing => {
-                actions.speed = Some(SpeedChange::Stop);
+            Phase::Stopping | Phase::Pausing => {
+                actions.speed = Some(SpeedRequest::Stop);
+                self.stalled_since = None;
+            }
+            Phase::FastStopping => {
+                actions.speed = Some(SpeedRequest::FastStop);
                 self.stalled_since = None;
             }
             Phase::Configuring
@@ -370,7 +376,7 @@ impl Supervisor {
         let Some(since) = self.stalled_since else { return };
         if self.watch.is_at_rest() && cycle_state.can_ramp {
             self.stalled_since = None;
-            actions.speed = Some(SpeedChange::Target(self.speed()));
+            actions.speed = Some(SpeedRequest::Change(self.speed()));
         } else if cycle_state.tick.wake_time.since_s(since) > STALL_REST_S {
             self.stalled_since = None;
             self.step(Event::StalledLong, cycle_state, actions);
@@ -595,7 +601,7 @@ impl Supervisor {
                         > LEAVE_RECORD_S_MAX;
                 if off && self.energised(cycle_state).is_none() && recorded {
                     actions.shutdown = Some(true);
-                } else if time_s > SHUTDOWN_S_MAX {
+                } else if time_s > self.shutdown_s_max {
                     actions.shutdown = Some(false);
                 }
             }

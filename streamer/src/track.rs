@@ -3,14 +3,15 @@
 //! Everything is counted from the last setpoint that left. A cycle that was skipped, or whose frames were
 //! refused, therefore costs nothing but a longer step, up to the gap that the drives bridge. Beyond it the drives
 //! have stopped by themselves: trajectory time stays where the last setpoint was, and sigma starts from 0.
-use crate::approach::Approach;
+use crate::approach::{Approach, ApproachLimits};
 use crate::cycle_state::{CycleState, Decision, TrajectoryResult};
 use crate::intake::Boxed;
 use crate::last_sent::Ledger;
 use taustream_arm::Settings;
 use taustream_messages::Phase;
 use taustream_messages::trajectory::is_newer;
-use taustream_motion::time_scale::{Scale, TimeScale, ramp_duration_s, scaled};
+use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
+use taustream_motion::time_scale::{Scale, TimeScale, scaled};
 use taustream_motion::trajectory::Cursor;
 use taustream_motion::{JointArray, Setpoint};
 
@@ -26,15 +27,6 @@ pub struct RequestedSetpoint {
     pub restart: bool,
     /// The drives follow what is commanded.
     pub live: bool,
-}
-
-/// How the speed along the path changes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SpeedChange {
-    /// sigma to 0; never refused.
-    Stop,
-    /// sigma to this value.
-    Target(f64),
 }
 
 /// A point of the track; `sent` is the last that left, `next` the one being sent.
@@ -57,7 +49,8 @@ pub struct Track {
     /// Longest gap over which the motion continues; more than the tolerated one where a stall is bridged.
     bridged_periods: u64,
     base_tolerance_rad: f64,
-    ramp_s: f64,
+    stop_rules: StopRules,
+    approach_limits: ApproachLimits,
     scale: TimeScale,
     running: Option<Boxed>,
     cursor: Cursor,
@@ -75,16 +68,15 @@ impl Track {
     pub fn new(settings: &Settings) -> Self {
         let (limits, joints) = (settings.robot.limits(), settings.robot.joints.len());
         let (cycle, supervision) = (&settings.cycle, &settings.supervision);
-        // Clamped to what a stop may take; settings without room for a stop were refused before.
-        let ramp_s = TimeScale::settled(0.0, ramp_duration_s(&limits, joints)).ramp_duration_s();
         Self {
             joints,
             period_s: f64::from(cycle.period_us) * 1e-6,
             tolerated_periods: u64::from(cycle.tolerated_gap_periods).max(1),
             bridged_periods: u64::from(settings.bridged_gap_periods()).max(1),
             base_tolerance_rad: supervision.base_tolerance_rad,
-            ramp_s,
-            scale: TimeScale::settled(0.0, ramp_s),
+            stop_rules: StopRules::new(&limits, joints),
+            approach_limits: ApproachLimits::new(&limits, joints),
+            scale: TimeScale::settled(0.0),
             running: None,
             cursor: Cursor::default(),
             approach: Approach::default(),
@@ -121,9 +113,10 @@ impl Track {
         }
         self.newest_generation = offer.generation;
         self.cursor = Cursor::at_start(&offer.trajectory);
-        self.scale = TimeScale::settled(sigma, self.ramp_s);
+        self.scale = TimeScale::settled(sigma);
         (self.sent.s, self.sent.axis) = (0.0, 0);
-        self.approach = Approach::new(&hold_position_rad, offer.trajectory.base_rad(), self.ramp_s);
+        let base_rad = offer.trajectory.base_rad();
+        self.approach = Approach::while_moving(&hold_position_rad, base_rad, &self.approach_limits);
         self.sent.approach = 0;
         (self.starting, self.restart) = (true, true);
         self.running.replace(offer)
@@ -163,12 +156,13 @@ impl Track {
             cycle_state.bridged =
                 periods > self.tolerated_periods && periods <= self.bridged_periods && !self.starting;
             if periods > self.bridged_periods && !self.starting {
-                self.scale = TimeScale::settled(0.0, self.ramp_s);
+                self.scale = TimeScale::settled(0.0);
                 (self.sent.axis, self.next.axis) = (0, 0);
                 (cycle_state.frozen, restart) = (true, true);
                 // The drives stand where each was commanded last; the approach brings the joints together again.
                 let reached_rad = running.trajectory.sample(self.sent.s).position_rad;
-                self.approach = Approach::new(&setpoint.position_rad, &reached_rad, self.ramp_s);
+                let (held_rad, limits) = (&setpoint.position_rad, &self.approach_limits);
+                self.approach = Approach::while_standing(held_rad, &reached_rad, limits);
                 (self.sent.approach, self.next.approach) = (0, 0);
             } else {
                 let step = if self.starting { 0 } else { periods };
@@ -186,7 +180,7 @@ impl Track {
             }
             let now_s = self.seconds(self.next.axis);
             let approached = self.approach.has_ended(self.seconds(self.next.approach));
-            cycle_state.at_rest = self.scale.requested() <= 0.0 && self.scale.is_settled(now_s) && approached;
+            cycle_state.at_rest = self.stands(now_s) && approached;
         }
         cycle_state.trajectory_s = self.next.s;
         RequestedSetpoint { setpoint, restart, live }
@@ -219,25 +213,30 @@ impl Track {
         if self.running.is_some() && all_unreachable {
             // Joints that stand beside the path stay there: no setpoint can bring them back.
             let now_s = self.seconds(self.next.axis);
-            cycle_state.at_rest = self.scale.requested() <= 0.0 && self.scale.is_settled(now_s);
+            cycle_state.at_rest = self.stands(now_s);
         }
         cycle_state.commanded_rad = *ledger.commanded_rad();
-        let mut trial = self.scale;
-        cycle_state.can_ramp = trial.request(1.0, self.seconds(self.sent.axis)).is_ok();
+        cycle_state.can_ramp = self.scale.can_change(self.seconds(self.sent.axis));
     }
 
     /// Changes the speed along the path from the last setpoint on.
     ///
-    /// Real time: no allocation.
-    pub fn change_speed(&mut self, order: SpeedChange) {
+    /// Real time: bounded work, see [`StopRules::apply`]; no allocation.
+    pub fn change_speed(&mut self, request: SpeedRequest) {
         let now_s = self.seconds(self.sent.axis);
-        match order {
-            SpeedChange::Stop => self.scale.stop(now_s),
-            // `CycleState::can_ramp` was checked first; a refused request changes nothing.
-            SpeedChange::Target(sigma) => {
-                let _ = self.scale.request(sigma, now_s);
-            }
-        }
+        let approach_s = self.seconds(self.sent.approach);
+        let Some(running) = &self.running else { return };
+        let (s, ahead) = (self.sent.s, running.ahead());
+        // Where joints were parted while trajectory time stands, it waits until they are together again.
+        let waits_s = if self.stands(now_s) { self.approach.rest_s(approach_s) } else { 0.0 };
+        let approaching = waits_s <= 0.0 && !self.approach.has_ended(approach_s);
+        let situation = Situation { now_s, s, ahead, approaching, waits_s };
+        self.stop_rules.apply(request, &mut self.scale, &situation);
+    }
+
+    /// Trajectory time does not pass.
+    fn stands(&self, now_s: f64) -> bool {
+        self.scale.requested() <= 0.0 && self.scale.is_settled(now_s)
     }
 
     /// Clears the trajectory and holds the last pose that left. Returns the box.
@@ -246,7 +245,7 @@ impl Track {
     pub fn drop_trajectory(&mut self) -> Option<Boxed> {
         (self.starting, self.restart) = (false, true);
         self.sent.s = 0.0;
-        self.scale = TimeScale::settled(0.0, self.ramp_s);
+        self.scale = TimeScale::settled(0.0);
         self.sent.axis = 0;
         self.running.take()
     }
@@ -287,7 +286,7 @@ impl Track {
 
     fn shorten_axis(&mut self) {
         if self.sent.axis > AXIS_PERIODS_MAX && self.scale.is_settled(self.seconds(self.sent.axis)) {
-            self.scale = TimeScale::settled(self.scale.requested(), self.ramp_s);
+            self.scale = TimeScale::settled(self.scale.requested());
             self.sent.axis = 0;
         }
     }

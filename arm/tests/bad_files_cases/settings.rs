@@ -106,6 +106,20 @@ pub(crate) const CASES: &[Case] = &[
     (
         Settings,
         "first_speed_percent = 100.0",
+        "first_speed_percent = 100.0\nstop_s_max = 5.5",
+        "supervision.stop_s_max",
+        "above 0 up to 5 s",
+    ),
+    (
+        Settings,
+        "first_speed_percent = 100.0",
+        "first_speed_percent = 100.0\nstop_s_max = 0.05",
+        "joint[0].stop",
+        "at most 0.05 s",
+    ),
+    (
+        Settings,
+        "first_speed_percent = 100.0",
         "first_speed_percent = 101",
         "supervision.first_speed_percent",
         "percent",

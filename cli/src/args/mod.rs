@@ -11,7 +11,7 @@ pub(crate) use live::{
 };
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
-    PlanArgs, PlotArgs, SampleArgs,
+    PlanArgs, PlotArgs, SampleArgs, StopsBenchArgs,
 };
 
 pub(crate) use papers::PapersArgs;

@@ -305,6 +305,19 @@ pub(crate) enum BenchName {
     Papers(super::PapersArgs),
     /// Compare the planners by name: problems solved, planning time, quality of the motions.
     Planners(super::PlannersArgs),
+    /// Measure how long stops take and how far they go, by speed, by phase and by move, against the optimum along the path.
+    Stops(StopsBenchArgs),
+}
+
+/// What `taustream bench stops` takes.
+#[derive(Args, Debug)]
+pub(crate) struct StopsBenchArgs {
+    /// Robot: a path, or the name of a shipped robot.
+    #[arg(long, value_name = "FILE", default_value = "ur5")]
+    pub(crate) robot: PathBuf,
+    /// Instants of each move at which a stop begins.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 100, value_parser = clap::value_parser!(u32).range(5..=10_000))]
+    pub(crate) instants: u32,
 }
 
 /// What `taustream bench cost` takes.

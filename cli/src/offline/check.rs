@@ -9,6 +9,7 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use taustream_arm::stopping::STOP_S_MAX;
 use taustream_arm::text::counted;
 use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 
@@ -16,7 +17,7 @@ use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
     let checked = arm::find_any(&args.config).and_then(|found| match found {
         arm::AnyFile::Settings(path) => check_settings(form, &path),
-        arm::AnyFile::Robot(path) => form.print(&Verdict(CheckedRobot::of(&Robot::load(&path)?))),
+        arm::AnyFile::Robot(path) => check_robot(form, &path),
         arm::AnyFile::Scene(path) => form.print(&Verdict(CheckedScene::of(&Scene::load(&path)?))),
         arm::AnyFile::Empty(path) => {
             let why = "is empty, which says nothing about settings or a robot; a scene without obstacles says so by its margin: \
@@ -50,6 +51,20 @@ impl<T: fmt::Display> fmt::Display for Verdict<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\nno faults", self.0.to_string().trim_end())
     }
+}
+
+/// A robot that cannot stop in time is shown, and refused all the same. Settings may accept a longer stop.
+fn check_robot(form: Form, path: &Path) -> Result<(), Failure> {
+    let robot = Robot::load(path)?;
+    let shown = CheckedRobot::of(&robot);
+    let Err(faults) = robot.require_stops(STOP_S_MAX) else { return form.print(&Verdict(shown)) };
+    if form == Form::Text {
+        form.progress(&faults);
+        form.print(&shown)?;
+        return Err(Failure::unfit(path, format!("REFUSED: {} fault(s), listed first", faults.0.len())));
+    }
+    form.print(&shown)?;
+    Err(faults.into())
 }
 
 /// Settings whose only fault is a bus that is too full are shown with its table and the remedies, and refused all the same.

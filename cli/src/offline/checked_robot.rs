@@ -3,7 +3,7 @@ use serde::Serialize;
 use std::fmt;
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, Shape};
-use taustream_motion::time_scale::ramp_duration_s;
+use taustream_motion::stopping::StopRules;
 
 /// One joint's limits.
 #[derive(Debug, Serialize)]
@@ -114,8 +114,10 @@ pub(super) struct CheckedRobot {
     link_margins: Vec<MarginLine>,
     /// Pairs that are never further apart than their margin; they keep more than 0 m.
     always_close: Vec<[String; 2]>,
-    /// How long a pause or stop from full speed takes.
+    /// No pause or stop from a constant speed takes longer.
     pause_s: f64,
+    /// No stop takes longer, even on top of a change of speed.
+    longest_stop_s: f64,
 }
 
 impl CheckedRobot {
@@ -160,7 +162,8 @@ impl CheckedRobot {
                 .map(|((a, b), margin_m)| MarginLine { links: [link(*a), link(*b)], margin_m: *margin_m })
                 .collect(),
             always_close: names(&robot.close_by_rule),
-            pause_s: ramp_duration_s(&robot.limits(), robot.joints.len()),
+            pause_s: robot.stop_s(),
+            longest_stop_s: StopRules::new(&robot.limits(), robot.joints.len()).longest_stop_s(),
         }
     }
 }
@@ -212,8 +215,10 @@ impl fmt::Display for CheckedRobot {
         self.margins(f)?;
         write!(
             f,
-            "  a pause or stop from full speed takes {:.3} s, on the path, inside the stop limits",
-            self.pause_s
+            "  a pause or stop from full speed takes at most {:.3} s, on the path, inside the stop limits; on top of a change of speed at \
+             most {:.3} s. What runs decides how much less: a fast stop uses all of the stop limits, a pause or stop half of what they \
+             leave above the motion limits",
+            self.pause_s, self.longest_stop_s
         )
     }
 }

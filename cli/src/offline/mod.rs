@@ -13,4 +13,5 @@ mod planners;
 pub(crate) mod plot;
 mod protocol_line;
 pub(crate) mod sample;
+mod stops_bench;
 pub(crate) mod verify;

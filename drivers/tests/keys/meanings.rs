@@ -179,6 +179,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "A trajectory is accepted when its base is this near to the commanded pose.",
     ),
     ("Settings files: supervision.first_speed_percent", "Speed after start, percent; without it 25."),
+    (
+        "Settings files: supervision.stop_s_max",
+        "Longest stop from full speed, s, of an arm that is accepted; without it 1.",
+    ),
     ("Settings files: bus[].name", "Name of the bus, for the servos and for messages."),
     ("Settings files: bus[].interface", "Network interface."),
     ("Settings files: bus[].virtual", "true for vcan and the local link, which have no bit rate."),

@@ -8,12 +8,13 @@ use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
-use taustream_motion::{JointArray, Stroke, Trajectory};
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Stroke, Trajectory};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::intake::{self, CommandQueue};
 use taustream_streamer::names::Names;
+use taustream_streamer::prepared::PreparedTrajectory;
 use taustream_streamer::report::{self, Readers, Record};
 use taustream_streamer::tick::Tick;
 
@@ -47,6 +48,7 @@ pub(crate) struct Arm {
     out: Vec<Vec<CanFrame>>,
     pub(crate) runtime: PathBuf,
     pub(crate) digest: [u8; 32],
+    limits: [JointLimits; MAX_JOINTS],
     pub(crate) tick: u64,
     generation: u64,
     pub(crate) counted: u64,
@@ -93,6 +95,7 @@ impl Arm {
             out: vec![Vec::new(); count],
             runtime,
             digest: settings.robot.digest,
+            limits: settings.robot.limits(),
             settings,
             tick: 0,
             generation: 0,
@@ -187,13 +190,14 @@ impl Arm {
         self.generation += 1;
         let generation = self.generation;
         let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
-        *empty = CheckedTrajectory {
+        let checked = CheckedTrajectory {
             trajectory_id: generation,
             generation,
             robot_digest: self.digest,
             replaces: Replaces::Rest,
             trajectory,
         };
+        *empty = PreparedTrajectory::new(checked, &self.limits);
         self.command_queue.trajectories.offer(empty);
         self.step(&mut NoProbe);
         let decision = self.command_queue.trajectories.trajectory_result().unwrap().decision;

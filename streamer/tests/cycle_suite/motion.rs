@@ -72,7 +72,7 @@ fn speed_changed_while_moving_stays_on_the_path_and_is_remembered() {
 #[test]
 fn stop_and_fast_stop_end_at_rest_on_the_path() {
     for (command, end) in [(Command::Stop, Phase::Holding), (Command::FastStop, Phase::Fault)] {
-        for after in [3, 250, 777, 1_400, 2_200] {
+        for after in [12, 250, 777, 1_400, 2_200] {
             let mut harness = CycleHarness::new();
             let trajectory = harness.move_it();
             harness.run(after);

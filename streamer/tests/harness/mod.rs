@@ -17,6 +17,7 @@ use taustream_streamer::cycle_state::{Cause, Decision, TrajectoryResult};
 use taustream_streamer::intake::{self, CommandQueue, Shutdown};
 use taustream_streamer::names::Names;
 use taustream_streamer::pose_store::PoseRecords;
+use taustream_streamer::prepared::PreparedTrajectory;
 use taustream_streamer::report::{self, CycleRecord, Note, Readers, Record};
 use taustream_streamer::tick::Tick;
 use taustream_streamer::write_ahead::Requester;
@@ -513,13 +514,14 @@ impl CycleHarness {
 
     pub fn offer_as(&mut self, trajectory: Trajectory, generation: u64) -> Decision {
         let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
-        *empty = CheckedTrajectory {
+        let checked = CheckedTrajectory {
             trajectory_id: 1000 + generation,
             generation,
             robot_digest: self.settings.robot.digest,
             replaces: Replaces::Rest,
             trajectory,
         };
+        *empty = PreparedTrajectory::new(checked, &self.settings.robot.limits());
         self.command_queue.trajectories.offer(empty);
         self.step_after(1);
         let TrajectoryResult { decision, .. } = self

@@ -2,7 +2,7 @@
 use taustream_arm::Settings;
 use taustream_messages::{Command, Phase};
 use taustream_motion::MAX_JOINTS;
-use taustream_motion::time_scale::ramp_duration_s;
+use taustream_motion::stopping::StopRules;
 
 /// After the phase of energising has ended a drive may still come on by a frame that was on its way, ms.
 const ON_ITS_WAY_MS: u64 = 20;
@@ -73,7 +73,7 @@ impl PhaseRules {
             ticks + u64::from(every) + 2
         };
         Self {
-            stop_ticks: ticks(ramp_duration_s(&limits, joints)),
+            stop_ticks: ticks(StopRules::new(&limits, joints).longest_stop_s()),
             brake_ticks: ticks(brakes_s.fold(0.0, f64::max)),
             lost_cycles_max: u64::from(settings.lost_cycles_max()),
             permitted: false,

@@ -21,6 +21,7 @@ use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, run_cycle};
 use taustream_streamer::intake::{self, CommandQueue, Handover};
+use taustream_streamer::prepared::PreparedTrajectory;
 use taustream_streamer::report::{self, Readers, Record};
 use taustream_streamer::tick::Schedule;
 
@@ -232,13 +233,14 @@ impl World {
         let Some(mut filled) = self.queue.trajectories.empty_box() else { return false };
         self.generation += 1;
         let trajectory_id = 1_000 + self.generation;
-        *filled = CheckedTrajectory {
+        let checked = CheckedTrajectory {
             trajectory_id,
             generation: self.generation,
             robot_digest: self.settings.robot.digest,
             replaces: Replaces::Rest,
             trajectory: trajectory.clone(),
         };
+        *filled = PreparedTrajectory::new(checked, &self.settings.robot.limits());
         self.queue.trajectories.offer(filled);
         self.checker.offered(trajectory_id, trajectory);
         true

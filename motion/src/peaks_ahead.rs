@@ -1,0 +1,167 @@
+//! How fast, strong and jerky a motion is in each stretch of its time: tables that are made once, off the real-time thread.
+//!
+//! The motion is cut into cells of equal duration. Each cell holds proven bounds of velocity, acceleration and jerk with
+//! their signs, joint by joint. A stop that is being chosen looks the cells up that it passes.
+use crate::limits::TOLERANCE;
+use crate::proof::Proof;
+use crate::{JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
+
+/// Most cells of a table.
+pub const CELLS_MAX: usize = 1024;
+/// Shortest cell, s.
+const CELL_S_MIN: f64 = 1e-3;
+
+/// Lowest and highest value of a quantity, one pair a joint.
+pub type Ranges = [[f64; 2]; MAX_JOINTS];
+
+/// What a motion does in one stretch of its time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stretch {
+    /// Velocities, rad/s.
+    pub velocity_rad_s: Ranges,
+    /// Accelerations, rad/s^2.
+    pub acceleration_rad_s2: Ranges,
+    /// Jerks, rad/s^3.
+    pub jerk_rad_s3: Ranges,
+}
+
+impl Stretch {
+    /// Extends every range to hold those of another stretch.
+    ///
+    /// Real time: three loops over the joints.
+    pub fn join(&mut self, other: &Self) {
+        let pairs = [
+            (&mut self.velocity_rad_s, &other.velocity_rad_s),
+            (&mut self.acceleration_rad_s2, &other.acceleration_rad_s2),
+            (&mut self.jerk_rad_s3, &other.jerk_rad_s3),
+        ];
+        for (ranges, others) in pairs {
+            for ([low, high], [other_low, other_high]) in ranges.iter_mut().zip(others) {
+                *low = low.min(*other_low);
+                *high = high.max(*other_high);
+            }
+        }
+    }
+}
+
+/// How many cells the table of a motion has.
+#[must_use]
+pub fn cell_count(trajectory: &Trajectory) -> usize {
+    let wanted = libm::ceil(trajectory.duration_s() / CELL_S_MIN);
+    (1..CELLS_MAX).find(|count| to_f64(*count) >= wanted).unwrap_or(CELLS_MAX)
+}
+
+/// Fills `cells`, as many as [`cell_count`] says, with the bounds of a motion that keeps the motion limits.
+pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimits; MAX_JOINTS]) {
+    let duration_s = trajectory.duration_s();
+    let width_s = cell_s(cells.len(), duration_s);
+    let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
+    for (pair, stroke) in edges.chunks_exact_mut(2).zip(trajectory.strokes()) {
+        pair.copy_from_slice(&[stroke.start_s, stroke.end_s()]);
+    }
+    edges.sort_unstable_by(f64::total_cmp);
+    // Between two of these the motion is one polynomial.
+    let mut edges = edges.iter().copied().filter(|edge_s| *edge_s > 0.0 && *edge_s < duration_s);
+    let mut proof = Proof::new(trajectory, limits);
+    let (mut from_s, mut piece_ends_s) = (0.0, 0.0);
+    for (index, cell) in cells.iter_mut().enumerate() {
+        let mut whole: Option<Stretch> = None;
+        let cell_ends_s = to_f64(index + 1) * width_s;
+        while from_s < cell_ends_s {
+            if from_s >= piece_ends_s {
+                piece_ends_s = edges.find(|edge_s| *edge_s > from_s).unwrap_or(f64::INFINITY);
+                proof.enter(from_s, piece_ends_s.min(duration_s));
+            }
+            let to_s = cell_ends_s.min(piece_ends_s);
+            let found = bounds(&mut proof, limits, [from_s, to_s]);
+            whole.get_or_insert(found).join(&found);
+            from_s = to_s;
+        }
+        *cell = whole.unwrap_or_default();
+    }
+}
+
+/// What one polynomial piece does between two of its instants. Motion limits that were proven bound it, too.
+fn bounds(proof: &mut Proof<'_>, limits: &[JointLimits; MAX_JOINTS], [from_s, to_s]: [f64; 2]) -> Stretch {
+    let middle_s = 0.5 * (from_s + to_s);
+    let ranges = proof.ranges(middle_s, (to_s - middle_s).max(middle_s - from_s));
+    let mut stretch = Stretch::default();
+    let [velocity, acceleration, jerk] = ranges;
+    for (joint, JointLimits { motion, .. }) in limits.iter().enumerate() {
+        let within = |[low, high]: [f64; 2], limit: f64| {
+            let limit = limit * (1.0 + TOLERANCE);
+            [low.max(-limit), high.min(limit)]
+        };
+        stretch.velocity_rad_s[joint] = within(velocity[joint], motion.velocity_rad_s);
+        stretch.acceleration_rad_s2[joint] = within(acceleration[joint], motion.acceleration_rad_s2);
+        stretch.jerk_rad_s3[joint] = within(jerk[joint], motion.jerk_rad_s3);
+    }
+    stretch
+}
+
+fn cell_s(count: usize, duration_s: f64) -> f64 {
+    duration_s / to_f64(count.max(1))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "at most some thousand cells")]
+fn to_f64(count: usize) -> f64 {
+    count as f64
+}
+
+/// A motion's table, and after its cut that of the motion that follows.
+#[derive(Clone, Copy, Debug)]
+pub struct PeaksAhead<'a> {
+    cells: &'a [Stretch],
+    cells_a_second: f64,
+    then: Option<(f64, &'a [Stretch], f64)>,
+}
+
+impl<'a> PeaksAhead<'a> {
+    /// The table of a motion of `duration_s`.
+    #[must_use]
+    pub fn new(cells: &'a [Stretch], duration_s: f64) -> Self {
+        Self { cells, cells_a_second: cells_a_second(cells.len(), duration_s), then: None }
+    }
+
+    /// The same up to `from_s`, and the table of another motion of `duration_s`, on the same time axis, from there on.
+    #[must_use]
+    pub fn then(self, from_s: f64, cells: &'a [Stretch], duration_s: f64) -> Self {
+        Self { then: Some((from_s, cells, cells_a_second(cells.len(), duration_s))), ..self }
+    }
+
+    /// What the motion does between two of its instants, the earlier first; rest after its end.
+    ///
+    /// Real time: looks at each cell between them once, at most [`CELLS_MAX`] of each motion.
+    #[must_use]
+    pub fn between(&self, from_s: f64, to_s: f64) -> Stretch {
+        let cut_s = self.then.map_or(f64::INFINITY, |(cut_s, ..)| cut_s);
+        let mut stretch: Option<Stretch> = None;
+        if from_s < cut_s || self.then.is_none() {
+            join(&mut stretch, self.cells, [from_s, to_s.min(cut_s)], self.cells_a_second);
+        }
+        if let Some((cut_s, cells, cells_a_second)) = self.then
+            && to_s >= cut_s
+        {
+            join(&mut stretch, cells, [from_s.max(cut_s), to_s], cells_a_second);
+        }
+        stretch.unwrap_or_default()
+    }
+}
+
+fn cells_a_second(count: usize, duration_s: f64) -> f64 {
+    if duration_s > 0.0 { to_f64(count) / duration_s } else { 0.0 }
+}
+
+/// Joins the cells between two instants. Beyond the last cell the motion rests.
+fn join(stretch: &mut Option<Stretch>, cells: &[Stretch], [from_s, to_s]: [f64; 2], cells_a_second: f64) {
+    // The cell in which an instant lies. A negative or NaN time is in the first.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at both ends")]
+    let index = |s: f64| ((s * cells_a_second) as usize).min(cells.len());
+    let (first, last) = (index(from_s), index(to_s));
+    for cell in cells.get(first..).unwrap_or(&[]).iter().take((last + 1).saturating_sub(first)) {
+        match stretch {
+            Some(stretch) => stretch.join(cell),
+            None => *stretch = Some(*cell),
+        }
+    }
+}
