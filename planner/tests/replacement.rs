@@ -1,16 +1,20 @@
-//! Motions that replace running ones: durations beside Ruckig's optimum.
-#![expect(clippy::unwrap_used, reason = "helpers of tests; a failure in them fails the test")]
+//! Motions that replace running ones: limits by an independent differentiation and by the exact proof, kept strokes bit by
+//! bit, ends, and durations beside Ruckig's optimum.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 use rsruckig::prelude::{
     ControlInterface, InputParameter, Ruckig, Synchronization, ThrowErrorHandler,
     Trajectory as RuckigTrajectory,
 };
-use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Trajectory};
+use taustream_motion::limits::check_motion;
+use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Stroke, Trajectory};
 use taustream_planner::budget::Budget;
-use taustream_planner::replacement::{replacement, to_rest};
+use taustream_planner::replacement::{replacement, to_rest, without_ended};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::timing::Path;
 
 const JOINTS: usize = 6;
+/// Strokes of a running motion beside which those of a replacement fit, wherever the cut.
+const MOST_STROKES: usize = 400;
 
 /// Limits that differ from joint to joint, over some decades.
 fn limits(rng: &mut SeededRng) -> [JointLimits; MAX_JOINTS] {
@@ -46,6 +50,99 @@ fn cut(rng: &mut SeededRng, running: &Trajectory, from_s: f64) -> (f64, JointArr
         *goal += rng.within(-4.0, 4.0);
     }
     (cut_s, goal_rad)
+}
+
+/// Largest shares of velocity, acceleration and jerk limits, from positions alone, by central differences over `h`.
+fn used_by_differences(motion: &Trajectory, from_s: f64, limits: &[JointLimits; MAX_JOINTS]) -> [f64; 3] {
+    const SAMPLES: u32 = 2_000;
+    let span_s = motion.duration_s() - from_s;
+    let shortest_s = motion.strokes().iter().map(|s| s.duration_s).fold(span_s, f64::min);
+    let h = shortest_s / 40.0;
+    let mut used = [0.0_f64; 3];
+    for sample in 0..SAMPLES {
+        let t_s = from_s + span_s * f64::from(sample) / f64::from(SAMPLES);
+        let [a, b, c, d] = [-1.5, -0.5, 0.5, 1.5].map(|k| motion.sample(t_s + k * h).position_rad);
+        for joint in 0..JOINTS {
+            let m = limits[joint].motion;
+            let (a, b, c, d) = (a[joint], b[joint], c[joint], d[joint]);
+            used[0] = used[0].max(((c - b) / h).abs() / m.velocity_rad_s);
+            used[1] = used[1].max(((d - c - b + a) / (2.0 * h * h)).abs() / m.acceleration_rad_s2);
+            used[2] = used[2].max(((d - 3.0 * c + 3.0 * b - a) / (h * h * h)).abs() / m.jerk_rad_s3);
+        }
+    }
+    used
+}
+
+fn bits(pose_rad: &JointArray) -> [u64; MAX_JOINTS] {
+    pose_rad.map(f64::to_bits)
+}
+
+fn check(what: &str, running: &Trajectory, new: &Trajectory, cut_s: f64, limits: &[JointLimits; MAX_JOINTS]) {
+    let begun = running.strokes().iter().filter(|stroke| stroke.start_s < cut_s).count();
+    assert_eq!(bits(new.base_rad()), bits(running.base_rad()), "{what}");
+    assert_eq!(new.strokes()[..begun], running.strokes()[..begun], "{what}: begun strokes differ");
+    assert!(
+        new.strokes()[begun..].iter().all(|stroke| stroke.start_s >= cut_s),
+        "{what}: begins before the cut"
+    );
+    let used = used_by_differences(new, cut_s, limits);
+    // Rounding of positions, 1e-15 rad over h^3, and the curvature of the jerk over h.
+    assert!(used.iter().all(|used| *used <= 1.02), "{what}: differences use {used:?} of the limits");
+    if let Err(violation) = check_motion(new, limits) {
+        panic!("{what}: {violation} (cut at {cut_s} s)");
+    }
+    let end = new.sample(new.duration_s());
+    for rates in [end.velocity_rad_s, end.acceleration_rad_s2, end.jerk_rad_s3] {
+        assert!(rates.iter().all(|rate| *rate == 0.0), "{what}: moves at its end");
+    }
+}
+
+/// Goal: a motion is replaced at any instant, again and again, and stays inside the limits.
+/// Method: three cuts in a row of each of many motions.
+#[test]
+fn motion_cut_anywhere_again_and_again_goes_to_the_new_goal_inside_the_limits() {
+    for seed in 0..40 {
+        let mut rng = SeededRng::new(seed, 1);
+        let limits = limits(&mut rng);
+        let mut running = straight(&mut rng, &limits);
+        let mut from_s = 0.0;
+        for level in 0..3 {
+            if running.strokes().len() > MOST_STROKES {
+                break; // The strokes of three motions do not fit into a message.
+            }
+            let (cut_s, goal_rad) = cut(&mut rng, &running, from_s);
+            let what = format!("seed {seed}, cut {level}");
+            let new =
+                replacement(&running, cut_s, &goal_rad, &limits).unwrap_or_else(|| panic!("{what}: refused"));
+            check(&what, &running, &new, cut_s, &limits);
+            for (joint, (end, goal)) in new.end_rad().iter().zip(&goal_rad).enumerate() {
+                assert!((end - goal).abs() <= 1e-12, "{what}: joint {joint} ends at {end}, not at {goal}");
+            }
+            (running, from_s) = (new, cut_s);
+        }
+    }
+}
+
+/// Goal: a motion inside its limits comes to rest from any instant, never later than it would have.
+#[test]
+fn motion_cut_anywhere_comes_to_rest_inside_the_limits_no_later_than_before() {
+    for seed in 0..40 {
+        let mut rng = SeededRng::new(seed, 2);
+        let limits = limits(&mut rng);
+        let mut running = straight(&mut rng, &limits);
+        let mut from_s = 0.0;
+        for level in 0..2 {
+            if running.strokes().len() > MOST_STROKES {
+                break;
+            }
+            let (cut_s, goal_rad) = cut(&mut rng, &running, from_s);
+            let what = format!("seed {seed}, level {level}");
+            let rest = to_rest(&running, cut_s, &limits).unwrap_or_else(|| panic!("{what}: refused"));
+            check(&what, &running, &rest, cut_s, &limits);
+            assert!(rest.duration_s() <= running.duration_s(), "{what}: rests later");
+            (running, from_s) = (replacement(&running, cut_s, &goal_rad, &limits).unwrap(), cut_s);
+        }
+    }
 }
 
 /// Time-optimal duration from a state to rest at the goal, all joints together.
@@ -95,6 +192,54 @@ fn replacements_of_random_cuts_take_little_longer_than_the_optimum() {
     ratios.sort_by(f64::total_cmp);
     let (median, high) = (ratios[ratios.len() / 2], ratios[ratios.len() * 95 / 100]);
     assert!(median <= 1.15 && high <= 1.4, "median {median}, 95th percentile {high}");
+}
+
+/// Goal: the reason for all this. Pending strokes of a train cancel running ones, so that dropping them alone breaks the
+/// limits; and the checks of this file notice it, as well as one new stroke that is wrong.
+#[test]
+fn dropping_pending_strokes_alone_breaks_the_limits_and_the_checks_notice() {
+    let (mut acceleration, mut jerk) = (0.0_f64, 0.0_f64);
+    for seed in 0..20 {
+        let mut rng = SeededRng::new(seed, 4);
+        let limits = limits(&mut rng);
+        let at_rest = Trajectory::new(JOINTS, [0.0; MAX_JOINTS], &[]).unwrap();
+        let (_, goal_rad) = cut(&mut rng, &at_rest, 0.0);
+        let running = replacement(&at_rest, 0.0, &goal_rad, &limits).unwrap();
+        let (cut_s, goal_rad) = cut(&mut rng, &running, 0.0);
+        let kept: Vec<Stroke> = running.strokes().iter().filter(|s| s.start_s < cut_s).copied().collect();
+        if let Ok(dropped) = Trajectory::new(JOINTS, *running.base_rad(), &kept) {
+            let used = used_by_differences(&dropped, cut_s, &limits);
+            (acceleration, jerk) = (acceleration.max(used[1]), jerk.max(used[2]));
+        }
+        let new = replacement(&running, cut_s, &goal_rad, &limits).unwrap();
+        let mut strokes = new.strokes().to_vec();
+        let stroke = &mut strokes[kept.len() + 3];
+        // The jerk of this alone is about three times the limit.
+        stroke.delta_rad[0] += limits[0].motion.jerk_rad_s3 * stroke.duration_s.powi(3) / 40.0;
+        let planted = Trajectory::new(JOINTS, *running.base_rad(), &strokes).unwrap();
+        assert!(check_motion(&planted, &limits).is_err(), "seed {seed}: a planted fault is not noticed");
+    }
+    assert!(acceleration > 2.0 && jerk > 4.0, "dropping uses {acceleration} and {jerk} of the limits");
+}
+
+/// Goal: strokes that have ended leave no trace but the base, bit by bit.
+#[test]
+fn motion_without_its_ended_strokes_has_the_same_bits() {
+    for seed in 0..20 {
+        let mut rng = SeededRng::new(seed, 6);
+        let limits = limits(&mut rng);
+        let running = straight(&mut rng, &limits);
+        let (cut_s, goal_rad) = cut(&mut rng, &running, 0.0);
+        let new = replacement(&running, cut_s, &goal_rad, &limits).unwrap();
+        let from_s = cut_s + (new.duration_s() - cut_s) * rng.within(0.0, 1.1);
+        let short = without_ended(&new, from_s);
+        assert!(short.strokes().len() <= new.strokes().len());
+        for part in 0..100 {
+            let t_s = from_s + f64::from(part) * 0.01;
+            assert_eq!(short.sample(t_s), new.sample(t_s), "seed {seed}, t {t_s}");
+        }
+        assert_eq!(bits(&short.end_rad()), bits(&new.end_rad()), "seed {seed}");
+    }
 }
 
 /// Goal: arguments that make no sense are refused, without a panic.

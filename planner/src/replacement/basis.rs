@@ -10,10 +10,10 @@ pub(super) const EXPONENT: u32 = 10;
 const PER_KERNEL: f64 = 12.0;
 /// How much wider strokes may be for each second from either end (1).
 const GROWTH: f64 = 0.6;
-/// Instants a spacing at which weights are fitted; a stroke starts at every fourth of them.
-const INSTANTS: u32 = 4;
+/// Instants a spacing at which weights are fitted; a stroke starts at every second of them.
+const INSTANTS: u32 = 2;
 /// Instants that are checked for each of these.
-pub(super) const CHECKED: u32 = 3;
+const CHECKED: u32 = 6;
 /// More strokes than this are never useful.
 const STROKES_MAX: usize = 256;
 
@@ -77,6 +77,8 @@ pub(super) struct Instants {
     running: Vec<(usize, usize)>,
     /// For each radian of the stroke.
     shares: Vec<[f64; 3]>,
+    /// Of instants that are checked: the last fitted one that is not later.
+    pub nearest: Vec<usize>,
     /// Most strokes that run at once.
     pub most_running: usize,
 }
@@ -97,14 +99,16 @@ impl Instants {
         Self::new(slots, times_s)
     }
 
-    /// These instants, and more between them: [`CHECKED`] for each.
-    pub(super) fn checked(&self, slots: &[Slot], end_s: f64) -> Self {
-        let mut times_s = Vec::new();
+    /// These instants, and more between them: [`CHECKED`] for each, and twice as many until `fine_until_s`.
+    pub(super) fn checked(&self, slots: &[Slot], end_s: f64, fine_until_s: f64) -> Self {
+        let (mut times_s, mut nearest) = (Vec::new(), Vec::new());
         let next_s = self.times_s.iter().skip(1).chain(std::iter::once(&end_s));
-        for (from_s, to_s) in self.times_s.iter().zip(next_s) {
-            divide(&mut times_s, *from_s, *to_s, CHECKED);
+        for (instant, (from_s, to_s)) in self.times_s.iter().zip(next_s).enumerate() {
+            let parts = if *from_s < fine_until_s { 2 * CHECKED } else { CHECKED };
+            divide(&mut times_s, *from_s, *to_s, parts);
+            nearest.extend((0..parts).map(|_| instant));
         }
-        Self::new(slots, times_s)
+        Self { nearest, ..Self::new(slots, times_s) }
     }
 
     fn new(slots: &[Slot], times_s: Vec<f64>) -> Self {
@@ -125,11 +129,11 @@ impl Instants {
             most_running = most_running.max(shares.len() - running[running.len() - 1].1);
         }
         running.push((0, shares.len()));
-        Self { times_s, running, shares, most_running }
+        Self { times_s, running, shares, nearest: Vec::new(), most_running }
     }
 
     /// Index of the first stroke that runs at an instant, and the shares of those that run.
-    #[inline]
+    #[inline(always)]
     pub(super) fn shares(&self, instant: usize) -> (usize, &[[f64; 3]]) {
         let (first, from) = self.running[instant];
         let (_, to) = self.running[instant + 1];

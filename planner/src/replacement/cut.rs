@@ -4,12 +4,15 @@ use super::fit::Rates;
 use crate::replacement::reference::Task;
 use taustream_motion::limits::TOLERANCE;
 use taustream_motion::peaks::peak_constants;
+use taustream_motion::range::PermittedRange;
 use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Setpoint, Stroke, Trajectory};
 
 /// A stroke whose jerk stays below this share of the limit needs no narrow strokes that cancel it.
 const NEGLIGIBLE: f64 = 0.05;
 /// A stroke with less than this share of its duration left is over.
 const OVER: f64 = 0.05;
+/// Instants at which position ranges are looked at.
+const RANGE_SAMPLES: u32 = 48;
 /// How much more than at an instant a peak beside it may be ..
 const PEAK: f64 = 2e-4;
 /// .. up to this share of the limits.
@@ -112,6 +115,23 @@ impl<'a> Cut<'a> {
             }
         }
         sums
+    }
+
+    /// True when a motion stays in the position ranges after the cut, or comes in from where it is at the cut. At sampled instants:
+    /// the proof follows later.
+    pub(super) fn holds_range(&self, motion: &Trajectory, duration_s: f64) -> bool {
+        let start_rad = self.running.sample(self.at_s).position_rad;
+        let ranges: [PermittedRange; MAX_JOINTS] =
+            std::array::from_fn(|joint| PermittedRange::around(&self.limits[joint], start_rad[joint]));
+        (1..=RANGE_SAMPLES).all(|part| {
+            let t_s = self.at_s + duration_s * f64::from(part) / f64::from(RANGE_SAMPLES);
+            let position_rad = motion.sample(t_s).position_rad;
+            ranges
+                .iter()
+                .zip(&position_rad)
+                .take(self.joints())
+                .all(|(range, position)| range.contains(*position))
+        })
     }
 
     /// A share of the limits of some joints at instants after the cut. Up to `early_s` the motion may use what it uses as it

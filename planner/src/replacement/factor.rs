@@ -65,6 +65,7 @@ impl Factor {
     }
 
     /// Solves for several right-hand sides in place.
+    #[inline(always)]
     pub(super) fn solve(&self, x: &mut [[f64; LANES]]) {
         let band = self.band;
         for i in 0..self.count {

@@ -7,8 +7,9 @@
 //! Source: Boyd et al., "Distributed Optimization and Statistical Learning via the Alternating Direction Method of
 //! Multipliers", 2011, sections 3.4.3 and 5.
 use super::LANES;
-use super::basis::{CHECKED, Instants};
+use super::basis::Instants;
 use super::factor::Factor;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Velocity, acceleration and jerk of some joints at one instant.
 pub(super) type Rates = [[f64; LANES]; 3];
@@ -19,8 +20,12 @@ const RELAXATION: f64 = 1.6;
 const EXCESS: f64 = 1.001;
 /// How much further the bounds go down than a peak between the instants is too high.
 const TIGHTEN: f64 = 0.999;
+/// A parabola through values below this share of the ceiling has its peak below it.
+const NEAR: f64 = 0.97;
+/// After how many rounds a fit is given up whose largest share of a bound is above what is stated.
+const HOPELESS: [(u32, f64); 4] = [(8, 1.08), (14, 1.035), (20, 1.02), (26, 1.012)];
 /// Most rounds of a fit.
-const ROUNDS: u32 = 40;
+const ROUNDS: u32 = 32;
 
 /// What all joints share.
 pub(super) struct System {
@@ -47,26 +52,48 @@ pub(super) struct Problem {
     pub sum_rad: Option<[f64; LANES]>,
 }
 
+/// A fit, compiled for each width of vectors.
+struct Rounds<'a> {
+    system: &'a System,
+    problem: &'a mut Problem,
+}
+
+impl WithSimd for Rounds<'_> {
+    type Output = Option<Vec<[f64; LANES]>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.system.rounds(self.problem)
+    }
+}
+
 impl System {
-    /// Weights of the strokes, or nothing when none were found inside the ceilings.
+    /// Weights of the strokes, or nothing when none were found inside the ceilings. Uses the widest vectors of the processor.
     pub(super) fn solve(&self, problem: &mut Problem) -> Option<Vec<[f64; LANES]>> {
+        Arch::new().dispatch(Rounds { system: self, problem })
+    }
+
+    #[inline(always)]
+    fn rounds(&self, problem: &mut Problem) -> Option<Vec<[f64; LANES]>> {
         let mut along = vec![[1.0; LANES]; self.count];
         self.factor.solve(&mut along);
         let mut dual = vec![[[0.0; LANES]; 3]; problem.reference.len()];
         let mut weights = vec![[0.0; LANES]; self.count];
         for round in 0..ROUNDS {
             self.least_squares(problem, &along, &mut weights);
-            if self.project(problem, &weights, &mut dual, round == 0) > EXCESS {
-                continue;
-            }
-            if self.tighten(problem, &weights) {
+            let used = self.project(problem, &weights, &mut dual, round == 0);
+            if used <= EXCESS && self.tighten(problem, &weights) {
                 return Some(weights);
+            }
+            if HOPELESS.iter().any(|(rounds, most)| round + 1 == *rounds && used > *most) {
+                break;
             }
         }
         None
     }
 
     /// Weights nearest to the reference, with their sum fixed.
+    #[inline(always)]
     fn least_squares(&self, problem: &Problem, along: &[[f64; LANES]], weights: &mut [[f64; LANES]]) {
         weights.fill([0.0; LANES]);
         for (instant, (target, kept)) in problem.reference.iter().zip(&problem.kept[0]).enumerate() {
@@ -100,6 +127,7 @@ impl System {
     }
 
     /// Projects into the bounds, sets the next reference, and returns the largest share of a bound.
+    #[inline(always)]
     fn project(
         &self,
         problem: &mut Problem,
@@ -107,27 +135,32 @@ impl System {
         dual: &mut [Rates],
         first: bool,
     ) -> f64 {
-        let mut used: f64 = 0.0;
+        let mut used = [0.0; LANES];
         let relaxation = if first { 1.0 } else { RELAXATION };
         for (instant, dual) in dual.iter_mut().enumerate() {
             let now = self.instants.sum(instant, weights, &problem.kept[0][instant]);
             let (target, bounds) = (&mut problem.reference[instant], &problem.bounds[instant]);
-            for (((now, target), bounds), dual) in now.iter().zip(target).zip(bounds).zip(dual) {
+            for quantity in 0..3 {
+                // Local copies, so that lanes become vectors.
+                let (now, bound) = (now[quantity], bounds[quantity]);
+                let (mut aim, mut off) = (target[quantity], dual[quantity]);
                 for lane in 0..LANES {
-                    let bound = bounds[lane];
-                    used = used.max(now[lane].abs() / bound);
-                    let relaxed = relaxation * now[lane] + (1.0 - relaxation) * (target[lane] + dual[lane]);
-                    let wanted = relaxed + dual[lane];
-                    let inside = wanted.max(-bound).min(bound);
-                    dual[lane] = wanted - inside;
-                    target[lane] = inside - dual[lane];
+                    used[lane] = larger(now[lane].abs() / bound[lane], used[lane]);
+                    let relaxed = relaxation * now[lane] + (1.0 - relaxation) * (aim[lane] + off[lane]);
+                    let wanted = relaxed + off[lane];
+                    let raised = larger(-bound[lane], wanted);
+                    let inside = if bound[lane] < raised { bound[lane] } else { raised };
+                    off[lane] = wanted - inside;
+                    aim[lane] = inside - off[lane];
                 }
+                (target[quantity], dual[quantity]) = (aim, off);
             }
         }
-        used
+        used.into_iter().fold(0.0, f64::max)
     }
 
     /// True when nothing is above its ceiling. Otherwise lowers the bounds next to what is.
+    #[inline(always)]
     fn tighten(&self, problem: &mut Problem, weights: &[[f64; LANES]]) -> bool {
         let mut holds = true;
         let mut last: Option<[Rates; 2]> = None;
@@ -137,17 +170,23 @@ impl System {
             let middle = instant.saturating_sub(1);
             let [before, at] = last.unwrap_or([now, now]);
             for quantity in 0..3 {
+                let (values, ceilings) = (at[quantity], problem.ceilings[middle][quantity]);
+                let mut highest = 0.0;
                 for lane in 0..LANES {
-                    let values = [before, at, now].map(|rates| rates[quantity][lane]);
-                    let ceiling = problem.ceilings[middle][quantity][lane];
-                    let peak = peak(values);
-                    if peak <= ceiling {
+                    highest = larger(values[lane].abs() / ceilings[lane], highest);
+                }
+                if highest <= NEAR {
+                    continue;
+                }
+                for lane in 0..LANES {
+                    let peak = peak([before, at, now].map(|rates| rates[quantity][lane]));
+                    if peak <= ceilings[lane] {
                         continue;
                     }
                     holds = false;
-                    let near = middle / CHECKED as usize;
+                    let near = self.checked.nearest[middle];
                     for bounds in problem.bounds.iter_mut().skip(near).take(2) {
-                        bounds[quantity][lane] *= TIGHTEN * ceiling / peak;
+                        bounds[quantity][lane] *= TIGHTEN * ceilings[lane] / peak;
                     }
                 }
             }
@@ -157,7 +196,14 @@ impl System {
     }
 }
 
+/// One instruction, which [`f64::max`] is not. Where one is no number it is the second.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// Highest magnitude near the middle one of three neighbouring values: of the parabola through them.
+#[inline(always)]
 fn peak([before, middle, after]: [f64; 3]) -> f64 {
     let (top, bend) = (middle.abs(), before - 2.0 * middle + after);
     let is_top = middle * bend < 0.0 && top >= before.abs().max(after.abs());
@@ -166,7 +212,7 @@ fn peak([before, middle, after]: [f64; 3]) -> f64 {
 
 impl Instants {
     /// What weighted strokes and the kept ones do together at an instant.
-    #[inline]
+    #[inline(always)]
     fn sum(&self, instant: usize, weights: &[[f64; LANES]], kept: &Rates) -> Rates {
         let mut sum = *kept;
         let (first, shares) = self.shares(instant);

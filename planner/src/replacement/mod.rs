@@ -31,7 +31,9 @@ const CEILING: f64 = 0.9997;
 const DURATIONS: [f64; 10] = [1.07, 1.1, 1.15, 1.22, 1.32, 1.5, 1.8, 2.3, 3.2, 5.0];
 /// Width of the widest strokes over the duration.
 const MIDDLE: f64 = 0.18;
-/// Width of the last strokes over the duration.
+/// Width of the first strokes over that of the kept ones ..
+const FIRST: f64 = 0.5;
+/// Width of the last strokes over the duration; the first ones are not narrower for that.
 const LAST: f64 = 0.1;
 /// The reference departs from the running motion this part of the first width after the cut ..
 const LEAD: f64 = 0.15;
@@ -67,6 +69,22 @@ pub fn replacement(
 pub fn to_rest(running: &Trajectory, cut_s: f64, limits: &[JointLimits; MAX_JOINTS]) -> Option<Trajectory> {
     let cut = Cut::new(running, cut_s, limits)?;
     search(&cut, None, running.duration_s() - cut_s).or_else(|| Some(running.clone()))
+}
+
+/// The same motion from `from_s` on, with the strokes that have ended before it added to the base: up to the first stroke that
+/// still runs, in their order, so that every sample from `from_s` on has the same bits. For motions that are replaced many
+/// times, whose begun strokes would fill a message.
+#[must_use]
+pub fn without_ended(running: &Trajectory, from_s: f64) -> Trajectory {
+    let ended = running.strokes().iter().take_while(|stroke| stroke.has_ended(from_s)).count();
+    let (ended, left) = running.strokes().split_at(ended);
+    let mut base_rad = *running.base_rad();
+    for stroke in ended {
+        for (base, delta) in base_rad.iter_mut().zip(&stroke.delta_rad) {
+            *base += delta;
+        }
+    }
+    Trajectory::new(running.joints(), base_rad, left).unwrap_or_else(|_| running.clone())
 }
 
 /// To rest, and from there to the goal.
@@ -116,10 +134,12 @@ struct Attempt<'a> {
 impl<'a> Attempt<'a> {
     fn new(cut: &'a Cut<'a>, duration_s: f64, slowest: usize) -> Option<Self> {
         let (middle_s, last_s) = (MIDDLE * duration_s, LAST * duration_s);
-        let widths = Widths { duration_s, first_s: cut.kernel_s.min(middle_s), middle_s, last_s };
+        // Narrower than what they have to cancel, but not narrower each time that a replacement is replaced.
+        let first_s = cut.kernel_s.min((FIRST * cut.kernel_s).max(last_s)).min(middle_s);
+        let widths = Widths { duration_s, first_s, middle_s, last_s };
         let slots = slots(&widths).filter(|slots| cut.kept.len() + slots.len() <= MAX_STROKES)?;
         let instants = Instants::fitted(&slots);
-        let checked = instants.checked(&slots, duration_s);
+        let checked = instants.checked(&slots, duration_s, cut.kept_end_s);
         let motion = cut.limits[slowest].motion;
         let weights = [motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3]
             .map(|limit| 1.0 / (limit * limit));
@@ -155,7 +175,8 @@ impl<'a> Attempt<'a> {
         if let Some(goal_rad) = goal_rad {
             end_at(self.cut.running.base_rad(), &mut strokes, new + self.slots.len() / 2, goal_rad);
         }
-        Trajectory::new(self.cut.joints(), *self.cut.running.base_rad(), &strokes).ok()
+        let found = Trajectory::new(self.cut.joints(), *self.cut.running.base_rad(), &strokes).ok()?;
+        self.cut.holds_range(&found, self.widths.duration_s).then_some(found)
     }
 
     fn problem(
