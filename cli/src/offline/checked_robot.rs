@@ -163,7 +163,10 @@ impl CheckedRobot {
                 .collect(),
             always_close: names(&robot.close_by_rule),
             pause_s: robot.stop_s(),
-            longest_stop_s: StopRules::new(&robot.limits(), robot.joints.len()).longest_stop_s(),
+            // Of an arm that is refused, the longest ramp that a time scale takes says nothing.
+            longest_stop_s: StopRules::new(&robot.limits(), robot.joints.len())
+                .longest_stop_s()
+                .max(robot.stop_s()),
         }
     }
 }

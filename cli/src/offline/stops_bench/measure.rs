@@ -5,6 +5,7 @@ use rsruckig::prelude::{
     Trajectory as RuckigTrajectory,
 };
 use std::path::Path;
+use std::time::Instant;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill};
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
@@ -36,6 +37,8 @@ pub(super) struct Case {
     pub(super) fast: Stopped,
     pub(super) pause: Stopped,
     pub(super) optimum: Stopped,
+    /// How long it took to choose the fast stop, us.
+    pub(super) choice_us: f64,
 }
 
 /// Stops at so many instants of each move, at each speed.
@@ -52,14 +55,17 @@ pub(super) fn cases(robot: &Robot, instants: u32) -> Result<Vec<Case>, Failure> 
             for instant in 0..instants {
                 let part = (f64::from(instant) + 0.5) / f64::from(instants);
                 let s = part * motion.trajectory.duration_s();
+                let (fast, choice_us) = motion.stop(SpeedRequest::FastStop, (s, speed));
+                let (pause, _) = motion.stop(SpeedRequest::Stop, (s, speed));
                 let optimum = optimum(&motion.trajectory, (s, speed), &limits)?;
                 cases.push(Case {
                     travel_rad,
                     speed,
                     phase: instant * PHASES / instants,
-                    fast: motion.stop(SpeedRequest::FastStop, (s, speed)),
-                    pause: motion.stop(SpeedRequest::Stop, (s, speed)),
+                    fast,
+                    pause,
                     optimum,
+                    choice_us,
                 });
             }
         }
@@ -91,12 +97,15 @@ struct Motion {
 }
 
 impl Motion {
-    fn stop(&self, request: SpeedRequest, (from_s, speed): (f64, f64)) -> Stopped {
+    /// Stops, and says how long choosing took, us.
+    fn stop(&self, request: SpeedRequest, (from_s, speed): (f64, f64)) -> (Stopped, f64) {
         let end_s = self.trajectory.duration_s();
         let mut scale = TimeScale::settled(speed);
         let ahead = PeaksAhead::new(&self.cells, end_s);
         let situation = Situation { now_s: 0.0, s: from_s, ahead, approaching: false, waits_s: 0.0 };
+        let begun = Instant::now();
         self.rules.apply(request, &mut scale, &situation);
+        let choice_us = begun.elapsed().as_secs_f64() * 1e6;
         let (mut now_s, mut s) = (0.0, from_s);
         // A motion that ends by itself before is at rest, too.
         while now_s < scale.settles_s() && s < end_s {
@@ -105,10 +114,8 @@ impl Motion {
             now_s = next_s;
         }
         let position = |s: f64| self.trajectory.sample(s).position_rad[0];
-        Stopped {
-            duration_s: now_s.min(scale.settles_s()),
-            distance_rad: (position(s) - position(from_s)).abs(),
-        }
+        let distance_rad = (position(s) - position(from_s)).abs();
+        (Stopped { duration_s: now_s.min(scale.settles_s()), distance_rad }, choice_us)
     }
 }
 

@@ -73,6 +73,8 @@ struct Answer {
     by_move: Vec<Row>,
     by_speed_and_move: Vec<Row>,
     all: Row,
+    /// How long it takes to choose a fast stop, us.
+    choice_us: Spread,
 }
 
 impl fmt::Display for Answer {
@@ -103,6 +105,7 @@ impl fmt::Display for Answer {
                 row.longest_s
             )?;
         }
+        writeln!(f, "choosing a fast stop takes (us): median, p95, worst {}", self.choice_us)?;
         write!(
             f,
             "by the limits alone, no stop from a constant speed takes longer than {:.3} s; a change takes at least 2 ms, so ratios are \
@@ -154,6 +157,7 @@ fn answer(robot: &Robot, cases: &[Case]) -> Answer {
             .collect(),
         by_speed_and_move: by_speed_and_move.collect(),
         all: group("all".to_owned(), &|_| true),
+        choice_us: Spread::of(cases.iter().map(|case| case.choice_us).collect()),
     }
 }
 
