@@ -2,6 +2,12 @@
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
+/// `CLOCK_MONOTONIC` now, ns.
+#[must_use]
+pub fn now_ns() -> u64 {
+    ns_after(Duration::ZERO)
+}
+
 /// `CLOCK_MONOTONIC` at some time from now, ns.
 pub(crate) fn ns_after(time: Duration) -> u64 {
     let now = clock_gettime(ClockId::Monotonic);

@@ -6,7 +6,7 @@
 #![deny(unsafe_code)]
 
 pub mod bus;
-mod clock;
+pub mod clock;
 pub mod command;
 pub mod fault;
 pub mod files;
@@ -34,4 +34,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 3;
+pub const LAYOUT_VERSION: u32 = 4;

@@ -8,8 +8,12 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 pub enum When {
     /// Cut the running motion. From rest: at once.
     AtOnce,
-    /// Plan from the end of the running motion, and start when it has ended.
+    /// Plan from the end of the running motion, and start when it has ended. Replaces what waits for that.
     AfterCurrent,
+    /// Plan from the end of everything that was accepted, and start when it has ended.
+    Queue,
+    /// Bring the running motion to rest as soon as its limits allow, and drop what waits. The goal means nothing.
+    Cancel,
 }
 
 /// A replan request on the wire.
@@ -75,8 +79,8 @@ pub enum PlanRequestError {
         /// The value in the message.
         value_rad: f64,
     },
-    /// Neither at once nor after current.
-    #[error("unknown start code {got}; 0 (at once) or 1 (after current)")]
+    /// None of those that exist.
+    #[error("unknown start code {got}; 0 (at once), 1 (after current), 2 (queue) or 3 (cancel)")]
     When {
         /// The code in the message.
         got: u32,
@@ -91,6 +95,8 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             when: match r.when {
                 When::AtOnce => 0,
                 When::AfterCurrent => 1,
+                When::Queue => 2,
+                When::Cancel => 3,
             },
             deadline_ms: r.deadline_ms,
             seed: r.seed,
@@ -116,6 +122,8 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
         let when = match r.when {
             0 => When::AtOnce,
             1 => When::AfterCurrent,
+            2 => When::Queue,
+            3 => When::Cancel,
             got => return Err(PlanRequestError::When { got }),
         };
         for (joint, &value_rad) in r.goal_rad.iter().enumerate() {
@@ -242,4 +250,4 @@ impl PlanReply {
 }
 
 const _: () = assert!(size_of::<PlanRequest>() == 344);
-const _: () = assert!(size_of::<PlanReply>() == 48 + 312 + 248);
+const _: () = assert!(size_of::<PlanReply>() == 48 + 320 + 248);

@@ -12,6 +12,7 @@ pub struct Receipt {
     trajectory_id: u64,
     generation: u64,
     tick: u64,
+    trajectory_cut: u64,
     joint: u32,
     detail: u32,
     at_s: f64,
@@ -23,11 +24,11 @@ pub struct Receipt {
 /// What became of a trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// It runs, or runs when the arm is resumed.
+    /// It runs, or runs when the arm is resumed, or when the running one reaches its cut.
     Accepted {
         /// Trajectory time from which it holds.
         from_s: f64,
-        /// Cycle number from which it holds.
+        /// Cycle number from which it holds; 0 for one that waits for its cut.
         tick: u64,
     },
     /// Nothing changed.
@@ -90,13 +91,60 @@ pub enum Rejection {
         /// The phase.
         phase: Option<Phase>,
     },
-    /// It cuts a motion; this version accepts trajectories at rest only.
+    /// The cut lies behind the last setpoint that was sent.
     #[error(
-        "cut at {at_s:.3} s refused: this version accepts a trajectory only at rest; use --after-current or stop first"
+        "cut at {at_s:.3} s already passed by {by_s:.4} s of trajectory time; plan again with a later cut"
     )]
-    CutUnsupported {
+    CutPassed {
         /// Trajectory time of the cut.
         at_s: f64,
+        /// By how much.
+        by_s: f64,
+    },
+    /// The trajectory does not reach the cut, or waits for a later one itself.
+    #[error(
+        "cut at {at_s:.3} s is outside of what the trajectory runs, {begins_s:.3} s to {ends_s:.3} s; plan again"
+    )]
+    CutOutside {
+        /// Trajectory time of the cut.
+        at_s: f64,
+        /// From when the trajectory runs.
+        begins_s: f64,
+        /// When it ends.
+        ends_s: f64,
+    },
+    /// It cuts a trajectory that neither runs nor waits.
+    #[error("it cuts trajectory {cut}, but trajectory {running} runs; read the report and plan again")]
+    OtherTrajectory {
+        /// Id of the trajectory to cut.
+        cut: u64,
+        /// Id of the one that runs.
+        running: u64,
+    },
+    /// Nothing runs that could be cut.
+    #[error("nothing to cut: the arm is {}; plan from the commanded pose once it holds", phase.map_or("in an unknown phase", Phase::word))]
+    NothingToCut {
+        /// The phase.
+        phase: Option<Phase>,
+    },
+    /// A pause or another change of speed runs, chosen for the motion that is to be replaced.
+    #[error(
+        "the speed changes: the stop limits would not hold on the replacement; send it again when the speed is settled"
+    )]
+    SpeedChanges,
+    /// It does not repeat the strokes that have begun.
+    #[error("kept strokes differ: stroke {} of the trajectory that it cuts is missing, changed, or folded before its end", stroke + 1)]
+    KeptStrokesDiffer {
+        /// Zero-based index of the stroke.
+        stroke: u32,
+    },
+    /// Its base is not that of the trajectory that it cuts.
+    #[error("kept base differs: joint {} by {} rad; repeat the base bit by bit", joint + 1, Amount(*by_rad))]
+    KeptBaseDiffers {
+        /// Zero-based index of the joint.
+        joint: u32,
+        /// By how much.
+        by_rad: f64,
     },
     /// The streamer came to it after its sender had given up.
     #[error("too late: the streamer came to it {late_s:.3} s after its sender had given up; send it again")]
@@ -118,9 +166,16 @@ mod code {
     pub(super) const LIMIT: u32 = 6;
     pub(super) const NOT_AT_BASE: u32 = 7;
     pub(super) const NOT_READY: u32 = 8;
-    pub(super) const CUT: u32 = 9;
+    // 9 was the refusal of every cut, up to layout version 3.
     pub(super) const BUSY: u32 = 10;
     pub(super) const TOO_LATE: u32 = 11;
+    pub(super) const CUT_PASSED: u32 = 12;
+    pub(super) const CUT_OUTSIDE: u32 = 13;
+    pub(super) const OTHER_TRAJECTORY: u32 = 14;
+    pub(super) const NOTHING_TO_CUT: u32 = 15;
+    pub(super) const KEPT_STROKES: u32 = 16;
+    pub(super) const KEPT_BASE: u32 = 17;
+    pub(super) const SPEED_CHANGES: u32 = 18;
 }
 
 impl Receipt {
@@ -133,6 +188,7 @@ impl Receipt {
             trajectory_id,
             generation,
             tick: 0,
+            trajectory_cut: 0,
             joint: 0,
             detail: 0,
             at_s: 0.0,
@@ -172,7 +228,26 @@ impl Receipt {
             Rejection::NotReady { phase } => {
                 (self.code, self.detail) = (code::NOT_READY, phase.map_or(0, Phase::code));
             }
-            Rejection::CutUnsupported { at_s } => (self.code, self.at_s) = (code::CUT, *at_s),
+            Rejection::CutPassed { at_s, by_s } => {
+                (self.code, self.at_s, self.value) = (code::CUT_PASSED, *at_s, *by_s);
+            }
+            Rejection::CutOutside { at_s, begins_s, ends_s } => {
+                (self.code, self.at_s) = (code::CUT_OUTSIDE, *at_s);
+                (self.value, self.limit) = (*begins_s, *ends_s);
+            }
+            Rejection::OtherTrajectory { cut, running } => {
+                (self.code, self.trajectory_cut, self.tick) = (code::OTHER_TRAJECTORY, *cut, *running);
+            }
+            Rejection::NothingToCut { phase } => {
+                (self.code, self.detail) = (code::NOTHING_TO_CUT, phase.map_or(0, Phase::code));
+            }
+            Rejection::SpeedChanges => self.code = code::SPEED_CHANGES,
+            Rejection::KeptStrokesDiffer { stroke } => {
+                (self.code, self.detail) = (code::KEPT_STROKES, *stroke);
+            }
+            Rejection::KeptBaseDiffers { joint, by_rad } => {
+                (self.code, self.joint, self.value) = (code::KEPT_BASE, *joint, *by_rad);
+            }
             Rejection::TooLate { late_s } => (self.code, self.value) = (code::TOO_LATE, *late_s),
             Rejection::Busy => self.code = code::BUSY,
         }
@@ -211,7 +286,17 @@ impl Receipt {
             },
             code::NOT_AT_BASE => Rejection::NotAtBase { joint: self.joint, by_rad: self.value },
             code::NOT_READY => Rejection::NotReady { phase: Phase::from_code(self.detail) },
-            code::CUT => Rejection::CutUnsupported { at_s: self.at_s },
+            code::CUT_PASSED => Rejection::CutPassed { at_s: self.at_s, by_s: self.value },
+            code::CUT_OUTSIDE => {
+                Rejection::CutOutside { at_s: self.at_s, begins_s: self.value, ends_s: self.limit }
+            }
+            code::OTHER_TRAJECTORY => {
+                Rejection::OtherTrajectory { cut: self.trajectory_cut, running: self.tick }
+            }
+            code::NOTHING_TO_CUT => Rejection::NothingToCut { phase: Phase::from_code(self.detail) },
+            code::SPEED_CHANGES => Rejection::SpeedChanges,
+            code::KEPT_STROKES => Rejection::KeptStrokesDiffer { stroke: self.detail },
+            code::KEPT_BASE => Rejection::KeptBaseDiffers { joint: self.joint, by_rad: self.value },
             code::TOO_LATE => Rejection::TooLate { late_s: self.value },
             code::BUSY => Rejection::Busy,
             _ => return None,
@@ -220,4 +305,4 @@ impl Receipt {
     }
 }
 
-const _: () = assert!(size_of::<Receipt>() == 312);
+const _: () = assert!(size_of::<Receipt>() == 320);

@@ -53,7 +53,13 @@ pub struct Report {
     pub trajectory_s: f64,
     /// Its duration at full speed.
     pub trajectory_duration_s: f64,
-    /// The pose it ends at; the commanded pose when none runs.
+    /// The accepted trajectory that waits for its cut; 0 for none.
+    pub successor_id: u64,
+    /// Trajectory time from which that one is run.
+    pub successor_from_s: f64,
+    /// Trajectory time at which everything accepted has ended: the successor, or the one that runs.
+    pub end_s: f64,
+    /// The pose in which it ends; the commanded pose when none runs.
     pub end_rad: [f64; MAX_JOINTS],
     /// The time scale now.
     pub sigma: f64,

@@ -95,7 +95,7 @@ fn trajectory_written_and_read_is_the_same() {
 #[test]
 fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
     let cases: [(Corrupted, &str); 10] = [
-        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 4"),
+        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 5"),
         (Corrupted::Joints(0), "0 joints"),
         (Corrupted::Joints(9), "joint_count is 9"),
         (Corrupted::StrokeCount(600), "stroke_count is 600; at most 512"),
@@ -143,7 +143,13 @@ fn receipt_carries_every_outcome() {
         }),
         Outcome::Rejected(Rejection::NotAtBase { joint: 5, by_rad: 0.02 }),
         Outcome::Rejected(Rejection::NotReady { phase: Some(Phase::Paused) }),
-        Outcome::Rejected(Rejection::CutUnsupported { at_s: 0.9 }),
+        Outcome::Rejected(Rejection::CutPassed { at_s: 0.9, by_s: 0.02 }),
+        Outcome::Rejected(Rejection::CutOutside { at_s: 0.9, begins_s: 0.0, ends_s: 0.8 }),
+        Outcome::Rejected(Rejection::OtherTrajectory { cut: u64::MAX, running: 3 }),
+        Outcome::Rejected(Rejection::NothingToCut { phase: Some(Phase::Holding) }),
+        Outcome::Rejected(Rejection::SpeedChanges),
+        Outcome::Rejected(Rejection::KeptStrokesDiffer { stroke: 11 }),
+        Outcome::Rejected(Rejection::KeptBaseDiffers { joint: 4, by_rad: 1e-16 }),
         Outcome::Rejected(Rejection::TooLate { late_s: 0.75 }),
         Outcome::Rejected(Rejection::Busy),
     ];

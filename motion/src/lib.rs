@@ -11,6 +11,7 @@ extern crate std;
 
 pub mod brake;
 pub mod chain;
+pub mod cut;
 pub mod digits;
 pub mod duration;
 pub mod limits;

@@ -85,7 +85,20 @@ pub fn check_motion(
     trajectory: &Trajectory,
     limits: &[JointLimits; MAX_JOINTS],
 ) -> Result<Peaks, LimitViolation> {
-    crate::proof::check(trajectory, limits)
+    crate::proof::check(trajectory, limits, 0.0)
+}
+
+/// Like [`check_motion`], from `begin_s` on: for a replacement, which runs from its cut on. What its strokes would do before
+/// is not run and not checked. The joint's entry counts from the pose at `begin_s`.
+///
+/// # Errors
+/// The first violation in time, at its worst instant.
+pub fn check_motion_from(
+    trajectory: &Trajectory,
+    limits: &[JointLimits; MAX_JOINTS],
+    begin_s: f64,
+) -> Result<Peaks, LimitViolation> {
+    crate::proof::check(trajectory, limits, begin_s)
 }
 
 /// Relative excess that [`check_motion`] lets pass, so that a motion timed exactly to a limit is not refused

@@ -62,7 +62,7 @@ pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimit
     edges.sort_unstable_by(f64::total_cmp);
     // Between two of these the motion is one polynomial.
     let mut edges = edges.iter().copied().filter(|edge_s| *edge_s > 0.0 && *edge_s < duration_s);
-    let mut proof = Proof::new(trajectory, limits);
+    let mut proof = Proof::new(trajectory, limits, 0.0);
     let (mut from_s, mut piece_ends_s) = (0.0, 0.0);
     for (index, cell) in cells.iter_mut().enumerate() {
         let mut whole: Option<Stretch> = None;

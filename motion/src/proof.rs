@@ -1,5 +1,8 @@
 //! The proof behind [`crate::limits::check_motion`]: branch and bound with Taylor models.
 //!
+//! The proof begins at an instant that its caller chooses: at the start, or at the cut of a replacement, before which the
+//! trajectory is not run.
+//!
 //! Between two neighbouring starts or ends of strokes a trajectory is one polynomial. On an interval of half width H
 //! round m, Taylor's theorem bounds each quantity by its exact derivatives at m and a remainder:
 //!
@@ -45,16 +48,19 @@ const RATES: [Quantity; 3] = [Quantity::Velocity, Quantity::Acceleration, Quanti
 pub(crate) fn check(
     trajectory: &Trajectory,
     limits: &[JointLimits; MAX_JOINTS],
+    begin_s: f64,
 ) -> Result<Peaks, LimitViolation> {
-    let mut proof = Proof::new(trajectory, limits);
-    proof.check_ends()?;
+    let mut proof = Proof::new(trajectory, limits, begin_s);
+    proof.check_ends(begin_s)?;
     let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
     for (pair, stroke) in edges.chunks_exact_mut(2).zip(trajectory.strokes()) {
         pair.copy_from_slice(&[stroke.start_s, stroke.end_s()]);
     }
     edges.sort_unstable_by(f64::total_cmp);
-    let pieces =
-        || edges.windows(2).filter_map(|w| (w[1] > w[0] && w[1].is_finite()).then_some((w[0], w[1])));
+    let pieces = || {
+        let pieces = edges.windows(2).map(|w| (w[0].max(begin_s), w[1]));
+        pieces.filter(|(from_s, to_s)| to_s > from_s && to_s.is_finite())
+    };
     // A first look at some hundred instants, so that bounds are refined only near the peaks of the whole motion.
     let count = pieces().count().max(1);
     let looks = LOOKS.div_ceil(count);
@@ -108,14 +114,15 @@ struct Entry {
 }
 
 impl Entry {
-    fn of(joint: usize, limits: &JointLimits, trajectory: &Trajectory) -> Self {
-        let base_rad = trajectory.base_rad()[joint];
-        if limits.is_inside(base_rad) {
+    fn new(joint: usize, limits: &JointLimits, (trajectory, begin_s): (&Trajectory, f64)) -> Self {
+        let begins_rad = trajectory.sample(begin_s).position_rad[joint];
+        if limits.is_inside(begins_rad) {
             return Self::default();
         }
-        let above = limits.outside_rad(base_rad) > 0.0;
+        let above = limits.outside_rad(begins_rad) > 0.0;
         let outwards = |delta_rad: f64| if above { delta_rad > 0.0 } else { delta_rad < 0.0 };
-        let first = trajectory.strokes().iter().find(|stroke| outwards(stroke.delta_rad[joint]));
+        let mut left = trajectory.strokes().iter().filter(|stroke| !stroke.has_ended(begin_s));
+        let first = left.find(|stroke| outwards(stroke.delta_rad[joint]));
         Self { until_s: Some(first.map_or(f64::INFINITY, |stroke| stroke.start_s)), above }
     }
 
@@ -147,7 +154,11 @@ enum IntervalResult {
 }
 
 impl<'a> Proof<'a> {
-    pub(crate) fn new(trajectory: &'a Trajectory, limits: &'a [JointLimits; MAX_JOINTS]) -> Self {
+    pub(crate) fn new(
+        trajectory: &'a Trajectory,
+        limits: &'a [JointLimits; MAX_JOINTS],
+        begin_s: f64,
+    ) -> Self {
         let zero = [0.0; MAX_JOINTS];
         Self {
             trajectory,
@@ -160,7 +171,8 @@ impl<'a> Proof<'a> {
             reached_rad: *trajectory.base_rad(),
             travelled_rad: zero,
             entries: core::array::from_fn(|joint| {
-                limits.get(joint).map_or_else(Entry::default, |limits| Entry::of(joint, limits, trajectory))
+                let entry = |limits| Entry::new(joint, limits, (trajectory, begin_s));
+                limits.get(joint).map_or_else(Entry::default, entry)
             }),
             met: [zero; 3],
             bound: [zero; 3],
@@ -174,12 +186,13 @@ impl<'a> Proof<'a> {
 
     /// A trajectory without strokes still stands somewhere, a stroke may lead outwards from the start, and one that only
     /// leads inwards may not come far enough.
-    fn check_ends(&self) -> Result<(), LimitViolation> {
+    fn check_ends(&self, begin_s: f64) -> Result<(), LimitViolation> {
+        let begins_rad = self.trajectory.sample(begin_s).position_rad;
         let (end_s, end_rad) = (self.trajectory.duration_s(), self.trajectory.end_rad());
         for (joint, limits) in self.joint_limits() {
-            let base = self.position_fault(joint, limits, self.trajectory.base_rad()[joint], [0.0; 2]);
+            let begin = self.position_fault(joint, limits, begins_rad[joint], [begin_s; 2]);
             let end = || self.position_fault(joint, limits, end_rad[joint], [f64::INFINITY, end_s]);
-            if let Some(violation) = base.or_else(end) {
+            if let Some(violation) = begin.or_else(end) {
                 return Err(violation);
             }
         }
@@ -534,7 +547,7 @@ mod tests {
             delta_rad[0] = 1.0;
             let stroke = Stroke { start_s: 0.0, duration_s: 1.0, n, delta_rad };
             let trajectory = Trajectory::new(1, [0.0; MAX_JOINTS], &[stroke]).unwrap();
-            let mut proof = Proof::new(&trajectory, &limits);
+            let mut proof = Proof::new(&trajectory, &limits, 0.0);
             proof.enter(0.0, 1.0);
             for place in 1..200 {
                 let middle_s = f64::from(place) / 200.0;

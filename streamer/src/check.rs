@@ -8,7 +8,7 @@ use std::thread;
 use taustream_arm::Robot;
 use taustream_drivers::Nanos;
 use taustream_messages::{CheckedTrajectory, Rejection, Replaces, RobotDigest, TrajectoryMessage};
-use taustream_motion::limits::{Quantity, check_motion};
+use taustream_motion::limits::{Quantity, check_motion_from};
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
 /// Messages that may wait to be checked; more are refused as busy.
@@ -49,9 +49,6 @@ impl Rules {
     pub fn check(&self, message: &TrajectoryMessage) -> Result<Box<PreparedTrajectory>, Rejection> {
         let checked =
             CheckedTrajectory::try_from(message).map_err(|e| Rejection::Malformed(e.to_string()))?;
-        if let Replaces::Cut { at_s, .. } = checked.replaces {
-            return Err(Rejection::CutUnsupported { at_s });
-        }
         if checked.robot_digest != self.digest {
             return Err(Rejection::WrongRobot);
         }
@@ -60,7 +57,16 @@ impl Rules {
             let (got, expected) = (count(checked.trajectory.joints()), count(self.joints));
             return Err(Rejection::JointCount { got, expected });
         }
-        check_motion(&checked.trajectory, &self.limits).map_err(|v| Rejection::Limit {
+        let begin_s = match checked.replaces {
+            Replaces::Rest => 0.0,
+            Replaces::Cut { at_s, .. } => at_s,
+        };
+        let end_s = checked.trajectory.duration_s();
+        if end_s < begin_s {
+            return Err(Rejection::Malformed(format!("it ends at {end_s} s, before its cut at {begin_s} s")));
+        }
+        // From the cut on: what the kept strokes alone would do before it is never run.
+        check_motion_from(&checked.trajectory, &self.limits, begin_s).map_err(|v| Rejection::Limit {
             joint: u32::try_from(v.joint).unwrap_or(u32::MAX),
             at_s: v.at_s,
             value: v.value,
@@ -210,9 +216,16 @@ mod tests {
     }
 
     #[test]
-    fn check_of_a_cut_is_refused_as_unsupported() {
-        let cut = Replaces::Cut { trajectory_id: 3, at_s: 0.5 };
-        let refused = Rules::of(&robot()).check(&message(2.0, cut));
-        assert!(matches!(refused, Err(Rejection::CutUnsupported { .. })), "{refused:?}");
+    fn check_of_a_cut_looks_at_what_runs_from_the_cut_on() {
+        let rules = Rules::of(&robot());
+        let cut = |at_s| Replaces::Cut { trajectory_id: 3, at_s };
+        assert!(rules.check(&message(2.0, cut(0.5))).is_ok());
+        // Too fast as a whole, and at rest before the cut.
+        let result = rules.check(&message(0.3, cut(0.3)));
+        assert!(result.is_ok(), "{result:?}");
+        let refused = rules.check(&message(0.3, cut(0.1)));
+        assert!(matches!(refused, Err(Rejection::Limit { at_s, .. }) if at_s >= 0.1), "{refused:?}");
+        let refused = rules.check(&message(2.0, cut(2.1)));
+        assert!(matches!(refused, Err(Rejection::Malformed(_))), "{refused:?}");
     }
 }

@@ -146,6 +146,8 @@ impl Core {
             self.track.change_speed(order);
         }
         if actions.drop_trajectory {
+            let spare = self.track.drop_successor();
+            self.intake.recycle(spare);
             let spare = self.track.drop_trajectory();
             self.intake.recycle(spare);
             self.guard.release();
@@ -206,7 +208,8 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     probe.ended(Stage::Encode);
     core.buses.send(&mut cycle_state);
     core.ledger.record(command.setpoint(), requested.restart, &mut cycle_state);
-    core.track.commit(&command.setpoint().position_rad, &core.ledger, &mut cycle_state);
+    let replaced = core.track.commit(&command.setpoint().position_rad, &core.ledger, &mut cycle_state);
+    core.intake.recycle(replaced);
     probe.ended(Stage::Send);
     core.buses.receive(tick.wake_time, &mut cycle_state);
     core.supervisor.referencing_mut().read(&mut cycle_state);

@@ -1,5 +1,6 @@
 //! What one cycle has found out: every stage writes down what happened, `supervise` alone draws conclusions.
 use crate::phases::Event;
+use crate::successor::CutRefusal;
 use crate::tick::Tick;
 use taustream_drivers::{CanId, ErrorFrame, JointSet, LinkFault, Nanos, ServoStatus};
 pub use taustream_messages::{BUSES_MAX, Cause};
@@ -43,6 +44,13 @@ pub enum Decision {
         /// Cycle number.
         tick: u64,
     },
+    /// It waits until the running one reaches its cut.
+    Waits {
+        /// Trajectory time from which it holds.
+        from_s: f64,
+    },
+    /// It cuts, and the cut cannot be kept.
+    Cut(CutRefusal),
     /// Not newer than `newest`.
     Stale {
         /// Newest generation accepted.
@@ -193,6 +201,8 @@ pub struct CycleState {
     pub trajectory_id: u64,
     /// Its trajectory time.
     pub trajectory_s: f64,
+    /// It is the successor of the one that ran before, and its first setpoint has left.
+    pub took_over: bool,
     /// How far the setpoint is from the trajectory while a difference is faded out, rad.
     pub off_path_rad: JointArray,
     /// The time scale at the setpoint.
@@ -244,6 +254,7 @@ impl CycleState {
             live: false,
             trajectory_id: 0,
             trajectory_s: 0.0,
+            took_over: false,
             off_path_rad: [0.0; MAX_JOINTS],
             scale: Scale::default(),
             gap_s: 0.0,

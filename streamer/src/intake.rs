@@ -16,8 +16,8 @@ use taustream_drivers::Nanos;
 use taustream_messages::{CheckedTrajectory, Command, Replaces};
 use taustream_motion::{JointLimits, MAX_JOINTS, Trajectory};
 
-/// Boxes in circulation: one runs, one waits, two are being checked or answered.
-const BOXES: usize = 4;
+/// Boxes in circulation: one runs, one waits for its cut, one is on its way to the cycle, two are being checked or answered.
+const BOXES: usize = 5;
 /// Decisions that wait to be read: of every box, and of its next filling before the reader has come round.
 const VERDICTS: usize = 2 * BOXES;
 /// Commands that may be on their way at one time.

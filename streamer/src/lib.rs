@@ -37,6 +37,7 @@ pub mod referencing;
 pub mod report;
 pub mod rt;
 pub mod stop_socket;
+pub mod successor;
 pub mod supervise;
 pub mod threads;
 pub mod tick;

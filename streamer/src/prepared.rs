@@ -34,6 +34,14 @@ impl PreparedTrajectory {
     pub fn ahead(&self) -> PeaksAhead<'_> {
         PeaksAhead::new(&self.cells, self.checked.trajectory.duration_s())
     }
+
+    /// The same up to `from_s`, and what its successor does from there on.
+    ///
+    /// Real time: no allocation.
+    #[must_use]
+    pub fn ahead_into<'a>(&'a self, from_s: f64, successor: &'a Self) -> PeaksAhead<'a> {
+        self.ahead().then(from_s, &successor.cells, successor.trajectory.duration_s())
+    }
 }
 
 impl Deref for PreparedTrajectory {

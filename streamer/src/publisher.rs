@@ -244,6 +244,11 @@ impl Publisher {
                     self.newest_generation = generation;
                     Outcome::Accepted { from_s: 0.0, tick }
                 }
+                Decision::Waits { from_s } => {
+                    self.newest_generation = generation;
+                    Outcome::Accepted { from_s, tick: 0 }
+                }
+                Decision::Cut(refusal) => Outcome::Rejected(refusal.rejection()),
                 Decision::Stale { newest } => {
                     Outcome::Rejected(Rejection::StaleGeneration { got: generation, newest })
                 }
@@ -259,6 +264,10 @@ impl Publisher {
 
     fn receipt(&mut self, to: Option<&Ports>, id: u64, generation: u64, outcome: &Outcome) {
         match outcome {
+            Outcome::Accepted { tick: 0, from_s } => {
+                self.accepted += 1;
+                info!(id, generation, from_s, "trajectory accepted; it waits for its cut");
+            }
             Outcome::Accepted { tick, .. } => {
                 self.accepted += 1;
                 info!(id, generation, tick, "trajectory accepted");

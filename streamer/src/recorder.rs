@@ -5,7 +5,7 @@
 //! is counted, and the count is a line of the log.
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
 use crate::cycle_state::Transition;
-use crate::report::{CycleRecord, Record};
+use crate::report::{CutRecord, CycleRecord, Record};
 use rtrb::Consumer;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -111,8 +111,8 @@ impl Log {
                 self.candidates.push(candidate);
             }
             match record {
-                Record::Accepted { tick, trajectory_id, start_offset_rad } => {
-                    self.accepted(tick, trajectory_id, &start_offset_rad)?;
+                Record::Accepted { tick, trajectory_id, start_offset_rad, cut } => {
+                    self.accepted((tick, trajectory_id), &start_offset_rad, cut)?;
                 }
                 Record::Transition(transition) => self.line(&phase_line(&transition))?,
                 Record::CycleSettings(cycle) => self.line(&self.cycle_line(&cycle))?,
@@ -122,19 +122,22 @@ impl Log {
         Ok(())
     }
 
-    fn accepted(&mut self, tick: u64, trajectory_id: u64, offset_rad: &JointArray) -> io::Result<()> {
+    fn accepted(
+        &mut self,
+        (tick, trajectory_id): (u64, u64),
+        offset_rad: &JointArray,
+        cut: Option<CutRecord>,
+    ) -> io::Result<()> {
         let found = self.candidates.iter().position(|c| c.trajectory_id == trajectory_id);
-        let Some(candidate) = found.map(|at| self.candidates.swap_remove(at)) else {
-            return self.line(&json!({
-                "event": "trajectory", "tick": tick, "trajectory_id": trajectory_id, "generation": null, "file": null,
-                "start_offset_rad": offset_rad.get(..self.joints),
-            }));
-        };
-        let file: Value = serde_json::from_str(&candidate.file.to_json())?;
+        let candidate = found.map(|at| self.candidates.swap_remove(at));
+        let file: Option<Value> =
+            candidate.as_ref().map(|c| serde_json::from_str(&c.file.to_json())).transpose()?;
+        let cut = cut
+            .map(|cut| json!({ "trajectory_id": cut.trajectory_id, "at_s": cut.at_s, "from_s": cut.from_s }));
         self.line(&json!({
             "event": "trajectory", "tick": tick, "trajectory_id": trajectory_id,
-            "generation": candidate.generation, "file": file,
-            "start_offset_rad": offset_rad.get(..self.joints),
+            "generation": candidate.map(|c| c.generation), "file": file,
+            "start_offset_rad": offset_rad.get(..self.joints), "cut": cut,
         }))
     }
 
@@ -213,7 +216,8 @@ mod tests {
         let file = TrajectoryFile { robot: "ur5".into(), digest, trajectory: trajectory.clone() };
         sender.send(Candidate { trajectory_id: 7, generation: 3, file }).unwrap();
         let start_offset_rad = [0.0; MAX_JOINTS];
-        queue.push(Record::Accepted { tick: 41, trajectory_id: 7, start_offset_rad }).unwrap();
+        let cut = Some(CutRecord { trajectory_id: 6, at_s: 0.1 + 0.2, from_s: 0.25 });
+        queue.push(Record::Accepted { tick: 41, trajectory_id: 7, start_offset_rad, cut }).unwrap();
         let position_rad = trajectory.sample(0.777).position_rad;
         queue.push(Record::CycleSettings(cycle(41, position_rad))).unwrap();
         let cause = Some(Cause::new(FaultReason::FeedbackLate).at_joint(2).amount(0.021, 0.02));
@@ -233,6 +237,8 @@ mod tests {
             assert_eq!(bits(&lines[1]["file"]["base_rad"][joint]), base_rad[joint].to_bits());
         }
         assert_eq!(bits(&lines[2]["s"]), (0.1_f64 + 0.2).to_bits());
+        assert_eq!(bits(&lines[1]["cut"]["at_s"]), (0.1_f64 + 0.2).to_bits());
+        assert_eq!(lines[1]["cut"]["trajectory_id"], json!(6));
         assert_eq!((&lines[2]["sync"], &lines[2]["frames"]), (&json!([41]), &json!([287])));
         assert_eq!((&lines[3]["joint"], &lines[3]["reason"]), (&json!(2), &json!("feedback late (s)")));
         assert_eq!((&lines[1]["generation"], &lines[4]["records"]), (&json!(3), &json!(5)));

@@ -3,7 +3,7 @@
 //! Everything is a plain value pushed into a bounded queue. A full queue drops the newest value and counts it: the
 //! cycle never waits for a reader.
 use crate::cycle_state::{BUSES_MAX, BusState, Decision};
-use crate::cycle_state::{CycleState, TRANSITIONS_MAX, Transition, Trip};
+use crate::cycle_state::{CycleState, TRANSITIONS_MAX, TrajectoryResult, Transition, Trip};
 use crate::guard::GuardedCommand;
 use crate::supervise::{Actions, Supervisor, is_energised};
 use crate::track::Track;
@@ -11,7 +11,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusFault, BusReport, LAYOUT_VERSION, Phase, Report, RobotDigest};
+use taustream_messages::{BusFault, BusReport, LAYOUT_VERSION, Phase, Replaces, Report, RobotDigest};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Reports that may wait for the service thread.
@@ -109,11 +109,22 @@ pub struct CycleRecord {
     pub lost: [u32; BUSES_MAX],
 }
 
+/// The cut of an accepted replacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutRecord {
+    /// The trajectory that is cut.
+    pub trajectory_id: u64,
+    /// Trajectory time of the cut, s.
+    pub at_s: f64,
+    /// Trajectory time from which the replacement is sampled, s.
+    pub from_s: f64,
+}
+
 /// One line of the cycle log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "a box would be allocated by the cycle")]
 pub enum Record {
-    /// A trajectory runs from this cycle on.
+    /// A trajectory was accepted: it runs from this cycle on, or waits for its cut.
     Accepted {
         /// Cycle number.
         tick: u64,
@@ -121,6 +132,8 @@ pub enum Record {
         trajectory_id: u64,
         /// The held pose less the trajectory's base, faded out at the start, rad.
         start_offset_rad: JointArray,
+        /// What it cuts; `None` for one that begins at rest.
+        cut: Option<CutRecord>,
     },
     /// The phase changed.
     Transition(Transition),
@@ -302,7 +315,8 @@ impl Reporter {
         if self.queues.records.is_some() {
             self.write_records(cycle_state, command, track, supervision);
         }
-        let changed = actions.transitions[0].is_some() || cycle_state.trajectory_result.is_some();
+        let spliced = cycle_state.trajectory_result.is_some() || cycle_state.took_over;
+        let changed = actions.transitions[0].is_some() || spliced;
         if changed || cycle_state.tick.number >= self.next_tick {
             self.next_tick = cycle_state.tick.number + self.every_ticks;
             let report = self.report(cycle_state, command, track, supervisor);
@@ -405,15 +419,8 @@ impl Reporter {
         track: &Track,
         (supervisor, actions): (&Supervisor, &Actions),
     ) {
-        if let Some(trajectory_result) = cycle_state.trajectory_result
-            && let Decision::Accepted { tick } = trajectory_result.decision
-        {
-            let start_offset_rad = *track.start_offset_rad();
-            self.record(Record::Accepted {
-                tick,
-                trajectory_id: trajectory_result.trajectory_id,
-                start_offset_rad,
-            });
+        if let Some(accepted) = accepted(cycle_state, track) {
+            self.record(accepted);
         }
         for transition in actions.transitions.iter().flatten() {
             self.record(Record::Transition(*transition));
@@ -474,7 +481,12 @@ impl Reporter {
         r.generation = track.newest_generation();
         let run = self.last_running;
         (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
-        r.end_rad = track.running().map_or(cycle_state.commanded_rad, |t| t.trajectory.end_rad());
+        (r.successor_id, r.successor_from_s) =
+            track.waiting().map_or((0, 0.0), |w| (w.trajectory.trajectory_id, w.from_s));
+        let last = track.waiting().map(|waiting| &waiting.trajectory).or(track.running());
+        (r.end_s, r.end_rad) = last.map_or((0.0, cycle_state.commanded_rad), |last| {
+            (last.trajectory.duration_s(), last.trajectory.end_rad())
+        });
         (r.sigma, r.speed_percent) = (cycle_state.scale.sigma, supervisor.speed() * 100.0);
         r.command_rad = cycle_state.commanded_rad;
         r.command_velocity_rad_s = setpoint.velocity_rad_s;
@@ -500,6 +512,30 @@ impl Reporter {
             }
         }
         r
+    }
+}
+
+/// The record of a trajectory that was accepted in this cycle.
+fn accepted(cycle_state: &CycleState, track: &Track) -> Option<Record> {
+    let TrajectoryResult { trajectory_id, decision, .. } = cycle_state.trajectory_result?;
+    let tick = cycle_state.tick.number;
+    match decision {
+        Decision::Accepted { tick } => {
+            let start_offset_rad = *track.start_offset_rad();
+            Some(Record::Accepted { tick, trajectory_id, start_offset_rad, cut: None })
+        }
+        Decision::Waits { from_s } => {
+            let waiting = track.waiting().map(|waiting| &waiting.trajectory);
+            let mut known = waiting.into_iter().chain(track.running());
+            let replaces = known.find(|known| known.trajectory_id == trajectory_id)?.replaces;
+            let Replaces::Cut { trajectory_id: cut_id, at_s } = replaces else { return None };
+            let cut = Some(CutRecord { trajectory_id: cut_id, at_s, from_s });
+            Some(Record::Accepted { tick, trajectory_id, start_offset_rad: [0.0; MAX_JOINTS], cut })
+        }
+        Decision::Cut(_)
+        | Decision::Stale { .. }
+        | Decision::NotAtBase { .. }
+        | Decision::NotReady { .. } => None,
     }
 }
 

@@ -3,13 +3,18 @@
 //! Everything is counted from the last setpoint that left. A cycle that was skipped, or whose frames were
 //! refused, therefore costs nothing but a longer step, up to the gap that the drives bridge. Beyond it the drives
 //! have stopped by themselves: trajectory time stays where the last setpoint was, and sigma starts from 0.
+//!
+//! An accepted replacement waits ([`Successor`]) until trajectory time reaches its cut. Trajectory time, sigma and approach
+//! go on through the cut: both trajectories give the same position, velocity, acceleration and jerk there.
 use crate::approach::{Approach, ApproachLimits};
 use crate::cycle_state::{CycleState, Decision, TrajectoryResult};
 use crate::intake::Boxed;
 use crate::last_sent::Ledger;
+use crate::successor::{CutRefusal, Successor, Waiting};
 use taustream_arm::Settings;
-use taustream_messages::Phase;
 use taustream_messages::trajectory::is_newer;
+use taustream_messages::{Phase, Replaces};
+use taustream_motion::peaks_ahead::PeaksAhead;
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
 use taustream_motion::time_scale::{Scale, TimeScale, scaled};
 use taustream_motion::trajectory::Cursor;
@@ -38,6 +43,8 @@ struct TrackState {
     axis: u64,
     /// Periods since the approach began.
     approach: u64,
+    /// The waiting trajectory made the setpoint.
+    took_over: bool,
 }
 
 /// The trajectory that runs, or the pose that is held.
@@ -54,6 +61,7 @@ pub struct Track {
     scale: TimeScale,
     running: Option<Boxed>,
     cursor: Cursor,
+    successor: Successor,
     approach: Approach,
     starting: bool,
     restart: bool,
@@ -79,6 +87,7 @@ impl Track {
             scale: TimeScale::settled(0.0),
             running: None,
             cursor: Cursor::default(),
+            successor: Successor::default(),
             approach: Approach::default(),
             starting: false,
             restart: true,
@@ -108,8 +117,16 @@ impl Track {
             generation: offer.generation,
             decision,
         });
-        if !matches!(decision, Decision::Accepted { .. }) {
-            return Some(offer);
+        match decision {
+            Decision::Accepted { .. } => {}
+            Decision::Waits { from_s } => {
+                self.newest_generation = offer.generation;
+                return self.successor.put(offer, from_s);
+            }
+            Decision::Stale { .. }
+            | Decision::NotAtBase { .. }
+            | Decision::NotReady { .. }
+            | Decision::Cut(_) => return Some(offer),
         }
         self.newest_generation = offer.generation;
         self.cursor = Cursor::at_start(&offer.trajectory);
@@ -125,6 +142,21 @@ impl Track {
     fn decide(&self, offer: &Boxed, phase: Phase, hold_position_rad: &JointArray, tick: u64) -> Decision {
         if !is_newer(offer.generation, self.newest_generation) {
             return Decision::Stale { newest: self.newest_generation };
+        }
+        if matches!(offer.replaces, Replaces::Cut { .. }) {
+            let moves = matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused);
+            let Some(running) = self.running.as_ref().filter(|_| moves) else {
+                return Decision::Cut(CutRefusal::NothingToCut { phase });
+            };
+            return match self.successor.check(offer, (running, self.sent.s)) {
+                Ok(from_s) => {
+                    // A change of speed that runs was chosen for what ran ahead until now.
+                    let situation = self.situation(running.ahead_into(from_s, offer));
+                    let holds = self.stop_rules.holds(&self.scale, &situation);
+                    if holds { Decision::Waits { from_s } } else { Decision::Cut(CutRefusal::SpeedChanges) }
+                }
+                Err(refusal) => Decision::Cut(refusal),
+            };
         }
         if phase != Phase::Holding {
             return Decision::NotReady { phase };
@@ -148,7 +180,7 @@ impl Track {
         self.shorten_axis();
         cycle_state.gap_s = self.seconds(periods);
         cycle_state.live = live;
-        self.next = TrackState { tick, ..self.sent };
+        self.next = TrackState { tick, took_over: false, ..self.sent };
         let mut setpoint = Setpoint { position_rad: ledger.position_rad(), ..Setpoint::default() };
         let mut restart = self.restart;
         if let Some(running) = &self.running {
@@ -168,12 +200,20 @@ impl Track {
                 let step = if self.starting { 0 } else { periods };
                 self.next.axis = self.sent.axis + step;
                 let (from_s, to_s) = (self.seconds(self.sent.axis), self.seconds(self.next.axis));
-                let end_s = running.trajectory.duration_s();
-                self.next.s = (self.sent.s + self.advance_s(from_s, to_s, step)).min(end_s);
+                let s = self.sent.s + self.advance_s(from_s, to_s, step);
+                let waiting = self.successor.waiting().filter(|_| self.successor.takes_over_at(s));
+                let active = waiting.map_or(running, |waiting| &waiting.trajectory);
+                (self.next.took_over, cycle_state.trajectory_id) = (waiting.is_some(), active.trajectory_id);
+                let end_s = active.trajectory.duration_s();
+                self.next.s = s.min(end_s).max(self.sent.s);
                 cycle_state.scale = self.scale.sample(to_s);
                 self.next.approach = self.sent.approach + step;
                 let approach_s = self.seconds(self.next.approach);
-                setpoint = scaled(&self.cursor.sample(&running.trajectory, self.next.s), cycle_state.scale);
+                let of_successor =
+                    if self.next.took_over { self.successor.sample(self.next.s) } else { None };
+                let sampled =
+                    of_successor.unwrap_or_else(|| self.cursor.sample(&running.trajectory, self.next.s));
+                setpoint = scaled(&sampled, cycle_state.scale);
                 cycle_state.off_path_rad = self.approach.add_to(&mut setpoint, approach_s);
                 cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
                 keep_stopped(ledger, &mut setpoint, &mut cycle_state.off_path_rad);
@@ -192,11 +232,25 @@ impl Track {
         self.approach.offset_rad()
     }
 
-    /// Notes what left: `position_rad` is what the guard let pass.
+    /// Notes what left: `position_rad` is what the guard let pass. Returns the box of a trajectory whose successor has
+    /// taken over: only when a setpoint of it has left, because until then a stall may keep trajectory time before the cut.
     ///
-    /// Real time: a copy.
-    pub fn commit(&mut self, position_rad: &JointArray, ledger: &Ledger, cycle_state: &mut CycleState) {
+    /// Real time: a copy; nothing is freed.
+    pub fn commit(
+        &mut self,
+        position_rad: &JointArray,
+        ledger: &Ledger,
+        cycle_state: &mut CycleState,
+    ) -> Option<Boxed> {
+        let mut replaced = None;
         if cycle_state.setpoints_sent() {
+            if let Some(Waiting { trajectory, cursor, .. }) =
+                if self.next.took_over { self.successor.take() } else { None }
+            {
+                self.cursor = cursor;
+                replaced = self.running.replace(trajectory);
+                cycle_state.took_over = true;
+            }
             self.sent = self.next;
             (self.starting, self.restart) = (false, false);
         }
@@ -217,21 +271,29 @@ impl Track {
         }
         cycle_state.commanded_rad = *ledger.commanded_rad();
         cycle_state.can_ramp = self.scale.can_change(self.seconds(self.sent.axis));
+        replaced
     }
 
     /// Changes the speed along the path from the last setpoint on.
     ///
     /// Real time: bounded work, see [`StopRules::apply`]; no allocation.
     pub fn change_speed(&mut self, request: SpeedRequest) {
-        let now_s = self.seconds(self.sent.axis);
-        let approach_s = self.seconds(self.sent.approach);
         let Some(running) = &self.running else { return };
-        let (s, ahead) = (self.sent.s, running.ahead());
+        let ahead = match self.successor.waiting() {
+            Some(Waiting { trajectory, from_s, .. }) => running.ahead_into(*from_s, trajectory),
+            None => running.ahead(),
+        };
+        let situation = self.situation(ahead);
+        self.stop_rules.apply(request, &mut self.scale, &situation);
+    }
+
+    /// The state in which the speed along the path is changed.
+    fn situation<'a>(&self, ahead: PeaksAhead<'a>) -> Situation<'a> {
+        let (now_s, approach_s) = (self.seconds(self.sent.axis), self.seconds(self.sent.approach));
         // Where joints were parted while trajectory time stands, it waits until they are together again.
         let waits_s = if self.stands(now_s) { self.approach.rest_s(approach_s) } else { 0.0 };
         let approaching = waits_s <= 0.0 && !self.approach.has_ended(approach_s);
-        let situation = Situation { now_s, s, ahead, approaching, waits_s };
-        self.stop_rules.apply(request, &mut self.scale, &situation);
+        Situation { now_s, s: self.sent.s, ahead, approaching, waits_s }
     }
 
     /// Trajectory time does not pass.
@@ -250,6 +312,13 @@ impl Track {
         self.running.take()
     }
 
+    /// Clears the trajectory that waits. Returns the box.
+    ///
+    /// Real time: nothing is freed.
+    pub fn drop_successor(&mut self) -> Option<Boxed> {
+        self.successor.take().map(|waiting| waiting.trajectory)
+    }
+
     /// The commanded pose was set from outside: earlier commands do not count.
     ///
     /// Real time: stores a flag.
@@ -261,6 +330,12 @@ impl Track {
     #[must_use]
     pub fn running(&self) -> Option<&Boxed> {
         self.running.as_ref()
+    }
+
+    /// The trajectory that waits.
+    #[must_use]
+    pub fn waiting(&self) -> Option<&Waiting> {
+        self.successor.waiting()
     }
 
     /// The newest generation accepted.
