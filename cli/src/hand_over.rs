@@ -192,6 +192,7 @@ fn is_name(given: &Path) -> bool {
 fn is_for_services(action: &Action) -> bool {
     match action {
         Action::Replan(_)
+        | Action::Cancel(_)
         | Action::Recover(_)
         | Action::Run(_)
         | Action::Enable(_)

@@ -1,5 +1,6 @@
 //! Reports and receipts as text, with the names of the joints.
 use crate::arm::ArmName;
+use crate::live::replan::from_words;
 use taustream_messages::{Outcome, Pause, PauseReason, Rejection, Report};
 
 /// What went wrong, where, by how much: "tracking error (rad) at joint elbow: 0.12 against 0.05".
@@ -41,7 +42,7 @@ pub(crate) fn receipt_sentence(outcome: Option<&Outcome>, arm: &ArmName) -> Stri
     match outcome {
         None => "receipt: not readable; use command line and streamer of one release".to_owned(),
         Some(Outcome::Accepted { from_s, tick }) => {
-            format!("receipt: accepted, runs from trajectory time {from_s:.3} s at cycle {tick}")
+            format!("receipt: accepted, {}", from_words(*from_s, *tick))
         }
         Some(Outcome::Rejected(rejection)) => {
             format!("receipt: rejected, {rejection}{}", joint_clause(rejection, arm))
@@ -50,7 +51,10 @@ pub(crate) fn receipt_sentence(outcome: Option<&Outcome>, arm: &ArmName) -> Stri
 }
 
 fn joint_clause(rejection: &Rejection, arm: &ArmName) -> String {
-    let (Rejection::Limit { joint, .. } | Rejection::NotAtBase { joint, .. }) = rejection else {
+    let (Rejection::Limit { joint, .. }
+    | Rejection::NotAtBase { joint, .. }
+    | Rejection::KeptBaseDiffers { joint, .. }) = rejection
+    else {
         return String::new();
     };
     usize::try_from(*joint).map_or_else(|_| String::new(), |j| format!(" ({})", arm.joint(j)))

@@ -13,6 +13,7 @@ pub mod dynamics;
 pub mod enter;
 pub mod foraging;
 pub mod import;
+pub mod in_motion;
 pub mod kind;
 pub mod margin_exit;
 pub mod objective;

@@ -1,25 +1,32 @@
 //! Hands a trajectory to the streamer and waits for its receipt.
 //!
 //! The generation comes from the streamer's newest report, never from memory: a planner that was killed and started
-//! again continues where the streamer is. Reports are waited for, not taken from the queue, so that one which a dead
-//! streamer left behind is never believed.
+//! again continues where the streamer is. A report counts only while it is new by the clock of the host, so that one which a
+//! dead streamer left behind is never believed.
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 use std::thread;
 use std::time::{Duration, Instant};
 use taustream_arm::Robot;
+use taustream_messages::clock::now_ns;
 use taustream_messages::service::{
     ReceiptSubscriber, ReportSubscriber, ServiceError, TrajectoryPublisher, Wire,
 };
-use taustream_messages::{CheckedTrajectory, Phase, Receipt, Replaces, Report, TrajectoryMessage};
+use taustream_messages::{CheckedTrajectory, Outcome, Phase, Receipt, Replaces, Report, TrajectoryMessage};
 use taustream_motion::Trajectory;
 
 /// How often a wait looks for what it waits for.
 const POLL: Duration = Duration::from_millis(2);
 /// A streamer that sends no report for this long is not running.
 pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
+/// A report that is not older is the streamer's state of now, ns: a reporting period and a half at the default rate.
+const CURRENT_NS: u64 = 15_000_000;
 /// Of a wait for a receipt, how much is left to the receipt's own way.
 const RECEIPT_TAKES: Duration = Duration::from_millis(300);
+/// Trajectories that are remembered: one runs, one waits, others were replaced or are unanswered.
+const SENT_MAX: usize = 8;
 /// Ids stay below 2^53, so that JSON readers with f64 numbers keep them exact.
 const ID_BITS: u32 = 53;
 
@@ -78,6 +85,10 @@ pub struct Outbox<'a> {
     trajectories: TrajectoryPublisher,
     receipts: ReceiptSubscriber,
     reports: ReportSubscriber,
+    /// The newest report that made sense.
+    newest: Cell<Option<(Report, Phase)>>,
+    /// What was sent, newest last: what runs may be cut only by whoever knows its strokes.
+    sent: RefCell<VecDeque<(u64, Trajectory)>>,
 }
 
 impl<'a> Outbox<'a> {
@@ -88,7 +99,8 @@ impl<'a> Outbox<'a> {
     pub fn open(wire: &'a Wire) -> Result<Self, SendError> {
         // The receipt's port first: it must be there before anything that is answered.
         let (receipts, reports) = (wire.receipt_subscriber()?, wire.report_subscriber()?);
-        Ok(Self { wire, trajectories: wire.trajectory_publisher()?, receipts, reports })
+        let (newest, sent) = (Cell::new(None), RefCell::default());
+        Ok(Self { wire, trajectories: wire.trajectory_publisher()?, receipts, reports, newest, sent })
     }
 
     /// The newest report that has arrived since the last call, if there is one that makes sense.
@@ -104,7 +116,25 @@ impl<'a> Outbox<'a> {
                 newest = Some((*report, phase));
             }
         }
+        if newest.is_some() {
+            self.newest.set(newest);
+        }
         Ok(newest)
+    }
+
+    /// The newest report, if the streamer has written it just now by the clock that both share; else the next one to come,
+    /// within `timeout`. So a report that a dead streamer left behind is not believed, and nobody waits for a living one.
+    ///
+    /// # Errors
+    /// `NotRunning` when none comes.
+    pub fn current_report(&self, timeout: Duration) -> Result<(Report, Phase), SendError> {
+        self.newest_report()?;
+        match self.newest.get() {
+            Some((report, phase)) if now_ns().saturating_sub(report.time_ns) <= CURRENT_NS => {
+                Ok((report, phase))
+            }
+            Some(_) | None => self.fresh_report(timeout),
+        }
     }
 
     /// A report that was published after this call, within `timeout`.
@@ -136,8 +166,22 @@ impl<'a> Outbox<'a> {
         replaces: Replaces,
         timeout: Duration,
     ) -> Result<SentTrajectory, SendError> {
-        let (report, _) = self.fresh_report(REPORT_WITHIN)?;
-        check_robot(robot, &report)?;
+        let (report, _) = self.current_report(REPORT_WITHIN)?;
+        self.send_after(robot, &report, (trajectory, replaces), timeout)
+    }
+
+    /// The same, under the generation after that of a report that was just received.
+    ///
+    /// # Errors
+    /// When no streamer runs, it drives another robot, or shared memory refuses.
+    pub fn send_after(
+        &self,
+        robot: &Robot,
+        report: &Report,
+        (trajectory, replaces): (&Trajectory, Replaces),
+        timeout: Duration,
+    ) -> Result<SentTrajectory, SendError> {
+        check_robot(robot, report)?;
         let (trajectory_id, generation) = (random_id(), report.generation.wrapping_add(1));
         let message = TrajectoryMessage::new(&CheckedTrajectory {
             trajectory_id,
@@ -153,7 +197,22 @@ impl<'a> Outbox<'a> {
             return Err(self.wire.not_running("taustream-streamer").into());
         }
         let receipt = self.receipt(trajectory_id, timeout)?;
+        // Without a receipt it may have been accepted all the same.
+        if !matches!(receipt.and_then(|receipt| receipt.outcome()), Some(Outcome::Rejected(_))) {
+            let mut sent = self.sent.borrow_mut();
+            if sent.len() == SENT_MAX {
+                sent.pop_front();
+            }
+            sent.push_back((trajectory_id, trajectory.clone()));
+        }
         Ok(SentTrajectory { trajectory_id, generation, receipt })
+    }
+
+    /// The strokes of a trajectory that was sent from here.
+    #[must_use]
+    pub fn known(&self, trajectory_id: u64) -> Option<Trajectory> {
+        let sent = self.sent.borrow();
+        sent.iter().find(|(id, _)| *id == trajectory_id).map(|(_, trajectory)| trajectory.clone())
     }
 
     fn receipt(&self, trajectory_id: u64, timeout: Duration) -> Result<Option<Receipt>, SendError> {

@@ -1,16 +1,19 @@
 //! The replan service: one request after the other, from the streamer's true state.
 //!
-//! A request is answered from a report that was published after it arrived. At rest the motion starts at the
-//! commanded pose; while a motion runs, `AfterCurrent` plans from its end and waits until it has ended, and `AtOnce`
-//! asks the streamer to cut, whose answer (this version of it: refused) is handed back. A motion whose requester has
-//! gone in the meantime is not sent: no client waits for the arm to move.
+//! A request is answered from a report of just now. At rest the motion starts at the
+//! commanded pose; while a motion runs, it is replaced (`moving`). The streamer takes a replacement in advance and keeps it
+//! until its cut, so that nothing of it hangs on this process. A motion whose requester has gone in the meantime is not sent:
+//! no client waits for the arm to move.
+mod moving;
+
 use crate::kind::PlannerKind;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
 use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
-use crate::timing::stand_still;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
+use moving::Latency;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 use taustream_arm::daemon::{Manager, Promise};
@@ -18,12 +21,14 @@ use taustream_arm::{Robot, Scene};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::{PlanServer, ServiceError, Wire};
-use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
-use taustream_motion::{JointArray, Trajectory};
+use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces};
+use taustream_motion::JointArray;
 use tracing::{info, warn};
 
-/// How often the service looks for requests: what a user may feel of it is well below the planning time.
-const POLL: Duration = Duration::from_millis(5);
+/// How often the service looks for requests: what a user may feel of it is below the planning time.
+const POLL: Duration = Duration::from_millis(2);
+/// How often it looks at requests and requesters while it plans.
+const ATTEND_EVERY: Duration = Duration::from_millis(5);
 /// How often it looks for the files behind its services.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Deadline of a request that states none.
@@ -89,15 +94,9 @@ pub struct Service<'a> {
     server: PlanServer,
     stop: &'a AtomicBool,
     seen: Seen,
-    waiting: Option<Waiting>,
+    latency: Latency,
     promise: Promise,
     footprint: Footprint,
-}
-
-/// A proven motion that waits for the end of the one that runs.
-struct Waiting {
-    request: Request,
-    plan: Plan,
 }
 
 /// What is known of the streamer between requests.
@@ -129,7 +128,7 @@ impl<'a> Service<'a> {
             server,
             stop,
             seen: Seen::default(),
-            waiting: None,
+            latency: Latency::default(),
             promise,
             footprint: wire.footprint(),
         })
@@ -154,77 +153,55 @@ impl<'a> Service<'a> {
                 }
             }
         }
-        if let Some(waiting) = self.waiting.take() {
-            reply(&waiting.request, &failed("the planner was terminated before the running motion ended"));
-        }
         Ending::Stopped
     }
 
-    /// Looks at the streamer, at the motion that waits, and at one request.
+    /// Looks at the streamer, and at one request.
     fn turn(&mut self) {
         match self.outbox.newest_report() {
-            Ok(newest) => {
-                self.seen.note(newest.is_some());
-                self.go_on(newest);
-            }
+            Ok(newest) => self.seen.note(newest.is_some()),
             Err(e) => warn!("{e}"),
         }
         match self.server.receive() {
-            Ok(Some(request)) => self.take(request),
+            Ok(Some(request)) => self.take(&request),
             Ok(None) => {}
             Err(e) => warn!("cannot take a request: {e:?}"),
         }
     }
 
-    fn take(&mut self, request: Request) {
+    fn take(&mut self, request: &Request) {
         // Copied out before it is checked.
         let copy = *request.payload();
-        let answer = match CheckedPlanRequest::try_from(&copy) {
-            Ok(checked) => self.answer(&request, &checked),
-            Err(e) => Answer::Now(failed(&e.to_string())),
+        let outcome = match CheckedPlanRequest::try_from(&copy) {
+            Ok(checked) => self.answer(request, &checked).unwrap_or_else(|reason| failed(&reason)),
+            Err(e) => failed(&e.to_string()),
         };
-        match answer {
-            Answer::Now(outcome) => reply(&request, &outcome),
-            Answer::Later(plan) => self.waiting = Some(Waiting { request, plan: *plan }),
-        }
+        reply(request, &outcome);
     }
 
-    fn answer(&self, request: &Request, requested: &CheckedPlanRequest) -> Answer {
-        match self.try_answer(request, requested) {
-            Ok(answer) => answer,
-            Err(reason) => Answer::Now(failed(&reason)),
-        }
-    }
-
-    fn try_answer(&self, request: &Request, requested: &CheckedPlanRequest) -> Result<Answer, String> {
+    fn answer(&mut self, request: &Request, requested: &CheckedPlanRequest) -> Result<PlanOutcome, String> {
         let expected = self.robot.joints.len();
         if requested.joints != expected {
             let (got, robot) = (requested.joints, &self.robot.name);
             return Err(format!("the goal has {got} joint values, {robot} has {expected} joints"));
         }
         let options = options(requested)?;
-        if self.waiting.is_some() {
-            return Err("another motion waits for the end of the running one; try again after it".to_owned());
-        }
-        let (report, phase) = self.outbox.fresh_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
+        let (report, phase) = self.outbox.current_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
         match (phase, requested.when) {
-            (Phase::Holding, _) if report.energised == 1 => {
+            (Phase::Holding, When::Cancel) => Err("nothing runs that could be cancelled".to_owned()),
+            (Phase::Holding, When::AtOnce | When::AfterCurrent | When::Queue) if report.energised == 1 => {
                 let plan = self.plan(request, report.command_rad, (requested, &options))?;
-                Ok(Answer::Now(self.send(request, &plan)))
+                Ok(self.send(request, &plan))
             }
-            (Phase::Moving, When::AfterCurrent) => {
-                let plan = self.plan(request, report.end_rad, (requested, &options))?;
-                info!("planned; waiting for the running motion to end");
-                Ok(Answer::Later(Box::new(plan)))
+            (phase, _) if moving::runs(phase) => {
+                self.replan_in_motion(request, (requested, &options), report)
             }
-            (Phase::Moving, When::AtOnce) => self.ask_for_cut(&report).map(Answer::Now),
             _ => Err(not_ready(phase)),
         }
     }
 
-    /// Plans on a thread of its own: whatever goes wrong there, the service continues. Planning ends when its requester goes;
-    /// others are answered meanwhile.
+    /// Plans from a pose at rest.
     fn plan(
         &self,
         request: &Request,
@@ -234,26 +211,45 @@ impl<'a> Service<'a> {
         // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
-        self.promise.back_within(options.deadline + OVERRUN_MAX);
+        let planned =
+            self.work(request, options.deadline, |cancel| plan_until(&task, options, Some(cancel)))?;
+        planned.map_err(|e: PlanError| e.to_string())
+    }
+
+    /// Works on a thread of its own: whatever goes wrong there, the service continues. The work ends when its requester goes;
+    /// others are answered meanwhile.
+    fn work<T: Send>(
+        &self,
+        request: &Request,
+        deadline: Duration,
+        work: impl FnOnce(&AtomicBool) -> T + Send,
+    ) -> Result<T, String> {
+        self.promise.back_within(deadline + OVERRUN_MAX);
         let cancel = AtomicBool::new(false);
         let result = thread::scope(|scope| {
             let worker = thread::Builder::new().name("plan".to_owned());
-            let handle = worker.spawn_scoped(scope, || plan_until(&task, options, Some(&cancel)))?;
-            self.attend(request, options.deadline, &|| !handle.is_finished(), &cancel);
+            // Dropped at the end, however the work ends: that wakes whoever attends.
+            let (working, ended) = channel::<()>();
+            let cancelled = &cancel;
+            let handle = worker.spawn_scoped(scope, move || {
+                let _working = working;
+                work(cancelled)
+            })?;
+            self.attend(request, deadline, &ended, &cancel);
             std::io::Result::Ok(handle.join())
         });
         match result {
-            Ok(Ok(planned)) => planned.map_err(|e: PlanError| e.to_string()),
+            Ok(Ok(worked)) => Ok(worked),
             Ok(Err(_)) => Err("the planner has a fault and gave up on this goal; see its log".to_owned()),
             Err(e) => Err(format!("the planner cannot start a thread: {e}")),
         }
     }
 
     /// Waits while a motion is planned: answers other requests, and cancels it when nobody waits for it any more.
-    fn attend(&self, request: &Request, deadline: Duration, goes_on: &dyn Fn() -> bool, cancel: &AtomicBool) {
+    fn attend(&self, request: &Request, deadline: Duration, ended: &Receiver<()>, cancel: &AtomicBool) {
         let since = Instant::now();
         let requester = Requester::of(request);
-        while goes_on() {
+        while ended.recv_timeout(ATTEND_EVERY) == Err(RecvTimeoutError::Timeout) {
             if !cancel.load(Ordering::Relaxed) && !requester.waits(request) {
                 info!(
                     "whoever asked for the motion is gone after {:.1} s; planning ends",
@@ -274,7 +270,6 @@ impl<'a> Service<'a> {
                     )),
                 );
             }
-            thread::sleep(POLL);
         }
     }
 
@@ -295,42 +290,6 @@ impl<'a> Service<'a> {
             Err(e) => failed(&e.to_string()),
         }
     }
-
-    /// Asks the streamer to cut the running motion. The message cannot repeat the begun strokes, which only the
-    /// streamer knows, and moves nothing; so no streamer can take it for a motion, and this one's answer is final.
-    fn ask_for_cut(&self, report: &Report) -> Result<PlanOutcome, String> {
-        let still: Trajectory = stand_still(self.robot.joints.len(), &report.end_rad)
-            .ok_or("the streamer reports an invalid end pose")?;
-        let replaces = Replaces::Cut { trajectory_id: report.trajectory_id, at_s: report.trajectory_s };
-        let sent =
-            self.outbox.send(self.robot, &still, replaces, RECEIPT_WITHIN).map_err(|e| e.to_string())?;
-        Ok(PlanOutcome::Planned {
-            trajectory_id: sent.trajectory_id,
-            planning_s: 0.0,
-            duration_s: 0.0,
-            clearance_m: 0.0,
-            strokes: 0,
-            how: "not planned: the streamer was asked to cut the running motion".to_owned(),
-            receipt: sent.receipt.map(Box::new),
-        })
-    }
-
-    /// Sends the motion that waits when the arm has come to rest, or gives it up.
-    fn go_on(&mut self, newest: Option<(Report, Phase)>) {
-        let Some(waiting) = self.waiting.take() else { return };
-        let outcome = match newest {
-            _ if !waiting.request.is_connected() => {
-                info!("the client of the waiting motion has disconnected; motion dropped");
-                return;
-            }
-            Some((_, Phase::Holding)) => self.send(&waiting.request, &waiting.plan),
-            Some((_, Phase::Moving)) => return self.waiting = Some(waiting),
-            None if self.seen.is_recent() => return self.waiting = Some(waiting),
-            Some((_, phase)) => failed(&format!("the running motion did not end: {}", not_ready(phase))),
-            None => failed("the streamer stopped reporting while a motion waited; start it again"),
-        };
-        reply(&waiting.request, &outcome);
-    }
 }
 
 /// Why a planner does not serve any more.
@@ -340,11 +299,6 @@ pub enum Ending {
     Stopped,
     /// The files behind its services are gone: nobody finds it.
     NamesGone,
-}
-
-enum Answer {
-    Now(PlanOutcome),
-    Later(Box<Plan>),
 }
 
 /// The process that waits for an answer.
@@ -408,11 +362,12 @@ fn not_ready(phase: Phase) -> String {
     let hint = match phase {
         Phase::Disabled | Phase::Locked => "run `taustream enable`",
         Phase::Fault => "run `taustream clear-fault`, then `taustream enable`",
-        Phase::Paused | Phase::Pausing => "run `taustream resume` or `taustream stop`",
         Phase::Holding => "its drives are not energised; run `taustream enable`",
         Phase::Configuring
         | Phase::Enabling
         | Phase::Moving
+        | Phase::Pausing
+        | Phase::Paused
         | Phase::Stopping
         | Phase::FastStopping
         | Phase::Braking

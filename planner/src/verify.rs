@@ -8,7 +8,7 @@ use crate::world::World;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::Trajectory;
 use taustream_motion::digits::{Amount, Decimals};
-use taustream_motion::limits::{LimitViolation, Peaks, check_motion};
+use taustream_motion::limits::{LimitViolation, Peaks, check_motion_from};
 
 /// What was proven about a trajectory.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,7 +155,8 @@ pub struct Stretch<'a> {
     pub span_s: [f64; 2],
 }
 
-/// Like [`verify_in`], for a motion whose stretches, which must follow each other, keep different distances.
+/// Like [`verify_in`], for a motion whose stretches, which must follow each other, keep different distances. Limits, too, are
+/// proven from the begin of the first stretch on: a replacement runs from its cut.
 ///
 /// # Errors
 /// The first violation; `Unresolved` when the clock cut in, or when there is no stretch.
@@ -171,13 +172,14 @@ pub fn verify_stretches(
         return Err(Violation::Joints { got, expected });
     }
     // Limits first: beyond them angles may be so large that geometry means nothing.
-    let peaks = check_motion(trajectory, &robot.limits()).map_err(|violation| {
+    let [begin_s, _] = first.span_s;
+    let peaks = check_motion_from(trajectory, &robot.limits(), begin_s).map_err(|violation| {
         let name = robot.joints.get(violation.joint).map(|j| j.name.clone()).unwrap_or_default();
         Violation::Limit { name, violation }
     })?;
     // Once a motion, with bodies inside of meshes: nothing gets in later without crossing a surface.
-    if let Some(contact) = first.world.contact(trajectory.base_rad()) {
-        return Err(Violation::Collision { from_s: 0.0, at_s: 0.0, contact });
+    if let Some(contact) = first.world.contact(&trajectory.sample(begin_s).position_rad) {
+        return Err(Violation::Collision { from_s: begin_s, at_s: begin_s, contact });
     }
     let mut proof = Proof {
         duration_s: trajectory.duration_s(),

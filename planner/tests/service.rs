@@ -19,6 +19,9 @@ const HOME: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 const AWAY: [f64; 6] = [0.4, -1.4, 1.4, -1.57, -1.57, 0.0];
 const THERE: [f64; 6] = [-0.4, -1.5, 1.5, -1.57, -1.57, 0.0];
 
+/// When the played motion ends.
+const ENDS_S: f64 = 2.5;
+
 fn join(arm: &str, node: &str) -> Wire {
     Wire::join(arm, node, &runtime::directory().expect("a directory")).expect("joins")
 }
@@ -29,6 +32,8 @@ struct Played {
     generation: AtomicU64,
     accepted: AtomicU64,
     cuts: AtomicU64,
+    /// So many cuts come too late.
+    late: AtomicU64,
     mute: AtomicBool,
     end: AtomicBool,
 }
@@ -40,6 +45,7 @@ impl Played {
             generation: AtomicU64::new(41),
             accepted: AtomicU64::new(0),
             cuts: AtomicU64::new(0),
+            late: AtomicU64::new(0),
             mute: AtomicBool::new(false),
             end: AtomicBool::new(false),
         }
@@ -61,6 +67,8 @@ impl Played {
             generation: self.generation.load(Ordering::SeqCst),
             trajectory_id: 7,
             trajectory_s: 0.5,
+            trajectory_duration_s: ENDS_S,
+            end_s: ENDS_S,
             command_rad: if moving { pose(HOME) } else { pose(AWAY) },
             end_rad: pose(AWAY),
             ..Report::default()
@@ -93,8 +101,22 @@ impl Played {
 
     fn evaluate(&self, checked: &CheckedTrajectory) -> Outcome {
         if let Replaces::Cut { at_s, .. } = checked.replaces {
-            self.cuts.fetch_add(1, Ordering::SeqCst);
-            return Outcome::Rejected(Rejection::CutUnsupported { at_s });
+            let number = self.cuts.fetch_add(1, Ordering::SeqCst);
+            let strokes = checked.trajectory.strokes();
+            assert!(
+                strokes.iter().all(|stroke| stroke.start_s >= at_s),
+                "nothing is known that could be kept"
+            );
+            assert_eq!(
+                (at_s, checked.trajectory.base_rad()),
+                (ENDS_S, &pose(AWAY)),
+                "from the end of what runs"
+            );
+            if number < self.late.load(Ordering::SeqCst) {
+                return Outcome::Rejected(Rejection::CutPassed { at_s, by_s: 0.01 });
+            }
+            self.generation.fetch_add(1, Ordering::SeqCst);
+            return Outcome::Accepted { from_s: at_s, tick: 0 };
         }
         assert_eq!(checked.generation, self.generation.load(Ordering::SeqCst) + 1, "the next generation");
         let base_bits = checked.trajectory.base_rad().map(f64::to_bits);
@@ -255,7 +277,8 @@ fn service_bad_requests_are_refused_in_words_and_nothing_is_sent() {
             let outcome = ask(arm, requested, || ());
             assert!(reason_of(&outcome).contains(word), "{word}: {outcome:?}");
         }
-        for phase in Phase::ALL.into_iter().filter(|p| !matches!(p, Phase::Holding | Phase::Moving)) {
+        let runs = |phase: &Phase| matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused);
+        for phase in Phase::ALL.into_iter().filter(|phase| *phase != Phase::Holding && !runs(phase)) {
             played.show(phase);
             let outcome = ask(arm, &good, || ());
             assert!(reason_of(&outcome).contains(phase.word()), "{outcome:?}");
@@ -267,51 +290,86 @@ fn service_bad_requests_are_refused_in_words_and_nothing_is_sent() {
     assert_eq!(played.accepted.load(Ordering::SeqCst), 0);
 }
 
+/// Goal: a motion whose strokes this planner has not sent is gone on from at its end, in every phase in which it runs; a cut
+/// that comes too late is tried again.
 #[test]
-fn service_while_moving_cuts_are_the_streamers_to_refuse_and_after_current_waits() {
-    let played = Played::new(Phase::Moving);
-    with_service("moving", &played, |arm, _| {
-        let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
-        assert_eq!(receipt_of(&outcome), Outcome::Rejected(Rejection::CutUnsupported { at_s: 0.5 }));
-        assert_eq!(played.cuts.load(Ordering::SeqCst), 1);
+fn service_while_moving_goes_on_from_the_end_of_a_motion_that_it_does_not_know() {
+    for (phase, when) in [
+        (Phase::Moving, When::AtOnce),
+        (Phase::Moving, When::AfterCurrent),
+        (Phase::Pausing, When::AtOnce),
+        (Phase::Paused, When::Queue),
+    ] {
+        let played = Played::new(phase);
+        with_service("moving", &played, |arm, _| {
+            played.late.store(2, Ordering::SeqCst);
+            let outcome = ask(arm, &request(when, "", pose(THERE)), || ());
+            assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: ENDS_S, tick: 0 });
+            assert_eq!(played.cuts.load(Ordering::SeqCst), 3, "{phase:?} {when:?}");
+            let PlanOutcome::Planned { duration_s, how, .. } = outcome else { panic!() };
+            assert!(duration_s > 0.1 && how.starts_with("after 2.500 s: "), "{duration_s} {how}");
 
+            // No cut can be kept: the last reason is handed back, and nothing has changed.
+            played.late.store(100, Ordering::SeqCst);
+            let outcome = ask(arm, &request(when, "", pose(THERE)), || ());
+            assert!(reason_of(&outcome).contains("already passed by 0.0100 s"), "{outcome:?}");
+        });
+        assert_eq!(played.accepted.load(Ordering::SeqCst), 0);
+    }
+}
+
+/// The running motion ends while the new one is planned: it begins at rest then.
+#[test]
+fn service_motion_that_has_ended_meanwhile_is_gone_on_from_at_rest() {
+    let played = Played::new(Phase::Moving);
+    with_service("ended", &played, |arm, _| {
+        played.late.store(1, Ordering::SeqCst);
         let outcome = ask(arm, &request(When::AfterCurrent, "", pose(THERE)), || {
-            thread::sleep(Duration::from_millis(700));
-            assert_eq!(played.accepted.load(Ordering::SeqCst), 0, "sent before the arm was at rest");
-            // Meanwhile no other request gets in between.
-            let other = ask(arm, &request(When::AfterCurrent, "", pose(HOME)), || ());
-            assert!(reason_of(&other).contains("waits"), "{other:?}");
+            let since = Instant::now();
+            while played.cuts.load(Ordering::SeqCst) == 0 {
+                assert!(since.elapsed() < Duration::from_secs(20), "no cut was tried");
+                thread::sleep(Duration::from_millis(1));
+            }
             played.show(Phase::Holding);
         });
-        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
-
-        // The running motion ends in a fault: the one that waits is given up.
-        played.show(Phase::Moving);
-        let outcome = ask(arm, &request(When::AfterCurrent, "", pose(THERE)), || {
-            thread::sleep(Duration::from_millis(700));
-            played.show(Phase::Fault);
-        });
-        assert!(reason_of(&outcome).contains("fault"), "{outcome:?}");
+        let outcome = receipt_of(&outcome);
+        assert!(matches!(outcome, Outcome::Accepted { .. }), "{outcome:?}");
     });
-    assert_eq!(played.accepted.load(Ordering::SeqCst), 1);
 }
 
 #[test]
+fn service_cancel_needs_something_that_runs() {
+    let played = Played::new(Phase::Holding);
+    with_service("cancel", &played, |arm, _| {
+        let outcome = ask(arm, &request(When::Cancel, "", pose(HOME)), || ());
+        assert!(reason_of(&outcome).contains("nothing runs"), "{outcome:?}");
+        played.show(Phase::Moving);
+        let outcome = ask(arm, &request(When::Cancel, "", pose(HOME)), || ());
+        assert!(reason_of(&outcome).contains("another process has sent"), "{outcome:?}");
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst) + played.cuts.load(Ordering::SeqCst), 0);
+}
+
+/// Goal: no client waits for a motion without a client. Method: planning that lasts, and a request that is dropped meanwhile.
+#[test]
 fn service_motion_whose_requester_has_gone_is_not_sent() {
     let played = Played::new(Phase::Moving);
-    with_service("gone", &played, |arm, _| {
+    with_service_in(&ringed(), "gone", &played, |arm, _| {
         let wire = join(arm, "client");
         let client = wire.plan_client().expect("port");
-        let requested = PlanRequest::from(&request(When::AfterCurrent, "", pose(THERE)));
-        let pending = client.send_copy(requested).expect("sent");
-        thread::sleep(Duration::from_millis(700));
+        let hard =
+            CheckedPlanRequest { deadline_ms: 3_000, ..request(When::AfterCurrent, "rrt", pose(RINGED)) };
+        let pending = client.send_copy(PlanRequest::from(&hard)).expect("sent");
+        thread::sleep(Duration::from_millis(300));
         drop(pending);
-        thread::sleep(Duration::from_millis(200));
-        played.show(Phase::Holding);
+        let since = Instant::now();
         // The next request is served, so the service has looked at the one that is gone.
-        receipt_of(&ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()));
+        while let PlanOutcome::Failed { reason } = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ()) {
+            assert!(reason.contains("another request"), "{reason}");
+            assert!(since.elapsed() < Duration::from_secs(40), "the planner plans on for nobody");
+        }
     });
-    assert_eq!(played.accepted.load(Ordering::SeqCst), 1);
+    assert_eq!(played.cuts.load(Ordering::SeqCst), 1);
 }
 
 #[test]

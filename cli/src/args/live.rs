@@ -4,6 +4,7 @@ use crate::angles::Angles;
 use clap::Args;
 use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;
+use taustream_messages::plan::When;
 use taustream_planner::PlannerKind;
 
 /// A command to the streamer without arguments of its own.
@@ -74,9 +75,12 @@ const REPLAN_HELP: &str = "\
 Examples:
   taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
+  taustream replan --goal \"..\" && taustream replan --goal \"..\" --queue && taustream replan --goal \"..\" --queue
 
-The planner starts from the commanded pose, verifies the whole motion and sends it. The receipt of the streamer states
-whether, and from which cycle, it runs. Exit code 0 means: accepted (with --wait: executed).";
+At rest the motion starts at the commanded pose. An arm that moves, or is paused, gets a replacement of its motion: the planner
+cuts the motion a little ahead of the arm, or lets it end, leads on to the goal, verifies everything from the cut on, and sends
+it. The arm does not jump, and a pause stays a pause. What was rejected changes nothing. The receipt of the streamer states
+whether, and from when, it runs. Exit code 0 means: accepted (with --wait: executed).";
 
 /// `taustream replan`
 #[derive(Args, Debug)]
@@ -88,12 +92,15 @@ pub(crate) struct ReplanArgs {
     /// The same in degrees.
     #[arg(long, value_name = "DEG,..", allow_hyphen_values = true, value_parser = Angles::of_degrees, conflicts_with = "goal")]
     goal_deg: Option<Angles>,
-    /// Start as soon as the motion is planned (the default).
-    #[arg(long, conflicts_with = "after_current")]
-    pub(crate) at_once: bool,
-    /// Plan from the end of the running motion, and start when it has ended.
+    /// Leave the running motion as soon as the new one is planned (the default).
+    #[arg(long, conflicts_with_all = ["after_current", "queue"])]
+    at_once: bool,
+    /// Start when the running motion has ended; what was to follow it is dropped.
+    #[arg(long, conflicts_with = "queue")]
+    after_current: bool,
+    /// Start when every motion that was accepted has ended: several goals in a row.
     #[arg(long)]
-    pub(crate) after_current: bool,
+    queue: bool,
     /// Deadline of planning, ms.
     #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: u32,
@@ -109,6 +116,15 @@ pub(crate) struct ReplanArgs {
 }
 
 impl ReplanArgs {
+    /// When the motion starts.
+    pub(crate) fn when(&self) -> When {
+        match (self.after_current, self.queue) {
+            (true, _) => When::AfterCurrent,
+            (_, true) => When::Queue,
+            (false, false) => When::AtOnce,
+        }
+    }
+
     /// Where to go, and the option that says so. One of the two is there: clap asks for it.
     pub(crate) fn goal(&self) -> (&Angles, &'static str) {
         match (&self.goal, &self.goal_deg) {
@@ -117,6 +133,22 @@ impl ReplanArgs {
             (None, None) => (Angles::NONE, "--goal"),
         }
     }
+}
+
+const CANCEL_HELP: &str = "\
+Examples:
+  taustream cancel --wait
+
+The planner replaces the motion by strokes that bring the arm to rest inside its motion limits, close to its path, and verifies
+them. Motions that wait are dropped. `taustream stop` needs no planner and stays on the path.";
+
+/// `taustream cancel`
+#[derive(Args, Debug)]
+#[command(after_help = CANCEL_HELP)]
+pub(crate) struct CancelArgs {
+    /// Return only when the arm is at rest.
+    #[arg(long)]
+    pub(crate) wait: bool,
 }
 
 const RECOVER_HELP: &str = "\

@@ -7,7 +7,8 @@ mod planners;
 
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
-    CommandArgs, DemoArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs, WatchArgs,
+    CancelArgs, CommandArgs, DemoArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs,
+    WatchArgs,
 };
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
@@ -154,6 +155,8 @@ pub(crate) enum Action {
     Check(CheckArgs),
     /// Request a motion to a new goal from the running planner, and print the receipt.
     Replan(ReplanArgs),
+    /// Bring the running motion to rest, and drop the motions that wait.
+    Cancel(CancelArgs),
     /// Lead joints that are outside their position limits back inside.
     Recover(RecoverArgs),
     /// Execute a saved trajectory from its base pose, after verification.
@@ -219,7 +222,7 @@ mod tests {
         for name in WITHOUT_SETTINGS {
             assert!(!help_of(&[name]).contains("--settings"), "{name}");
         }
-        for name in ["status", "enable", "doctor", "replan", "run", "watch", "reference"] {
+        for name in ["status", "enable", "doctor", "replan", "cancel", "run", "watch", "reference"] {
             assert!(help_of(&[name]).contains("--settings"), "{name}");
         }
         // A habit of scripts that name the arm everywhere stays without effect.

@@ -73,7 +73,7 @@ pub(crate) fn follow(
                 return Ok(executed);
             }
         }
-        if !news.is_empty() && watch.seen {
+        if !news.is_empty() && (watch.seen || watch.waits) {
             silence = Limit::after_s(SILENCE_S_MAX);
         } else if silence.is_over() {
             let why = if news.is_empty() {
@@ -95,11 +95,23 @@ struct Watch {
     tracking_error_rad_max: f64,
     /// Stalls of the streamer before the motion.
     stalls_before: Option<u64>,
+    /// It waits for its cut.
+    waits: bool,
+    /// The trajectory that follows when this one has reached its end.
+    next_id: Option<u64>,
 }
 
 impl Watch {
     fn of(trajectory_id: u64) -> Self {
-        Self { trajectory_id, seen: false, first_ns: None, tracking_error_rad_max: 0.0, stalls_before: None }
+        Self {
+            trajectory_id,
+            seen: false,
+            first_ns: None,
+            tracking_error_rad_max: 0.0,
+            stalls_before: None,
+            waits: false,
+            next_id: None,
+        }
     }
 
     /// `Some` when the motion has ended at its end; an error when it has ended elsewhere.
@@ -109,13 +121,22 @@ impl Watch {
             Failure::Failed(format!("the motion was {how} at {at_s:.3} of {of_s:.3} s: {why}"))
         };
         if r.trajectory_id != self.trajectory_id {
+            if self.seen && self.next_id == Some(r.trajectory_id) {
+                return Ok(Some(self.executed(r)));
+            }
             // Until the first report after the acceptance an older motion stands there.
             self.stalls_before = Some(r.stalls);
             let why = format!("another one, {}, took over", r.trajectory_id);
-            return if self.seen { Err(stopped("dropped", &why)) } else { Ok(None) };
+            if self.seen {
+                return Err(stopped("dropped", &why));
+            }
+            let waited = std::mem::replace(&mut self.waits, r.successor_id == self.trajectory_id);
+            return if waited && !self.waits { Err(self.not_begun(r, phase)) } else { Ok(None) };
         }
         self.seen = true;
-        let stalls_before = *self.stalls_before.get_or_insert(r.stalls);
+        let follows = r.successor_id != 0 && r.successor_from_s + END_TOLERANCE_S >= r.trajectory_duration_s;
+        self.next_id = follows.then_some(r.successor_id);
+        self.stalls_before.get_or_insert(r.stalls);
         let errors = r.tracking_error_rad.iter().take(r.joints());
         self.tracking_error_rad_max = errors.fold(self.tracking_error_rad_max, |max, e| max.max(e.abs()));
         match phase {
@@ -134,12 +155,32 @@ impl Watch {
         if r.trajectory_s + END_TOLERANCE_S < r.trajectory_duration_s {
             return Err(stopped("dropped", "the arm was stopped by another command"));
         }
+        Ok(Some(self.executed(r)))
+    }
+
+    fn executed(&self, r: &Report) -> Executed {
         let executed_ns = self.first_ns.map_or(0, |first| r.time_ns.saturating_sub(first));
-        Ok(Some(Executed {
+        Executed {
             executed_s: Duration::from_nanos(executed_ns).as_secs_f64(),
             tracking_error_rad_max: self.tracking_error_rad_max,
-            stalls: r.stalls.saturating_sub(stalls_before),
-        }))
+            stalls: r.stalls.saturating_sub(self.stalls_before.unwrap_or(r.stalls)),
+        }
+    }
+
+    /// It waited for its cut, and does not any more.
+    fn not_begun(&self, r: &Report, phase: Phase) -> Failure {
+        Failure::Failed(if r.successor_id == 0 {
+            format!(
+                "trajectory {} waited for its cut and was dropped: the arm is {}",
+                self.trajectory_id,
+                phase.word()
+            )
+        } else {
+            format!(
+                "trajectory {} took the place of trajectory {}, which waited",
+                r.successor_id, self.trajectory_id
+            )
+        })
     }
 }
 
@@ -196,6 +237,37 @@ mod tests {
         let end = walk(&steps).unwrap().unwrap();
         assert_eq!(end.stalls, 2);
         assert!(end.to_string().contains("2 gaps between setpoints"), "{end}");
+    }
+
+    /// A motion that waits behind another one for its cut at `from_s`.
+    fn waits(from_s: f64, report: Report) -> Report {
+        Report { successor_id: 7, successor_from_s: from_s, ..report }
+    }
+
+    #[test]
+    fn motion_that_waits_for_its_cut_is_followed_from_there() {
+        let steps = [
+            (waits(1.0, report(3, 0.2, 90)), Phase::Moving),
+            (waits(1.0, report(3, 0.2, 95)), Phase::Paused),
+            (report(7, 1.0, 1_000), Phase::Moving),
+            (Report { trajectory_duration_s: 2.0, ..report(7, 2.0, 2_000) }, Phase::Holding),
+        ];
+        assert!((walk(&steps).unwrap().unwrap().executed_s - 1.0).abs() < 1e-12);
+        let dropped = walk(&[steps[0], (report(3, 0.3, 120), Phase::Stopping)]).unwrap_err();
+        assert!(dropped.contains("was dropped: the arm is stopping"), "{dropped}");
+        let other = Report { successor_id: 8, ..report(3, 0.3, 120) };
+        let replaced = walk(&[steps[0], (other, Phase::Moving)]).unwrap_err();
+        assert!(replaced.contains("trajectory 8 took the place of trajectory 7"), "{replaced}");
+    }
+
+    /// Goal: a motion whose end is where the next one begins has reached it; one that is cut before has not.
+    #[test]
+    fn motion_that_goes_over_into_the_next_at_its_end_is_done() {
+        let next = |from_s, report| Report { successor_id: 9, successor_from_s: from_s, ..report };
+        let over = (report(9, 1.0, 1_100), Phase::Moving);
+        assert!(walk(&[(next(1.0, report(7, 0.5, 100)), Phase::Moving), over]).unwrap().is_some());
+        let cut = walk(&[(next(0.9, report(7, 0.5, 100)), Phase::Moving), over]).unwrap_err();
+        assert!(cut.contains("another one, 9"), "{cut}");
     }
 
     #[test]

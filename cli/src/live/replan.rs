@@ -65,11 +65,20 @@ impl fmt::Display for Planned {
             counted(self.strokes, "stroke")
         )?;
         writeln!(f, "clearance     {:.4} m", self.clearance_m)?;
+        let (id, generation) = (self.trajectory_id, self.generation);
         write!(
             f,
-            "receipt       accepted: trajectory {} (generation {}) from {:.3} s on, at cycle {}",
-            self.trajectory_id, self.generation, self.from_s, self.tick
+            "receipt       accepted: trajectory {id} (generation {generation}) {}",
+            from_words(self.from_s, self.tick)
         )
+    }
+}
+
+/// From when an accepted trajectory runs: one that waits for its cut has no cycle yet.
+pub(crate) fn from_words(from_s: f64, tick: u64) -> String {
+    match tick {
+        0 => format!("from {from_s:.3} s of the running motion on"),
+        _ => format!("from {from_s:.3} s on, at cycle {tick}"),
     }
 }
 
@@ -89,12 +98,8 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     let (goal, option) = args.goal();
     let goal_rad = goal.pose_of(&settings.robot, option)?;
     let client = Client::join(&arm.name)?;
-    let wanted = Wanted {
-        when: if args.after_current { When::AfterCurrent } else { When::AtOnce },
-        deadline_ms: args.deadline_ms,
-        seed: args.seed,
-        planner: args.planner,
-    };
+    let wanted =
+        Wanted { when: args.when(), deadline_ms: args.deadline_ms, seed: args.seed, planner: args.planner };
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),
         goal_rad,
@@ -192,8 +197,8 @@ pub(crate) fn accepted(receipt: &Receipt, arm: &ArmName) -> Result<(f64, u64), F
 /// How long a motion that must end first may still take.
 fn remaining_s(report: &Report, when: When) -> f64 {
     match when {
-        When::AtOnce => 0.0,
-        When::AfterCurrent => {
+        When::AtOnce | When::Cancel => 0.0,
+        When::AfterCurrent | When::Queue => {
             let left_s = (report.trajectory_duration_s - report.trajectory_s).max(0.0);
             left_s * 100.0 / report.speed_percent.clamp(1.0, 100.0)
         }

@@ -1,7 +1,7 @@
 //! `taustream run`: executes a saved trajectory from its base pose, after verification.
 use super::client::Client;
 use super::follow::{Executed, follow, say_pauses};
-use super::replan::accepted;
+use super::replan::{accepted, from_words};
 use crate::args::RunArgs;
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
@@ -47,8 +47,10 @@ impl fmt::Display for Answer {
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         write!(
             f,
-            "receipt       accepted: trajectory {} (generation {}) from {:.3} s on, at cycle {}",
-            self.trajectory_id, self.generation, self.from_s, self.tick
+            "receipt       accepted: trajectory {} (generation {}) {}",
+            self.trajectory_id,
+            self.generation,
+            from_words(self.from_s, self.tick)
         )?;
         if let Some(e) = &self.executed {
             write!(f, "\n{e}")?;
@@ -129,8 +131,21 @@ fn check_ready(
     }
     if phase != Phase::Holding {
         return Err(Failure::Refused(format!(
-            "the arm is {}; it must be holding (`taustream enable`, or wait for the running motion)",
-            phase.word()
+            "the arm is {}; a saved motion begins at rest, so it must be holding: {}",
+            phase.word(),
+            match phase {
+                Phase::Moving | Phase::Pausing | Phase::Paused => {
+                    "wait for the end of the motion, or `taustream cancel`; `taustream replan --queue` goes on from a running motion"
+                }
+                Phase::Stopping | Phase::FastStopping | Phase::Braking => "wait until the arm is at rest",
+                Phase::Configuring
+                | Phase::Disabled
+                | Phase::Enabling
+                | Phase::Holding
+                | Phase::Fault
+                | Phase::Locked
+                | Phase::Disabling => "`taustream enable`",
+            }
         )));
     }
     let away = |(command, base): (&f64, &f64)| (command - base).abs();

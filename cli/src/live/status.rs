@@ -85,7 +85,19 @@ struct MotionStatus {
     generation: u64,
     at_s: f64,
     duration_s: f64,
+    /// The accepted motion that waits for its cut.
+    successor: Option<SuccessorStatus>,
+    /// When everything accepted has ended, in trajectory time, and where.
+    end_s: f64,
     end_rad: Vec<f64>,
+}
+
+/// The motion that waits.
+#[derive(Debug, Serialize)]
+struct SuccessorStatus {
+    trajectory_id: u64,
+    /// Trajectory time of the takeover.
+    from_s: f64,
 }
 
 /// What the streamer says.
@@ -153,6 +165,9 @@ impl Status {
             generation: r.generation,
             at_s: r.trajectory_s,
             duration_s: r.trajectory_duration_s,
+            successor: (r.successor_id != 0)
+                .then_some(SuccessorStatus { trajectory_id: r.successor_id, from_s: r.successor_from_s }),
+            end_s: r.end_s,
             end_rad: r.end_rad.iter().take(r.joints()).copied().collect(),
         });
         Self {
@@ -318,11 +333,16 @@ impl fmt::Display for Status {
         self.trust(f)?;
         self.why_it_rests(f)?;
         match &self.motion {
-            Some(m) => writeln!(
-                f,
-                "motion {} (generation {}): {:.3} of {:.3} s",
-                m.trajectory_id, m.generation, m.at_s, m.duration_s
-            )?,
+            Some(m) => {
+                let (id, generation) = (m.trajectory_id, m.generation);
+                write!(f, "motion {id} (generation {generation}): {:.3} of {:.3} s", m.at_s, m.duration_s)?;
+                match &m.successor {
+                    Some(next) => {
+                        writeln!(f, "; motion {} follows at {:.3} s", next.trajectory_id, next.from_s)?;
+                    }
+                    None => writeln!(f)?,
+                }
+            }
             None => writeln!(f, "motion: none since the streamer started")?,
         }
         writeln!(

@@ -1,0 +1,219 @@
+//! From a motion that runs to a verified replacement of it.
+//!
+//! A replacement repeats the strokes that have begun before its cut and is verified from the cut on, for limits and for
+//! distances: the sum of kept and new strokes is new geometry. Three ways, from the quickest: strokes that carry the arm from
+//! its state at the cut to the goal; a taper to rest, and an ordinary plan from there; or the end of the motion, and an
+//! ordinary plan from there. The last one always exists.
+use crate::budget::Budget;
+use crate::plan::{
+    Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_until,
+};
+use crate::replacement::{replacement, to_rest};
+use crate::verify::{Proof, Stretch, Violation, verify_stretches};
+use crate::world::World;
+use std::sync::atomic::AtomicBool;
+use taustream_arm::{Robot, Scene};
+use taustream_motion::cut::kept;
+use taustream_motion::{JointArray, Stroke, Trajectory, TrajectoryError};
+
+/// What is cut, and when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutPoint {
+    /// Id of the trajectory that is cut.
+    pub trajectory_id: u64,
+    /// Its strokes; `None` when another process has sent it.
+    pub trajectory: Option<Trajectory>,
+    /// Trajectory time of the cut.
+    pub at_s: f64,
+    /// Trajectory time from which the replacement is sampled: the cut, or earlier when it cuts one that waits.
+    pub from_s: f64,
+    /// Trajectory time at which the trajectory ends.
+    pub end_s: f64,
+    /// Where it ends.
+    pub end_rad: JointArray,
+}
+
+impl CutPoint {
+    /// The trajectory that is cut, with the strokes folded that have ended when the replacement takes over.
+    fn folded(&self) -> Result<Trajectory, NoReplacement> {
+        let trajectory = self.trajectory.as_ref().ok_or(NoReplacement::Unknown)?;
+        let kept = kept(trajectory, self.at_s, self.from_s);
+        let pending = trajectory.strokes().iter().filter(|stroke| stroke.start_s >= self.at_s);
+        let strokes: Vec<Stroke> = kept.strokes.iter().chain(pending).copied().collect();
+        Ok(Trajectory::new(trajectory.joints(), kept.base_rad, &strokes)?)
+    }
+}
+
+/// A verified replacement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replacement {
+    /// Kept and new strokes.
+    pub trajectory: Trajectory,
+    /// What was proven of it from the cut on.
+    pub clearance_m: f64,
+    /// What it is, in a few words.
+    pub how: String,
+}
+
+/// Why there is no replacement.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoReplacement {
+    /// The strokes of the running motion are not known here.
+    #[error("another process has sent the running motion, and its strokes are not known here")]
+    Unknown,
+    /// No strokes were found that carry the arm from its state at the cut.
+    #[error("no strokes were found that lead on from the cut at {at_s:.3} s inside the motion limits")]
+    NoStrokes {
+        /// Trajectory time of the cut.
+        at_s: f64,
+    },
+    /// Kept and new strokes are no trajectory: as a rule, they are too many.
+    #[error("kept and new strokes together: {0}; wait until some of what is queued has run")]
+    Strokes(#[from] TrajectoryError),
+    /// Nothing could be planned from where the arm comes to rest.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// It is not proven.
+    #[error("the replacement is not proven: {0}")]
+    Unproven(#[from] Violation),
+    /// A shape of the robot or the scene cannot be built.
+    #[error("{name}: its mesh has no usable triangles; correct the file")]
+    Shape {
+        /// The link or obstacle.
+        name: String,
+    },
+}
+
+/// Robot, scene and what ends the work.
+#[derive(Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// Its surroundings.
+    pub scene: &'a Scene,
+    /// Set when nobody waits for the result any more.
+    pub cancel: &'a AtomicBool,
+}
+
+impl Surroundings<'_> {
+    /// A taper that brings the arm to rest as soon as its limits allow.
+    ///
+    /// # Errors
+    /// When no taper is found, or it is not proven.
+    pub fn taper(&self, cut: &CutPoint, options: &PlanOptions) -> Result<Replacement, NoReplacement> {
+        let tapered = self.taper_strokes(cut)?;
+        let proof = self.prove(&tapered, cut, options)?;
+        let how = "taper to rest".to_owned();
+        Ok(Replacement { trajectory: tapered, clearance_m: proof.clearance_m, how })
+    }
+
+    /// A taper to rest, and an ordinary plan from there to the goal.
+    ///
+    /// # Errors
+    /// When there is no taper, no plan, or one of them is not proven.
+    pub fn rest_first(
+        &self,
+        (cut, goal_rad): (&CutPoint, &JointArray),
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let tapered = self.taper_strokes(cut)?;
+        let proof = self.prove(&tapered, cut, options)?;
+        let plan = self.plan(&tapered.end_rad(), goal_rad, options)?;
+        let rest_s = tapered.duration_s();
+        let trajectory = continued(tapered.base_rad(), tapered.strokes(), (&plan.trajectory, rest_s))?;
+        let clearance_m = proof.clearance_m.min(plan.proof.clearance_m);
+        Ok(Replacement {
+            trajectory,
+            clearance_m,
+            how: format!("to rest at {rest_s:.3} s, then {}", plan.how),
+        })
+    }
+
+    /// What runs goes on to its end, and an ordinary plan leads on from there.
+    ///
+    /// # Errors
+    /// When there is no plan, or strokes that must be kept are not known.
+    pub fn after_end(
+        &self,
+        (cut, goal_rad): (&CutPoint, &JointArray),
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let plan = self.plan(&cut.end_rad, goal_rad, options)?;
+        // At its end every stroke of a motion that runs is folded; of one that waits, all are kept.
+        let trajectory = match &cut.trajectory {
+            Some(trajectory) => {
+                let kept = kept(trajectory, cut.at_s, cut.from_s);
+                continued(&kept.base_rad, kept.strokes, (&plan.trajectory, cut.end_s))?
+            }
+            None if cut.from_s >= cut.end_s => continued(&cut.end_rad, &[], (&plan.trajectory, cut.end_s))?,
+            None => return Err(NoReplacement::Unknown),
+        };
+        let Plan { how, proof, .. } = plan;
+        Ok(Replacement {
+            trajectory,
+            clearance_m: proof.clearance_m,
+            how: format!("after {:.3} s: {how}", cut.end_s),
+        })
+    }
+
+    /// Strokes that carry the arm from its state at the cut to the goal, as soon as its limits allow.
+    ///
+    /// # Errors
+    /// When none are found, or they are not proven.
+    pub fn direct(
+        &self,
+        (cut, goal_rad): (&CutPoint, &JointArray),
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        check_pose(self.robot, PoseOf::Goal, goal_rad)?;
+        let goal_rad = nearest_inside(self.robot, goal_rad);
+        let made = replacement(&cut.folded()?, cut.at_s, &goal_rad, &self.robot.limits());
+        let trajectory = made.ok_or(NoReplacement::NoStrokes { at_s: cut.at_s })?;
+        let proof = self.prove(&trajectory, cut, options)?;
+        Ok(Replacement {
+            trajectory,
+            clearance_m: proof.clearance_m,
+            how: "straight on from the motion".to_owned(),
+        })
+    }
+
+    fn taper_strokes(&self, cut: &CutPoint) -> Result<Trajectory, NoReplacement> {
+        let tapered = to_rest(&cut.folded()?, cut.at_s, &self.robot.limits());
+        tapered.ok_or(NoReplacement::NoStrokes { at_s: cut.at_s })
+    }
+
+    fn plan(
+        &self,
+        start_rad: &JointArray,
+        goal_rad: &JointArray,
+        options: &PlanOptions,
+    ) -> Result<Plan, NoReplacement> {
+        let (robot, scene, margin) = (self.robot, self.scene, StartMargin::AsItStands);
+        let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad, margin };
+        Ok(plan_until(&task, options, Some(self.cancel))?)
+    }
+
+    /// Proves limits and distances from the cut on.
+    fn prove(
+        &self,
+        trajectory: &Trajectory,
+        cut: &CutPoint,
+        options: &PlanOptions,
+    ) -> Result<Proof, NoReplacement> {
+        let world = World::new(self.robot, self.scene).map_err(|name| NoReplacement::Shape { name })?;
+        let budget = Budget::until(options.deadline, Some(self.cancel));
+        let span_s = [cut.at_s, trajectory.duration_s().max(cut.at_s)];
+        Ok(verify_stretches(&[Stretch { world: &world, span_s }], trajectory, &budget)?)
+    }
+}
+
+/// Kept strokes, and a motion from rest to rest that begins at `from_s`, where they have ended.
+fn continued(
+    base_rad: &JointArray,
+    kept: &[Stroke],
+    (motion, from_s): (&Trajectory, f64),
+) -> Result<Trajectory, NoReplacement> {
+    let later = motion.strokes().iter().map(|stroke| Stroke { start_s: stroke.start_s + from_s, ..*stroke });
+    let strokes: Vec<Stroke> = kept.iter().copied().chain(later).collect();
+    Ok(Trajectory::new(motion.joints(), *base_rad, &strokes)?)
+}
