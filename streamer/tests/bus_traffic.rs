@@ -129,7 +129,7 @@ fn every_setpoint_packing_follows_at_its_rate_inside_the_stop_limits() {
         assert!(used.iter().all(|share| *share <= 1.001), "{name}: {used:?} of the stop limits");
         assert!(used[0] > 0.2, "{name}: hardly moved, {used:?}");
         // The end of the motion itself was sent, not the last setpoint before it.
-        let goal = arm.hold_position_rad;
+        let goal = arm.newest.unwrap().position_rad;
         for servo in &arm.settings.servos {
             let node = u32::from(servo.node_id);
             let last = received.iter().rev().find(|setpoint| setpoint.node == node).unwrap();

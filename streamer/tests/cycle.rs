@@ -9,6 +9,8 @@
 )]
 #[path = "cycle_suite/bus_faults.rs"]
 mod bus_faults;
+#[path = "cycle_suite/cuts.rs"]
+mod cuts;
 #[path = "cycle_suite/faults.rs"]
 mod faults;
 mod harness;

@@ -25,7 +25,13 @@ fn rejections() -> Vec<String> {
         Rejection::Limit { joint: 0, at_s: 0.0, value: 0.0, limit: 0.0, what: String::new() },
         Rejection::NotAtBase { joint: 0, by_rad: 0.0 },
         Rejection::NotReady { phase: Some(Phase::Paused) },
-        Rejection::CutUnsupported { at_s: 0.0 },
+        Rejection::CutPassed { at_s: 0.0, by_s: 0.0 },
+        Rejection::CutOutside { at_s: 0.0, begins_s: 0.0, ends_s: 0.0 },
+        Rejection::OtherTrajectory { cut: 0, running: 0 },
+        Rejection::NothingToCut { phase: Some(Phase::Holding) },
+        Rejection::SpeedChanges,
+        Rejection::KeptStrokesDiffer { stroke: 0 },
+        Rejection::KeptBaseDiffers { joint: 0, by_rad: 0.0 },
         Rejection::TooLate { late_s: 0.0 },
         Rejection::Busy,
     ];
@@ -38,7 +44,13 @@ fn rejections() -> Vec<String> {
             | Rejection::Limit { .. }
             | Rejection::NotAtBase { .. }
             | Rejection::NotReady { .. }
-            | Rejection::CutUnsupported { .. }
+            | Rejection::CutPassed { .. }
+            | Rejection::CutOutside { .. }
+            | Rejection::OtherTrajectory { .. }
+            | Rejection::NothingToCut { .. }
+            | Rejection::SpeedChanges
+            | Rejection::KeptStrokesDiffer { .. }
+            | Rejection::KeptBaseDiffers { .. }
             | Rejection::TooLate { .. }
             | Rejection::Busy => {}
         }

@@ -16,8 +16,13 @@ use taustream_arm::Settings;
 use taustream_drivers::Nanos;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_drivers::sim::FaultRequest;
-use taustream_messages::{Command, Phase};
+use taustream_messages::{Command, Phase, Replaces};
+use taustream_motion::cut::kept;
+use taustream_motion::limits::check_motion_from;
+use taustream_motion::{Stroke, Trajectory};
 use taustream_streamer::cycle::{Probe, Stage};
+use taustream_streamer::cycle_state::Decision;
+use taustream_streamer::successor::CutRefusal;
 
 #[path = "../../drivers/tests/counting/mod.rs"]
 mod counting;
@@ -106,13 +111,48 @@ fn lose_a_bus_and_restore_it(arm: &mut Arm) {
     arm.enable();
 }
 
+/// Replaces the motion that runs by the same with a small stroke more.
+fn replace(arm: &mut Arm, running: &Trajectory, (ahead_s, by_rad): (f64, f64)) -> Decision {
+    let newest = arm.newest.unwrap();
+    let (trajectory_id, at_s) = (newest.trajectory_id, newest.s + ahead_s);
+    let kept = kept(running, at_s, at_s);
+    let later = running.strokes().iter().filter(|stroke| stroke.start_s >= at_s);
+    let stroke = Stroke {
+        start_s: at_s,
+        duration_s: 1.5,
+        n: 6,
+        delta_rad: [by_rad, 0.0, by_rad, 0.0, 0.0, by_rad, 0.0, 0.0],
+    };
+    let mut strokes = kept.strokes.to_vec();
+    strokes.push(stroke);
+    strokes.extend(later);
+    let trajectory = Trajectory::new(JOINTS, kept.base_rad, &strokes).unwrap();
+    check_motion_from(&trajectory, &arm.settings.robot.limits(), at_s).unwrap();
+    arm.offer(&trajectory, Replaces::Cut { trajectory_id, at_s })
+}
+
 /// Motions, pauses, stops and faults, over and over.
 fn live_through(arm: &mut Arm, cycles: u64) {
     arm.enable();
     let mut round = 0;
+    let (mut accepted, mut refused) = (0, 0);
+    let mut count = |decision: Decision| match decision {
+        Decision::Waits { .. } => accepted += 1,
+        Decision::Cut(CutRefusal::Passed { .. }) => refused += 1,
+        Decision::Accepted { .. }
+        | Decision::Cut(_)
+        | Decision::Stale { .. }
+        | Decision::NotAtBase { .. }
+        | Decision::NotReady { .. } => panic!("{decision:?}"),
+    };
     while arm.counted < cycles || round < 5 {
-        arm.move_it(1.0);
-        arm.run(400);
+        let running = arm.move_it(1.0);
+        arm.run(300);
+        // One that is refused, one that takes the place of what waits, and takes over.
+        for (ahead_s, by_rad) in [(0.3, 0.04), (-0.1, 0.04), (0.05, -0.04)] {
+            count(replace(arm, &running, (ahead_s, by_rad)));
+        }
+        arm.run(100);
         arm.ask(Command::Pause);
         arm.run_until(Phase::Paused, 1_500);
         arm.ask(Command::Speed { percent: 60.0 });
@@ -125,8 +165,11 @@ fn live_through(arm: &mut Arm, cycles: u64) {
         arm.ask(Command::Stop);
         arm.run_until(Phase::Holding, 1_500);
         arm.run(100);
-        arm.move_it(0.5);
-        arm.run(500);
+        let running = arm.move_it(0.5);
+        arm.run(450);
+        // Dropped by what comes next.
+        count(replace(arm, &running, (0.5, 0.04)));
+        arm.run(50);
         let joint = round % JOINTS + 1;
         match round % 5 {
             0 => fault(arm, &format!("joint={joint},kind=silence")),
@@ -142,6 +185,7 @@ fn live_through(arm: &mut Arm, cycles: u64) {
         recover(arm);
         round += 1;
     }
+    assert!(accepted >= 3 * round && refused == round, "{accepted} replacements, {refused} refused");
     for phase in [Phase::Moving, Phase::Paused, Phase::Stopping, Phase::FastStopping, Phase::Fault] {
         assert!(arm.visited.contains(&phase), "{phase:?} was never reached");
     }

@@ -34,6 +34,17 @@ pub struct LoggedCycle {
     pub lost: Vec<u64>,
 }
 
+/// The cut of a trajectory that replaces another one in motion.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+pub struct LoggedCut {
+    /// The trajectory that is cut.
+    pub trajectory_id: u64,
+    /// Trajectory time of the cut.
+    pub at_s: f64,
+    /// Trajectory time from which the replacement makes the setpoints.
+    pub from_s: f64,
+}
+
 /// One line of the log.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(tag = "event", rename_all = "lowercase")]
@@ -64,6 +75,9 @@ pub enum Event {
         /// The held pose less the trajectory's base, rad.
         #[serde(default)]
         start_offset_rad: Vec<f64>,
+        /// What it cuts; nothing for one that begins at rest.
+        #[serde(default)]
+        cut: Option<LoggedCut>,
     },
     /// Setpoints were sent.
     Cycle(LoggedCycle),

@@ -4,8 +4,9 @@
 //! and to 1e-11 rad by a second formula written here. A joint may be off the path only after a stall in which setpoints
 //! took turns: the arm then stands where each joint was last sent, the log states the difference, and from cycle to
 //! cycle it only gets smaller. In a fast stop a joint may also stand where it was sent last, and the log states how far from the
-//! path that is.
-use crate::cycle_log::LoggedCycle;
+//! path that is. A trajectory that cuts another one gives the same bits as that one at its cut, makes no setpoint before it,
+//! and the other makes none from it on.
+use crate::cycle_log::{LoggedCut, LoggedCycle};
 use crate::setpoints::Flaw;
 use std::collections::BTreeMap;
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
@@ -27,6 +28,8 @@ struct Joint {
 #[derive(Debug, Default)]
 pub(crate) struct PathCheck {
     trajectories: BTreeMap<u64, Trajectory>,
+    /// From when each replacement makes the setpoints.
+    begins_s: BTreeMap<u64, f64>,
     joints: [Joint; MAX_JOINTS],
     last: Option<(u64, f64)>,
 }
@@ -55,9 +58,61 @@ impl PathCheck {
         Ok(())
     }
 
+    /// Takes an accepted replacement, which goes on from another trajectory without a step.
+    pub(crate) fn replace(
+        &mut self,
+        trajectory_id: u64,
+        file: &serde_json::Value,
+        cut: &LoggedCut,
+    ) -> Result<(), Flaw> {
+        let trajectory = read(file)?;
+        let Some(before) = self.trajectories.get(&cut.trajectory_id) else {
+            let cut_id = cut.trajectory_id;
+            return Err(Flaw::Log(format!("trajectory {trajectory_id} cuts {cut_id}, never accepted")));
+        };
+        // Both in the cut and a little before the end of what is kept, where only a changed stroke would show.
+        for at_s in [cut.from_s, 0.5 * (cut.from_s + cut.at_s)] {
+            let (old, new) = (before.sample(at_s), trajectory.sample(at_s));
+            let apart =
+                |a: &JointArray, b: &JointArray| a.iter().zip(b).any(|(a, b)| a.to_bits() != b.to_bits());
+            if apart(&old.position_rad, &new.position_rad)
+                || apart(&old.velocity_rad_s, &new.velocity_rad_s)
+                || apart(&old.acceleration_rad_s2, &new.acceleration_rad_s2)
+                || apart(&old.jerk_rad_s3, &new.jerk_rad_s3)
+            {
+                return Err(Flaw::Log(format!(
+                    "trajectory {trajectory_id} does not go on from {} at s = {at_s}: {:?} rad, {:?} rad",
+                    cut.trajectory_id, new.position_rad, old.position_rad
+                )));
+            }
+        }
+        self.trajectories.insert(trajectory_id, trajectory);
+        self.begins_s.insert(trajectory_id, cut.from_s);
+        Ok(())
+    }
+
+    /// A replacement makes every setpoint from its cut on, and none before.
+    fn check_begin(&self, cycle: &LoggedCycle) -> Result<(), Flaw> {
+        let Some(from_s) = self.begins_s.get(&cycle.trajectory_id) else { return Ok(()) };
+        let early = cycle.s < *from_s;
+        let late = self.last.is_some_and(|(id, s)| id != cycle.trajectory_id && s > *from_s);
+        if early || late {
+            let (tick, id, s) = (cycle.tick, cycle.trajectory_id, cycle.s);
+            return Err(Flaw::Log(format!(
+                "tick {tick}: trajectory {id} takes over at s = {s}, before {:?}; its cut is at {from_s}",
+                self.last
+            )));
+        }
+        Ok(())
+    }
+
     /// Compares the setpoints that a cycle has sent with its trajectory; how many there were.
     pub(crate) fn compare(&mut self, cycle: &LoggedCycle) -> Result<usize, Flaw> {
-        let compared = if is_on_path(&cycle.phase) { self.compare_sent(cycle)? } else { 0 };
+        let on_path = is_on_path(&cycle.phase);
+        if on_path && cycle.joint_sent.contains(&true) {
+            self.check_begin(cycle)?;
+        }
+        let compared = if on_path { self.compare_sent(cycle)? } else { 0 };
         for (index, joint) in self.joints.iter_mut().enumerate().filter(|(index, _)| is_sent(cycle, *index)) {
             joint.last_sent_rad = cycle.position_rad.get(index).copied();
         }
@@ -284,6 +339,46 @@ mod tests {
         assert_eq!(kept("fast-stopping", 0.0), Ok(320));
         kept("fast-stopping", 1e-9).expect_err("elsewhere than stated");
         kept("moving", 0.0).expect_err("a joint that stays behind in motion");
+    }
+
+    /// Goal: a replacement passes when it goes on from the trajectory that it cuts, and takes over with the first setpoint from
+    /// its cut on; one with a changed stroke, an early and a late takeover fail.
+    #[test]
+    fn replacement_passes_only_when_it_goes_on_at_its_cut() {
+        let at_s = 0.2;
+        let file_of = |delta: f64| {
+            let kept =
+                serde_json::json!({ "start_s": 0.0, "duration_s": 0.4, "n": 5, "delta_rad": [delta, -0.4] });
+            let new =
+                serde_json::json!({ "start_s": at_s, "duration_s": 0.4, "n": 5, "delta_rad": [0.1, 0.1] });
+            serde_json::json!({ "joints": 2, "base_rad": [0.1, 0.2], "strokes": [kept, new] })
+        };
+        let cut = LoggedCut { trajectory_id: 5, at_s, from_s: at_s };
+        let run = |delta: f64, takes_over_s: f64| {
+            let mut path = PathCheck::default();
+            path.accept(5, &file(), &[])?;
+            path.replace(6, &file_of(delta), &cut)?;
+            for tick in 1..=590_u32 {
+                let s = f64::from(tick) * 1e-3;
+                let trajectory_id = if s < takes_over_s { 5 } else { 6 };
+                let sampled = path.trajectories[&trajectory_id].sample(s).position_rad;
+                path.compare(&LoggedCycle {
+                    tick: tick.into(),
+                    trajectory_id,
+                    s,
+                    position_rad: sampled[..2].to_vec(),
+                    off_path_rad: vec![0.0; 2],
+                    joint_sent: vec![true; 2],
+                    sigma: 1.0,
+                    ..log()[0].clone()
+                })?;
+            }
+            Ok::<(), Flaw>(())
+        };
+        run(0.4, at_s).unwrap();
+        run(f64::from_bits(0.4_f64.to_bits() + 1), at_s).expect_err("a changed stroke");
+        run(0.4, at_s - 1e-3).expect_err("too early");
+        run(0.4, at_s + 2e-3).expect_err("too late");
     }
 
     #[test]

@@ -189,8 +189,11 @@ fn check_assuming(
         match event {
             Event::Start { .. } | Event::Phase { .. } => {}
             Event::Lost { records } => return Err(Flaw::Log(format!("{records} records are missing"))),
-            Event::Trajectory { trajectory_id, file, start_offset_rad, .. } => {
-                path.accept(*trajectory_id, file, start_offset_rad)?;
+            Event::Trajectory { trajectory_id, file, start_offset_rad, cut, .. } => {
+                match cut {
+                    Some(cut) => path.replace(*trajectory_id, file, cut)?,
+                    None => path.accept(*trajectory_id, file, start_offset_rad)?,
+                }
                 check_result.trajectories += 1;
             }
             Event::Cycle(cycle) => {

@@ -62,6 +62,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             generation: 1,
             file: file(&trajectory),
             start_offset_rad: Vec::new(),
+            cut: None,
         },
     ];
     for tick in 1..=CYCLES {

@@ -68,6 +68,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
         generation: 1,
         file,
         start_offset_rad: Vec::new(),
+        cut: None,
     }];
     let mut frames: Vec<BusFrame> =
         (1..=3).map(|node| BusFrame { id: 0x7FF, data: vec![node, 0, 0xCC, 0, 0, 0, 0, 0] }).collect();

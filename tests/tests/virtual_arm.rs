@@ -6,7 +6,7 @@ use taustream_tests::virtual_arm::arms::{self, SimulatedArm};
 use taustream_tests::virtual_arm::checker::Rule;
 use taustream_tests::virtual_arm::plan::Plan;
 use taustream_tests::virtual_arm::planted::{PlantedDriver, PlantedFault};
-use taustream_tests::virtual_arm::run::{Outcome, PLAN_MS, run};
+use taustream_tests::virtual_arm::run::{Outcome, PLAN_MS, Replacing, run, run_replacing};
 use taustream_tests::virtual_arm::world::shipped;
 
 /// Seeds for each arm in an ordinary run; `TAUSTREAM_SEEDS` replaces it.
@@ -80,6 +80,51 @@ fn pos_vel() {
 #[test]
 fn vcan6_go_on() {
     seeds_of("vcan6-go-on");
+}
+
+/// Goal: replacements at random moments, with everything that goes wrong between, break no rule. Method: the same seeds as above,
+/// and motions that are replaced every few tens of milliseconds; a tenth of the messages is spoiled by one bit.
+fn replaced_seeds_of(name: &str) {
+    let arm = SimulatedArm::by_name(name).expect("an arm");
+    let settings = arm.settings().expect("settings");
+    let (mut accepted, mut refused) = (0, 0);
+    for seed in 0..number("TAUSTREAM_SEEDS").unwrap_or(SEEDS) {
+        let plan = Plan::random(seed, &settings, PLAN_MS);
+        let outcome = run_replacing(&arm, seed, (&plan, &shipped), Replacing::Sound).expect("an arm");
+        assert!(outcome.violations.is_empty(), "with replacements, {outcome}");
+        accepted += outcome.replacements.0;
+        refused += outcome.replacements.1;
+    }
+    println!("{name}: {accepted} replacements, {refused} refused");
+    assert!(accepted > 20 && refused > 5, "{accepted} replacements, {refused} refused");
+}
+
+#[test]
+fn vcan6_with_replacements() {
+    replaced_seeds_of("vcan6");
+}
+
+#[test]
+fn damiao6_with_replacements() {
+    replaced_seeds_of("damiao6");
+}
+
+#[test]
+fn dual_bus_with_replacements() {
+    replaced_seeds_of("dual-bus");
+}
+
+/// Goal: a motion whose pending strokes are dropped, without strokes that bring it down, is found to be beyond the motion limits
+/// that every accepted motion keeps. So the check at the intake is what keeps an arm from it.
+#[test]
+fn dropping_pending_strokes_alone_is_found_by_the_rate_rule() {
+    let arm = SimulatedArm::by_name("vcan6").expect("an arm");
+    let found = (0..20).any(|seed| {
+        let outcome =
+            run_replacing(&arm, seed, (&Plan::calm(), &shipped), Replacing::DropAlone).expect("an arm");
+        outcome.violations.iter().any(|violation| violation.rule == Rule::Rate)
+    });
+    assert!(found, "no seed has shown it");
 }
 
 /// The seed and the arm of the environment; without them, a calm one.

@@ -8,14 +8,14 @@ use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::intake::{self, CommandQueue};
 use taustream_streamer::names::Names;
 use taustream_streamer::prepared::PreparedTrajectory;
-use taustream_streamer::report::{self, Readers, Record};
+use taustream_streamer::report::{self, CycleRecord, Readers, Record};
 use taustream_streamer::tick::Tick;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -52,7 +52,8 @@ pub(crate) struct Arm {
     pub(crate) tick: u64,
     generation: u64,
     pub(crate) counted: u64,
-    pub(crate) hold_position_rad: JointArray,
+    /// What the newest cycle sent.
+    pub(crate) newest: Option<CycleRecord>,
     pub(crate) visited: Vec<Phase>,
 }
 
@@ -100,7 +101,7 @@ impl Arm {
             tick: 0,
             generation: 0,
             counted: 0,
-            hold_position_rad: [0.0; 8],
+            newest: None,
             visited: Vec::new(),
         }
     }
@@ -142,7 +143,7 @@ impl Arm {
         self.simulator.simulator.take_events();
         while let Some(record) = self.readers.records.as_mut().and_then(|records| records.pop().ok()) {
             match record {
-                Record::CycleSettings(cycle) => self.hold_position_rad = cycle.position_rad,
+                Record::CycleSettings(cycle) => self.newest = Some(cycle),
                 Record::Transition(t) => self.visited.push(t.to),
                 Record::Accepted { .. } | Record::Lost(_) => {}
             }
@@ -176,9 +177,10 @@ impl Arm {
         assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
     }
 
-    pub(crate) fn move_it(&mut self, size: f64) {
+    pub(crate) fn move_it(&mut self, size: f64) -> Trajectory {
         // Towards the middle, so that motions that were cut short do not add up to the end of a range.
-        let size = if self.hold_position_rad[0] > 0.0 { -size } else { size };
+        let hold_position_rad = self.newest.map_or([0.0; 8], |cycle| cycle.position_rad);
+        let size = if hold_position_rad[0] > 0.0 { -size } else { size };
         let stroke = |start_s: f64, sign: f64| Stroke {
             start_s,
             duration_s: 1.2,
@@ -186,7 +188,14 @@ impl Arm {
             delta_rad: [0.9, 0.2, -0.4, 0.3, 0.2, 0.5, 0.0, 0.0].map(|d| d * size * sign),
         };
         let strokes = [stroke(0.0, 1.0), stroke(0.8, -0.5), stroke(1.9, 0.5), stroke(2.6, -1.0)];
-        let trajectory = Trajectory::new(JOINTS, self.hold_position_rad, &strokes).unwrap();
+        let trajectory = Trajectory::new(JOINTS, hold_position_rad, &strokes).unwrap();
+        let decision = self.offer(&trajectory, Replaces::Rest);
+        assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
+        trajectory
+    }
+
+    /// Offers a trajectory whose id is its generation, runs one cycle, and returns the decision.
+    pub(crate) fn offer(&mut self, trajectory: &Trajectory, replaces: Replaces) -> Decision {
         self.generation += 1;
         let generation = self.generation;
         let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
@@ -194,14 +203,13 @@ impl Arm {
             trajectory_id: generation,
             generation,
             robot_digest: self.digest,
-            replaces: Replaces::Rest,
-            trajectory,
+            replaces,
+            trajectory: trajectory.clone(),
         };
         *empty = PreparedTrajectory::new(checked, &self.limits);
         self.command_queue.trajectories.offer(empty);
         self.step(&mut NoProbe);
-        let decision = self.command_queue.trajectories.trajectory_result().unwrap().decision;
-        assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
+        self.command_queue.trajectories.trajectory_result().unwrap().decision
     }
 
     pub(crate) fn enable(&mut self) {

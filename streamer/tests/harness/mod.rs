@@ -513,12 +513,44 @@ impl CycleHarness {
     }
 
     pub fn offer_as(&mut self, trajectory: Trajectory, generation: u64) -> Decision {
+        self.offer_message(trajectory, Replaces::Rest, generation)
+    }
+
+    /// Offers a replacement of a trajectory, cut at its trajectory time.
+    pub fn offer_cut(&mut self, trajectory: Trajectory, cut: (u64, f64)) -> Decision {
+        self.generation += 1;
+        let generation = self.generation;
+        self.offer_cut_as(trajectory, cut, generation)
+    }
+
+    pub fn offer_cut_as(
+        &mut self,
+        trajectory: Trajectory,
+        (trajectory_id, at_s): (u64, f64),
+        generation: u64,
+    ) -> Decision {
+        self.offer_message(trajectory, Replaces::Cut { trajectory_id, at_s }, generation)
+    }
+
+    /// The id of the newest trajectory that was offered.
+    pub fn newest_id(&self) -> u64 {
+        1000 + self.generation
+    }
+
+    /// Id and cut of the trajectory that waits, as the newest report states them after a cycle.
+    pub fn core_waiting(&mut self) -> Option<(u64, f64)> {
+        self.run(12);
+        let report = self.report.unwrap();
+        (report.successor_id != 0).then_some((report.successor_id, report.successor_from_s))
+    }
+
+    fn offer_message(&mut self, trajectory: Trajectory, replaces: Replaces, generation: u64) -> Decision {
         let mut empty = self.command_queue.trajectories.empty_box().expect("boxes go round");
         let checked = CheckedTrajectory {
             trajectory_id: 1000 + generation,
             generation,
             robot_digest: self.settings.robot.digest,
-            replaces: Replaces::Rest,
+            replaces,
             trajectory,
         };
         *empty = PreparedTrajectory::new(checked, &self.settings.robot.limits());

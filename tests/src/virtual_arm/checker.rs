@@ -146,14 +146,21 @@ impl Checker {
         }
     }
 
-    /// A trajectory was offered under this id.
-    pub fn offered(&mut self, id: u64, trajectory: &Trajectory) {
-        self.path.offer(id, trajectory.clone());
+    /// A trajectory was offered under this id: from rest, or as the successor of what runs from its cut on.
+    pub fn offered(&mut self, id: u64, trajectory: &Trajectory, cut_s: Option<f64>) {
+        self.path.offer(id, trajectory.clone(), cut_s);
     }
 
     /// A command was accepted.
     pub fn accepted(&mut self, command: Command) {
         self.phases.accepted(command);
+        if command == Command::TorqueOff {
+            // The frame that de-energises a drive carries where its joint was measured, behind what it was commanded in motion.
+            for joint in &mut self.joints {
+                joint.rates.restart();
+                joint.last = None;
+            }
+        }
     }
 
     /// The loop stood still before this cycle.
@@ -177,11 +184,12 @@ impl Checker {
                 self.report(cycle.tick, Rule::OnPath, text);
             }
         }
+        let goes_on = self.path.goes_on(cycle.trajectory_id);
         let before = self.newest.replace(*cycle);
         let constant = before.is_some_and(|before| {
             before.phase == Phase::Moving
                 && (before.sigma - cycle.sigma).abs() < 1e-12
-                && before.trajectory_id == cycle.trajectory_id
+                && (before.trajectory_id == cycle.trajectory_id || before.trajectory_id != 0 && goes_on)
         });
         let beside = cycle.off_path_rad.iter().any(|off| off.abs() > self.base_tolerance_rad);
         let steady = constant && cycle.phase == Phase::Moving && !beside;

@@ -6,11 +6,20 @@ use taustream_streamer::report::CycleRecord;
 /// Difference between two formulas for one position, and rounding of sums of angles.
 const FORMULA_RAD: f64 = 1e-9;
 
+/// A trajectory that was offered.
+#[derive(Clone, Debug)]
+struct Offered {
+    id: u64,
+    trajectory: Trajectory,
+    /// From when it makes the setpoints, for one that goes on from the trajectory before it.
+    from_s: Option<f64>,
+}
+
 /// The trajectory that runs, and how far it has come.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Path {
-    offered: Vec<(u64, Trajectory)>,
-    running: Option<(u64, Trajectory)>,
+    offered: Vec<Offered>,
+    running: Option<Offered>,
     last: Option<(u64, f64)>,
     /// What each joint was sent last.
     sent_rad: [Option<f64>; MAX_JOINTS],
@@ -20,8 +29,13 @@ pub(crate) struct Path {
 
 impl Path {
     /// A trajectory was offered under this id.
-    pub(crate) fn offer(&mut self, id: u64, trajectory: Trajectory) {
-        self.offered.push((id, trajectory));
+    pub(crate) fn offer(&mut self, id: u64, trajectory: Trajectory, from_s: Option<f64>) {
+        self.offered.push(Offered { id, trajectory, from_s });
+    }
+
+    /// A trajectory goes on from the one before it.
+    pub(crate) fn goes_on(&self, id: u64) -> bool {
+        self.running.iter().chain(&self.offered).any(|offered| offered.id == id && offered.from_s.is_some())
     }
 
     /// The loop stood still, or frames of a cycle were lost.
@@ -36,14 +50,23 @@ impl Path {
         }
         let [period_s, tolerance_rad] = limits;
         let id = cycle.trajectory_id;
-        if self.running.as_ref().is_none_or(|(running, _)| *running != id) {
-            let at = self.offered.iter().position(|(offered, _)| *offered == id);
+        if self.running.as_ref().is_none_or(|running| running.id != id) {
+            let at = self.offered.iter().position(|offered| offered.id == id);
             let Some(at) = at else { return Some(format!("moves on trajectory {id}, never offered")) };
-            self.running = Some(self.offered.swap_remove(at));
-            self.offered.clear();
-            (self.last, self.parted) = (None, false);
+            let begins = self.offered.swap_remove(at);
+            // What was offered earlier is not taken any more.
+            self.offered.retain(|offered| offered.id > id);
+            match begins.from_s {
+                None => (self.last, self.parted) = (None, false),
+                Some(from_s) => {
+                    if let Some(text) = self.late_or_early(from_s, cycle.s) {
+                        return Some(format!("trajectory {id} {text}"));
+                    }
+                }
+            }
+            self.running = Some(begins);
         }
-        let (_, trajectory) = self.running.as_ref()?;
+        let trajectory = &self.running.as_ref()?.trajectory;
         let held = self.last.is_some_and(|(_, s)| s.to_bits() == cycle.s.to_bits()) && cycle.sigma <= 0.0;
         if let Some((tick, s)) = self.last.replace((cycle.tick, cycle.s)) {
             #[expect(clippy::cast_precision_loss, reason = "periods of one run")]
@@ -73,5 +96,12 @@ impl Path {
             *sent_rad = Some(cycle.position_rad[joint]);
         }
         wrong
+    }
+
+    /// A successor makes every setpoint from its cut on, and none before.
+    fn late_or_early(&self, from_s: f64, s: f64) -> Option<String> {
+        let before = self.last.map_or(f64::NEG_INFINITY, |(_, s)| s);
+        let in_time = before <= from_s && from_s <= s;
+        (!in_time).then(|| format!("takes over between {before} s and {s} s, its cut is at {from_s} s"))
     }
 }

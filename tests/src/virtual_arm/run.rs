@@ -1,7 +1,7 @@
 //! One run: a plan, an operator, and at the end the proof that the arm can be moved again.
 use super::arms::SimulatedArm;
 use super::checker::{Rule, Violation};
-use super::motion::random_train;
+use super::motion::{cruising_train, random_replacement, random_train};
 use super::operator::{Deed, Operator};
 use super::plan::Plan;
 use super::random::SeededRng;
@@ -10,7 +10,8 @@ use anyhow::Result;
 use std::fmt;
 use taustream_arm::Settings;
 use taustream_messages::Phase;
-use taustream_motion::{JointArray, Trajectory};
+use taustream_motion::cut::kept;
+use taustream_motion::{JointArray, Stroke, Trajectory};
 
 /// Virtual time in which things go wrong, ms.
 pub const PLAN_MS: u64 = 6_000;
@@ -38,6 +39,8 @@ pub struct Outcome {
     pub digest: u64,
     /// Setpoints of moving joints that were compared.
     pub compared: u64,
+    /// Replacements in motion that were accepted, and refused.
+    pub replacements: (u64, u64),
     /// What no arm may do.
     pub violations: Vec<Violation>,
     /// What happened.
@@ -63,8 +66,23 @@ struct Run {
     home_rad: JointArray,
     /// The newest trajectory that was offered.
     offered: Option<Trajectory>,
+    replaces: Replacing,
+    /// Moments and shapes of replacements: of their own, so that runs without them stay as they are.
+    replacer: SeededRng,
+    next_replacement_ms: u64,
     /// The operator is at work.
     operated: bool,
+}
+
+/// What replaces motions that run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Replacing {
+    /// Nothing.
+    Nothing,
+    /// Replacements that keep the limits, at random moments; some too late, some with a changed stroke.
+    Sound,
+    /// A planted fault: pending strokes are dropped, and nothing brings the motion down.
+    DropAlone,
 }
 
 /// Runs a plan on an arm and checks everything.
@@ -72,11 +90,27 @@ struct Run {
 /// # Errors
 /// When the arm's settings are refused.
 pub fn run(arm: &SimulatedArm, seed: u64, plan: &Plan, wrap: Wrap<'_>) -> Result<Outcome> {
+    run_replacing(arm, seed, (plan, wrap), Replacing::Nothing)
+}
+
+/// Like [`run`], with replacements of motions that run.
+///
+/// # Errors
+/// When the arm's settings are refused.
+pub fn run_replacing(
+    arm: &SimulatedArm,
+    seed: u64,
+    (plan, wrap): (&Plan, Wrap<'_>),
+    replaces: Replacing,
+) -> Result<Outcome> {
     let settings: Settings = arm.settings()?;
     let world = World::new(settings, seed, plan, wrap)?;
     let home_rad = world.position_rad();
     let (operator, rng) = (Operator::new(seed), SeededRng::new(seed, 4));
-    let mut run = Run { world, operator, rng, home_rad, offered: None, operated: true };
+    let (replacer, next_replacement_ms, offered) = (SeededRng::new(seed, 5), 0, None);
+    let operated = true;
+    let mut run =
+        Run { world, operator, rng, home_rad, offered, replaces, replacer, next_replacement_ms, operated };
     run.steps(PLAN_MS, |_| false);
     run.world.make_whole();
     run.prove_recovery();
@@ -88,6 +122,7 @@ pub fn run(arm: &SimulatedArm, seed: u64, plan: &Plan, wrap: Wrap<'_>) -> Result
         frames: world.frames(),
         digest: world.digest(),
         compared: world.checker.compared(),
+        replacements: world.replacements(),
         violations: world.checker.violations().to_vec(),
         story: world.story,
     })
@@ -115,6 +150,10 @@ impl Run {
             Some(Deed::Trajectory) => self.offer(),
             None => {}
         }
+        if self.replaces != Replacing::Nothing && self.operated && now_ms >= self.next_replacement_ms {
+            self.next_replacement_ms = now_ms + self.replacer.whole(2, 250);
+            self.replace(phase);
+        }
         for answered in self.world.step() {
             self.operator.answered(answered.answer.accepted, answered.answer.why);
         }
@@ -123,10 +162,36 @@ impl Run {
     fn offer(&mut self) {
         let Some(from_rad) = self.world.commanded_rad() else { return };
         let robot = &self.world.settings.robot;
-        self.offered = random_train(&mut self.rng, robot, &self.home_rad, &from_rad);
+        let train = if self.replaces == Replacing::DropAlone { cruising_train } else { random_train };
+        self.offered = train(&mut self.rng, robot, &self.home_rad, &from_rad);
         if let Some(trajectory) = &self.offered {
             self.world.offer(trajectory);
         }
+    }
+
+    /// Replaces what runs, from a moment on that is a little ahead, or already over.
+    fn replace(&mut self, phase: Phase) {
+        if !matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused) {
+            return;
+        }
+        let Some((id, running, s)) = self.world.running() else { return };
+        let cut_s = (s + self.replacer.within(-0.01, 0.25)).clamp(0.0, running.duration_s());
+        let made = match self.replaces {
+            Replacing::DropAlone => {
+                let kept = kept(running, cut_s, cut_s);
+                let ends_s = kept.strokes.iter().map(Stroke::end_s).fold(0.0, f64::max);
+                let made = Trajectory::new(running.joints(), kept.base_rad, kept.strokes).ok();
+                made.filter(|_| ends_s >= cut_s)
+            }
+            Replacing::Sound | Replacing::Nothing => {
+                let robot = &self.world.settings.robot;
+                random_replacement(&mut self.replacer, robot, &self.home_rad, (running, cut_s))
+            }
+        };
+        let Some(made) = made else { return };
+        let changed = self.replaces == Replacing::Sound && self.replacer.chance(0.1);
+        let offered = if changed { with_a_changed_bit(&made) } else { made };
+        self.world.offer_cut(&offered, (id, cut_s));
     }
 
     /// After everything is whole the arm can be brought back, moved, and reaches its goal.
@@ -170,4 +235,12 @@ impl Run {
         let tick = self.world.now_ms();
         self.world.checker.report(tick, Rule::Recovery, text);
     }
+}
+
+/// The base one bit off: no streamer may take it.
+fn with_a_changed_bit(trajectory: &Trajectory) -> Trajectory {
+    let mut base_rad = *trajectory.base_rad();
+    base_rad[0] = f64::from_bits(base_rad[0].to_bits() ^ 1);
+    Trajectory::new(trajectory.joints(), base_rad, trajectory.strokes())
+        .unwrap_or_else(|_| trajectory.clone())
 }

@@ -20,6 +20,7 @@ use taustream_motion::{JointArray, Trajectory};
 use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, run_cycle};
+use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::intake::{self, CommandQueue, Handover};
 use taustream_streamer::prepared::PreparedTrajectory;
 use taustream_streamer::report::{self, Readers, Record};
@@ -35,6 +36,9 @@ const LATE_NS_MAX: u64 = 300_000;
 const FOREIGN_ID: u16 = 0x781;
 /// How long a drive counts as disturbed after its fault, ms.
 const DISTURBED_MS: u64 = 1_000;
+
+/// Trajectories that are remembered: more than may run, wait or be on their way.
+const SENT_MAX: usize = 32;
 
 /// Changes a driver before it is used: to plant faults that the checker must find.
 pub type Wrap<'a> = &'a dyn Fn(BusDriver) -> Box<dyn ServoDriver>;
@@ -80,6 +84,9 @@ pub struct World {
     handover: Option<(u64, Handover)>,
     newest: Option<Report>,
     generation: u64,
+    /// Trajectories that were offered, newest last.
+    sent: VecDeque<(u64, Trajectory)>,
+    replacements: (u64, u64),
     disturbed_until_ms: u64,
     digest: u64,
     frames: u64,
@@ -124,6 +131,8 @@ impl World {
             handover: None,
             newest: None,
             generation: 0,
+            sent: VecDeque::new(),
+            replacements: (0, 0),
             disturbed_until_ms: 0,
             digest: 0xCBF2_9CE4_8422_2325,
             frames: 0,
@@ -228,8 +237,31 @@ impl World {
         true
     }
 
-    /// Offers a trajectory as the service thread does after its check.
+    /// Offers a trajectory from rest as the service thread does after its check.
     pub fn offer(&mut self, trajectory: &Trajectory) -> bool {
+        self.offer_message(trajectory, Replaces::Rest)
+    }
+
+    /// Offers a replacement of what runs, cut at its trajectory time.
+    pub fn offer_cut(&mut self, trajectory: &Trajectory, (trajectory_id, at_s): (u64, f64)) -> bool {
+        self.offer_message(trajectory, Replaces::Cut { trajectory_id, at_s })
+    }
+
+    /// The trajectory that runs, with its strokes, and its trajectory time, as the newest report says.
+    #[must_use]
+    pub fn running(&self) -> Option<(u64, &Trajectory, f64)> {
+        let report = self.newest?;
+        let (id, trajectory) = self.sent.iter().find(|(id, _)| *id == report.trajectory_id)?;
+        Some((*id, trajectory, report.trajectory_s))
+    }
+
+    /// Replacements that were accepted, and refused.
+    #[must_use]
+    pub fn replacements(&self) -> (u64, u64) {
+        self.replacements
+    }
+
+    fn offer_message(&mut self, trajectory: &Trajectory, replaces: Replaces) -> bool {
         let Some(mut filled) = self.queue.trajectories.empty_box() else { return false };
         self.generation += 1;
         let trajectory_id = 1_000 + self.generation;
@@ -237,12 +269,20 @@ impl World {
             trajectory_id,
             generation: self.generation,
             robot_digest: self.settings.robot.digest,
-            replaces: Replaces::Rest,
+            replaces,
             trajectory: trajectory.clone(),
         };
         *filled = PreparedTrajectory::new(checked, &self.settings.robot.limits());
         self.queue.trajectories.offer(filled);
-        self.checker.offered(trajectory_id, trajectory);
+        let cut_s = match replaces {
+            Replaces::Rest => None,
+            Replaces::Cut { at_s, .. } => Some(at_s),
+        };
+        self.checker.offered(trajectory_id, trajectory, cut_s);
+        if self.sent.len() == SENT_MAX {
+            self.sent.pop_front();
+        }
+        self.sent.push_back((trajectory_id, trajectory.clone()));
         true
     }
 
@@ -424,7 +464,16 @@ impl World {
         while let Ok(report) = self.readers.reports.pop() {
             self.newest = Some(report);
         }
-        while self.queue.trajectories.trajectory_result().is_some() {}
+        while let Some(result) = self.queue.trajectories.trajectory_result() {
+            match result.decision {
+                Decision::Waits { .. } => self.replacements.0 += 1,
+                Decision::Cut(_) => self.replacements.1 += 1,
+                Decision::Accepted { .. }
+                | Decision::Stale { .. }
+                | Decision::NotAtBase { .. }
+                | Decision::NotReady { .. } => {}
+            }
+        }
     }
 
     fn take_answers(&mut self) -> Vec<Answered> {
