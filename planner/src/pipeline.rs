@@ -1,7 +1,8 @@
 //! The stages of planning, one after the other, each on a budget of evaluations.
 //!
-//! straight line -> RRT-Connect -> shortcuts -> a first proven motion -> improvement -> timing with rounded corners
-//! -> proof. From the first proven motion on there is an answer; later stages can only replace it by a better one.
+//! straight line -> RRT-Connect -> shortcuts -> timing with rounded corners -> proof -> improvement. The first path that is
+//! found is shortened, rounded and proven at once; from then on there is an answer, and later stages can only replace it by
+//! a better one. A longer deadline does the same work first, then more, so it can only give a better motion.
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::kind::{Improvement, PlannerKind};
@@ -29,6 +30,12 @@ const SEARCHES: u64 = 3;
 const MORE_SEARCHES: u64 = 60;
 /// What a corner costs in comparing paths: about what a stop there would (s).
 const CORNER_S: f64 = 0.3;
+/// Shortcuts tried a path.
+const SHORTCUTS: usize = 120;
+/// How far from its corners a motion may pass, widest first (rad, length of the difference of all joints).
+const BLENDS_RAD: [f64; 6] = [0.4, 0.2, 0.1, 0.05, 0.025, 0.01];
+/// Evaluations of a refinement's first round; each later one has twice as many.
+const FIRST_REFINEMENT: usize = 64;
 
 /// Evaluations granted a stage, from the deadline alone: about half of what a small controller does in the time,
 /// so that the clock cuts in on slow or busy machines only.
@@ -36,8 +43,6 @@ const CORNER_S: f64 = 0.3;
 struct StageBudgets {
     /// Poses checked by all searches.
     search_checks: usize,
-    /// Shortcuts tried a path.
-    shortcuts: usize,
     /// Evaluations of the refinement.
     refinements: usize,
     /// Timings of one path tried.
@@ -61,7 +66,6 @@ impl StageBudgets {
         let ms = counted_ms(options.deadline);
         Self {
             search_checks: search_checks(options.deadline),
-            shortcuts: (ms / 10).clamp(20, 200),
             refinements: ms,
             timings: (ms / 50).clamp(6, 40),
         }
@@ -163,18 +167,16 @@ impl<'a> Pipeline<'a> {
                     self.by_objective(&[(&line, LINE)]);
                 }
             }
-            PlannerKind::RrtConnect => self.search_alone(Searcher::RrtConnect, &line),
-            PlannerKind::Rrt => self.search_alone(Searcher::Rrt, &line),
-            PlannerKind::Rbf => self.search_alone(Searcher::Rbf, &line),
-            PlannerKind::Bfo => self.search_alone(Searcher::Bfo, &line),
+            PlannerKind::RrtConnect => self.search_first(Searcher::RrtConnect, &line),
+            PlannerKind::Rrt => self.search_first(Searcher::Rrt, &line),
+            PlannerKind::Rbf => self.search_first(Searcher::Rbf, &line),
+            PlannerKind::Bfo => self.search_first(Searcher::Bfo, &line),
             PlannerKind::Optimiser(method) => {
                 let evaluations = self.stage_budgets.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
                 let optimizer = (method.make)(setup);
                 if let Some(refined) = self.refine(&line, &*optimizer, evaluations, LINE) {
-                    let source = optimizer.name().to_uppercase();
-                    self.propose(&refined, &source);
-                    self.round(&refined, &source);
+                    self.round(&refined, &optimizer.name().to_uppercase());
                 }
             }
         }
@@ -182,21 +184,15 @@ impl<'a> Pipeline<'a> {
     }
 
     /// What one searcher finds, with rounded corners.
-    fn search_alone(&mut self, searcher: Searcher, line: &[JointArray]) {
-        if let Some((_, path)) = self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks) {
-            let source = searched(searcher);
-            self.propose(&path, &source);
-            self.round(&path, &source);
-        }
+    fn search_first(&mut self, searcher: Searcher, line: &[JointArray]) {
+        self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks);
     }
 
     /// A path round what blocks the straight line: searched, and improved.
     fn around(&mut self, line: &[JointArray]) {
         let searcher = Searcher::RrtConnect;
         let first = self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks);
-        let Some((estimate_s, path)) = first else { return };
-        let source = searched(searcher);
-        self.propose(&path, &source);
+        let Some((_, path)) = first else { return };
         match self.options.improvement {
             _ if self.evaluator.objective != Objective::Time => {
                 self.by_objective(&[(&path, "that"), (line, LINE)]);
@@ -204,14 +200,10 @@ impl<'a> Pipeline<'a> {
             Improvement::Nothing => {}
             Improvement::Searches => {
                 let more = SEARCHES..SEARCHES + MORE_SEARCHES;
-                let found = self.search(searcher, line, more, self.stage_budgets.refinements * refine::POSES);
-                if let Some((_, better)) = found.filter(|(s, _)| *s < estimate_s) {
-                    self.round(&better, &source);
-                }
+                self.search(searcher, line, more, self.stage_budgets.refinements * refine::POSES);
             }
             Improvement::Method(method) => self.refine_around(method, &[(&path, "that"), (line, LINE)]),
         }
-        self.round(&path, &source);
     }
 
     /// Looks for motions that are better by another measure than time.
@@ -229,15 +221,21 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Refinements from several paths, since each stays near where it starts.
+    /// Refinements from several paths, since each stays near where it starts: rounds of more and more evaluations, so that
+    /// a larger budget begins with what a smaller one does.
     fn refine_around(&mut self, method: &Method, starts: &[(&[JointArray], &str)]) {
-        let each = self.stage_budgets.refinements / starts.len().max(1);
-        let optimizer = (method.make)(Setup { reading: self.options.reading, evaluations: Some(each) });
-        let source = optimizer.name().to_uppercase();
-        let refined: Vec<_> =
-            starts.iter().filter_map(|(path, from)| self.refine(path, &*optimizer, each, from)).collect();
-        for path in refined {
-            self.round(&path, &source);
+        let mut left = self.stage_budgets.refinements;
+        let mut each = FIRST_REFINEMENT.min(left / starts.len().max(1));
+        while each > 0 && each * starts.len() <= left && !self.space.budget.is_over() {
+            left -= each * starts.len();
+            let optimizer = (method.make)(Setup { reading: self.options.reading, evaluations: Some(each) });
+            let source = optimizer.name().to_uppercase();
+            for (path, from) in starts {
+                if let Some(refined) = self.refine(path, &*optimizer, each, from) {
+                    self.round(&refined, &source);
+                }
+            }
+            each *= 2;
         }
     }
 
@@ -255,7 +253,10 @@ impl<'a> Pipeline<'a> {
 
     /// The corners of a whole motion: the exit path from the margin comes before the path.
     fn whole_path(&self, path: &[JointArray]) -> Vec<JointArray> {
-        self.margin_exit.iter().flat_map(|l| l.first_rad.iter()).chain(path).copied().collect()
+        let mut whole: Vec<JointArray> =
+            self.margin_exit.iter().flat_map(|l| l.first_rad.iter()).chain(path).copied().collect();
+        whole.dedup_by(|b, a| a.iter().zip(b.iter()).all(|(a, b)| (a - b).abs() <= SAME_RAD));
+        whole
     }
 
     /// What a motion must keep, and when; `None` when it does not leave the margin that it begins in.
@@ -329,13 +330,11 @@ impl<'a> Pipeline<'a> {
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
-            if self.best.is_none() {
-                // An answer, before time is spent on better ones.
-                self.propose(&path, searcher.title());
-            }
-            shorten(&self.space, &mut path, self.stage_budgets.shortcuts, &mut rng);
+            shorten(&self.space, &mut path, SHORTCUTS, &mut rng);
             let estimate_s = self.estimate_s(&path);
             if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
+                // At once: an answer before time is spent on better ones.
+                self.round(&path, &searched(searcher));
                 best = Some((estimate_s, path));
             }
         }
@@ -381,6 +380,9 @@ impl<'a> Pipeline<'a> {
         let evaluations = found.progress.evaluations;
         self.space.note_checks(evaluations * refine::POSES);
         let verdict = if free { "" } else { ", collides" };
+        // Of several rounds the last says enough.
+        let start = format!("{name} from {from} (");
+        self.tried.retain(|tried| !tried.starts_with(&start));
         self.tried.push(format!("{name} from {from} ({evaluations} evaluations{verdict})"));
         if !free {
             return None;
@@ -393,50 +395,52 @@ impl<'a> Pipeline<'a> {
     /// Times a path with a stop at every corner and proves the motion.
     fn propose(&mut self, path: &[JointArray], how: &str) {
         let corners = self.whole_path(path);
-        let waits = vec![1.0; corners.len().saturating_sub(2)];
-        let timed = self.path(&corners).fastest(&waits, self.space.budget);
-        match timed {
-            Some(timed) => self.prove(&corners, timed, how),
+        match self.path(&corners).stopping() {
+            Some(timed) => self.prove(&timed, how),
             None => self.untimed = true,
         }
     }
 
-    /// Rounds the corners of a path as far as that is free and saves time, and proves the motion.
+    /// Rounds the corners of a path as far as that is free, and proves the motion; stops at them where nothing else is.
     fn round(&mut self, path: &[JointArray], source: &str) {
         let whole = self.whole_path(path);
         let corners = whole.len().saturating_sub(2);
-        if corners == 0 {
-            return self.propose(path, source);
+        match self.rounded(&whole) {
+            Some(timed) => self.prove(&timed, &format!("{source}, {corners} corners rounded")),
+            None => self.propose(path, source),
         }
+    }
+
+    /// The widest blend of all corners that is free, then of one corner after the other: a tight one must not hold back the
+    /// rest.
+    fn rounded(&self, whole: &[JointArray]) -> Option<Timed> {
+        let corners = whole.len().saturating_sub(2);
         let mut left = self.stage_budgets.timings;
-        let mut best: Option<Timed> = None;
-        let mut attempt = |waits: &[f64], best: &mut Option<Timed>| {
+        let mut attempt = |blends_rad: &[f64]| {
             if left == 0 || self.space.budget.is_over() {
-                return;
+                return None;
             }
             left -= 1;
-            let Some(timed) = self.path(&whole).fastest(waits, self.space.budget) else { return };
-            let duration_s = timed.trajectory.duration_s();
-            let shorter = best.as_ref().is_none_or(|b| duration_s < b.trajectory.duration_s());
-            if shorter && self.keeps_apart(&timed.trajectory) {
-                *best = Some(timed);
-            }
+            self.path(whole).rounded(blends_rad).filter(|timed| self.keeps_apart(&timed.trajectory))
         };
-        for wait in [0.0, 0.25, 0.5, 0.75, 1.0] {
-            attempt(&vec![wait; corners], &mut best);
-        }
-        // Then one corner after the other: a tight one must not hold back the rest.
-        for step in [0.5, 0.25] {
+        let found = BLENDS_RAD
+            .iter()
+            .enumerate()
+            .find_map(|(width, blend_rad)| attempt(&vec![*blend_rad; corners]).map(|timed| (width, timed)));
+        let (width, mut best) = found?;
+        let mut blends_rad = vec![BLENDS_RAD[width]; corners];
+        for wider in BLENDS_RAD[..width].iter().rev() {
             for corner in 0..corners {
-                let Some(shape) = best.as_ref().map(|b| b.shape.clone()) else { return };
-                let mut waits = shape.waits;
-                waits[corner] = f64::max(waits[corner] - step, 0.0);
-                attempt(&waits, &mut best);
+                let narrow = std::mem::replace(&mut blends_rad[corner], *wider);
+                match attempt(&blends_rad) {
+                    Some(timed) if timed.trajectory.duration_s() < best.trajectory.duration_s() => {
+                        best = timed;
+                    }
+                    Some(_) | None => blends_rad[corner] = narrow,
+                }
             }
         }
-        if let Some(timed) = best {
-            self.prove(&whole, timed, &format!("{source}, {corners} corners rounded"));
-        }
+        Some(best)
     }
 
     /// Keeps a verified motion if it is better than what there is.
@@ -449,8 +453,9 @@ impl<'a> Pipeline<'a> {
 
     /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is shorter
     /// than what there is.
-    fn prove(&mut self, corners: &[JointArray], mut timed: Timed, how: &str) {
+    fn prove(&mut self, timed: &Timed, how: &str) {
         const SLOWER: f64 = 1.002;
+        let mut timed = timed.clone();
         for _ in 0..6 {
             let Some(stretches) = self.stretches(&timed.trajectory) else { return };
             let left_s = stretches.first().map(|s| s.span_s[1]);
@@ -463,7 +468,7 @@ impl<'a> Pipeline<'a> {
                 Err(violation) => {
                     let limit = matches!(violation, Violation::Limit { .. });
                     self.violation = Some(violation);
-                    let Some(slower) = self.path(corners).slower(&timed, SLOWER).filter(|_| limit) else {
+                    let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else {
                         return;
                     };
                     timed = slower;

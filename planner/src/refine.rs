@@ -94,7 +94,7 @@ impl<'a> PathProblem<'a> {
     fn energy_j(&self, dynamics: &Dynamics, corners_rad: &[JointArray]) -> f64 {
         let limits = self.world.robot().limits();
         let path = Path { corners_rad, joints: self.world.joints(), limits: &limits };
-        path.rough().map_or(f64::INFINITY, |timed| dynamics.spent_roughly_j(&timed.trajectory))
+        path.rough().map_or(f64::INFINITY, |motion| dynamics.spent_roughly_j(&motion))
     }
 
     /// The path with three control points, some scattered around it, and the straight line.

@@ -4,6 +4,7 @@ mod live;
 mod offline;
 mod papers;
 mod planners;
+mod timing;
 
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
@@ -17,6 +18,7 @@ pub(crate) use offline::{
 
 pub(crate) use papers::PapersArgs;
 pub(crate) use planners::PlannersArgs;
+pub(crate) use timing::TimingArgs;
 
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;

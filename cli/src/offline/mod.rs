@@ -14,4 +14,5 @@ pub(crate) mod plot;
 mod protocol_line;
 pub(crate) mod sample;
 mod stops_bench;
+mod timing_bench;
 pub(crate) mod verify;
