@@ -38,6 +38,6 @@ pub use taustream_arm::rng;
 pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
-pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan};
+pub use plan::{Blend, Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
 pub use position::{PositionError, PositionTask, Reached, plan_to_position};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -20,8 +20,20 @@ use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
 pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";
 
+/// How far from the corners of its path a motion may pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Blend {
+    /// As far as the scene's margins allow, up to 0.4 rad.
+    #[default]
+    Clearance,
+    /// The length of the difference of all joints, rad; 0 stops at each corner.
+    Radians(f64),
+    /// How far any point of the arm may be from where it would be on the path, m; 0 stops at each corner.
+    Metres(f64),
+}
+
 /// How to plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanOptions {
     /// Seed of every random choice: one seed gives one answer, unless the clock cuts the work short (then
     /// [`Plan::how`] says so).
@@ -36,6 +48,8 @@ pub struct PlanOptions {
     pub improvement: Improvement,
     /// What makes one motion better than another.
     pub objective: Objective,
+    /// How far from the corners of its path the motion may pass.
+    pub blend: Blend,
     /// True when the clock aborts at the deadline. Without it only the budget that is derived from the deadline ends the
     /// work, so that one seed gives one answer on any machine, however busy: for comparisons, not for arms.
     pub keeps_deadline: bool,
@@ -45,8 +59,8 @@ impl Default for PlanOptions {
     fn default() -> Self {
         let (deadline, planner) = (Duration::from_millis(2000), PlannerKind::Auto);
         let (reading, improvement) = (Reading::Corrected, Improvement::default());
-        let objective = Objective::default();
-        Self { seed: 0, deadline, planner, reading, improvement, objective, keeps_deadline: true }
+        let (objective, blend) = (Objective::default(), Blend::default());
+        Self { seed: 0, deadline, planner, reading, improvement, objective, blend, keeps_deadline: true }
     }
 }
 
@@ -83,14 +97,17 @@ pub enum PoseOf {
     Start,
     /// Where it shall end.
     Goal,
+    /// A pose that it shall pass, counted from 0.
+    Via(usize),
 }
 
 impl std::fmt::Display for PoseOf {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Start => "start",
-            Self::Goal => "goal",
-        })
+        match self {
+            Self::Start => f.write_str("start"),
+            Self::Goal => f.write_str("goal"),
+            Self::Via(number) => write!(f, "way point {}", number + 1),
+        }
     }
 }
 
@@ -117,6 +134,7 @@ pub enum PlanError {
         match which {
             PoseOf::Start => "choose a start inside, or lead an arm that stands there back with `taustream recover`",
             PoseOf::Goal => "choose a goal inside",
+            PoseOf::Via(_) => "choose a way point inside",
         }
     )]
     OutsideLimits {
@@ -145,7 +163,8 @@ pub enum PlanError {
     /// links; a goal must keep [`SweepRules::EDGE_END_M`] more.
     #[error("{which} nearer than the margin: {contact}{}; choose another {which} or a smaller margin", match which {
         PoseOf::Start => String::new(),
-        PoseOf::Goal => format!(" (a goal keeps {} m more, or no way to it can be proven)", SweepRules::EDGE_END_M),
+        PoseOf::Via(_) => format!(" (a way point keeps {} m more, or no way to it can be proven)", SweepRules::EDGE_END_M),
+    PoseOf::Goal => format!(" (a goal keeps {} m more, or no way to it can be proven)", SweepRules::EDGE_END_M),
     })]
     InsideMargin {
         /// Which pose.
@@ -246,6 +265,40 @@ pub fn plan(
     let (start_rad, goal_rad) = (*start_rad, *goal_rad);
     let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::Scene };
     plan_until(&task, options, None)
+}
+
+/// Plans a verified motion that passes poses in their order, each within the blend of the options: straight from one to the
+/// next where that is free, around what blocks it elsewhere.
+///
+/// # Errors
+/// What is wrong with a pose, or what was tried in vain.
+pub fn plan_through(
+    robot: &Robot,
+    scene: &Scene,
+    poses_rad: &[JointArray],
+    options: &PlanOptions,
+) -> Result<Plan, PlanError> {
+    let budget = Budget::until(options.clock(), None);
+    let evaluator = Evaluator::new(options.objective, robot)?;
+    let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
+    let last = poses_rad.len().saturating_sub(1);
+    let mut inside_rad = Vec::with_capacity(poses_rad.len());
+    for (i, pose_rad) in poses_rad.iter().enumerate() {
+        let which = match i {
+            0 => PoseOf::Start,
+            _ if i == last => PoseOf::Goal,
+            _ => PoseOf::Via(i - 1),
+        };
+        check_pose(robot, which, pose_rad)?;
+        let pose_rad = nearest_inside(robot, pose_rad);
+        // A goal keeps more, or no edge to it can be proven; so must what lies between.
+        let more_m = if i == 0 { 0.0 } else { SweepRules::EDGE_END_M };
+        if let Some(contact) = world.contact_within(&pose_rad, more_m) {
+            return Err(PlanError::too_close(which, contact));
+        }
+        inside_rad.push(pose_rad);
+    }
+    Pipeline::new(&world, &budget, options, &evaluator).run_through(&inside_rad)
 }
 
 /// What to plan.

@@ -52,8 +52,8 @@ fn planned_motions_in_random_scenes_are_safe_by_an_independent_check() {
     assert!(found >= 10 && round >= 4, "{found} found, {round} of them round something");
 }
 
-/// Goal: joints that are slow against what they accelerate at take many strokes a radian; a message holds 512, and
-/// the motion must be found all the same, near the time that its velocity limit asks for.
+/// Goal: joints that are slow against what they accelerate at move near the time that their velocity limit asks for, with
+/// few strokes: a message holds 512, and a cut has to keep some of them beside its own.
 #[test]
 fn long_motion_of_slow_joints_fits_into_one_message_near_full_speed() {
     for velocity_rad_s in [0.5, 0.1, 0.01, 1e-3] {
@@ -67,7 +67,8 @@ fn long_motion_of_slow_joints_fits_into_one_message_near_full_speed() {
         let plan = plan(&robot, &empty, &start, &goal, &options(0, 500, PlannerKind::Auto))
             .unwrap_or_else(|e| panic!("{velocity_rad_s} rad/s: {e}"));
         let (took_s, least_s) = (plan.proof.duration_s, 6.0 / velocity_rad_s);
-        assert!(took_s < 1.05 * least_s + 0.5, "{velocity_rad_s} rad/s: {took_s} s against {least_s} s");
+        assert!(plan.trajectory.strokes().len() <= 64, "{velocity_rad_s} rad/s");
+        assert!(took_s < 1.07 * least_s + 0.5, "{velocity_rad_s} rad/s: {took_s} s against {least_s} s");
         assert!(verify(&robot, &empty, &plan.trajectory).is_ok(), "{velocity_rad_s} rad/s");
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_planner::optimize::{METHODS, Method, Reading};
-use taustream_planner::{Objective, PlannerKind};
+use taustream_planner::{Blend, Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\
 Examples:
@@ -16,6 +16,7 @@ Examples:
   taustream plan ... --planner bfoa --reading printed
   taustream plan ... --objective energy --deadline-ms 5000
   taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
+  taustream plan ... --via 0.3,-1.2,1.2,-1.6,-1.57,0 --via 0.8,-1,1,-1.6,-1.57,0 --blend-rad 0.1
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
 The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
@@ -61,6 +62,17 @@ pub(crate) struct PlanArgs {
     /// orientation of the tip is free.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) to_position: Option<Position>,
+    /// Pose to pass on the way, rad, within the blend; give it once for each pose, in their order.
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, conflicts_with = "to_position")]
+    pub(crate) via: Vec<Angles>,
+    /// How far from its corners the motion may pass: the length of the difference of all joints, rad; 0 stops at each.
+    ///
+    /// Without it, corners are rounded as far as the scene's margins allow, up to 0.4 rad.
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true, value_parser = blend_amount)]
+    blend_rad: Option<f64>,
+    /// The same as a distance by which any point of the arm may be off, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "blend_rad", value_parser = blend_amount)]
+    blend_m: Option<f64>,
     /// Optimiser that searches poses for --to-position; without it the best two alternate.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg"], value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
@@ -92,6 +104,12 @@ impl PlanArgs {
             (Some(angles), _) => (angles, "--start"),
             (None, None) => (Angles::NONE, "--start"),
         }
+    }
+
+    /// How far from its corners the motion may pass.
+    pub(crate) fn blend(&self) -> Blend {
+        let in_metres = self.blend_m.map(Blend::Metres);
+        self.blend_rad.map(Blend::Radians).or(in_metres).unwrap_or_default()
     }
 
     /// Where to go, and the option that says so.
@@ -395,6 +413,13 @@ fn measuring_s(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if s == 0.0 || (0.1..=3_600.0).contains(&s) => Ok(s),
         _ => Err("expected 0, or seconds from 0.1 to 3600".to_owned()),
+    }
+}
+
+fn blend_amount(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(amount) if (0.0..=10.0).contains(&amount) => Ok(amount),
+        _ => Err("expected a number from 0 to 10".to_owned()),
     }
 }
 

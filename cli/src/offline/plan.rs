@@ -13,7 +13,7 @@ use taustream_arm::{Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::optimize::Method;
 use taustream_planner::{
-    Plan, PlanOptions, PositionError, PositionTask, StartMargin, plan, plan_to_position,
+    Plan, PlanOptions, PositionError, PositionTask, StartMargin, plan, plan_through, plan_to_position,
 };
 
 /// The summary of a plan.
@@ -83,6 +83,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         planner: args.planner,
         reading: args.reading,
         objective: args.objective,
+        blend: args.blend(),
         ..PlanOptions::default()
     };
     let end = End::of(args, &robot)?;
@@ -102,6 +103,8 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
 /// What a motion is planned to.
 enum End {
     Pose(JointArray),
+    /// The last of several poses.
+    Through(Vec<JointArray>),
     Position([f64; 3], Option<&'static Method>),
 }
 
@@ -115,7 +118,15 @@ impl End {
     fn of(args: &PlanArgs, robot: &Robot) -> Result<Self, Failure> {
         match (args.goal(), args.to_position) {
             (_, Some(Position(target_m))) => Ok(Self::Position(target_m, args.reach_with)),
-            (Some((goal, option)), None) => goal.pose_of(robot, option).map(Self::Pose),
+            (Some((goal, option)), None) if args.via.is_empty() => {
+                goal.pose_of(robot, option).map(Self::Pose)
+            }
+            (Some((goal, option)), None) => {
+                let mut poses_rad =
+                    args.via.iter().map(|via| via.pose_of(robot, "--via")).collect::<Result<Vec<_>, _>>()?;
+                poses_rad.push(goal.pose_of(robot, option)?);
+                Ok(Self::Through(poses_rad))
+            }
             (None, None) => Err(Failure::Usage("give --goal, --goal-deg or --to-position".to_owned())),
         }
     }
@@ -126,12 +137,18 @@ impl End {
         start_rad: JointArray,
         options: &PlanOptions,
     ) -> Result<Planned, PositionError> {
-        match *self {
-            Self::Pose(goal_rad) => {
-                let plan = plan(robot, scene, &start_rad, &goal_rad, options)?;
+        match self {
+            Self::Through(poses_rad) => {
+                let all_rad: Vec<JointArray> =
+                    std::iter::once(&start_rad).chain(poses_rad).copied().collect();
+                let plan = plan_through(robot, scene, &all_rad, options)?;
                 Ok(Planned { plan, position: None })
             }
-            Self::Position(target_m, method) => {
+            Self::Pose(goal_rad) => {
+                let plan = plan(robot, scene, &start_rad, goal_rad, options)?;
+                Ok(Planned { plan, position: None })
+            }
+            &Self::Position(target_m, method) => {
                 let margin = StartMargin::Scene;
                 let task = PositionTask { robot, scene, start_rad, target_m, margin, method };
                 let reached = plan_to_position(&task, options, None)?;

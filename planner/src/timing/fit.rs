@@ -18,8 +18,8 @@ use taustream_motion::stroke::Phi;
 
 /// Samples of a spacing in a fit.
 const PHASES: usize = 2;
-/// Samples of a spacing where peaks are looked for, its start among them: there the jerk has its kinks.
-const PEAK_PHASES: usize = 16;
+/// Samples of a stroke, at least, where peaks are looked for, the starts of others among them: there the jerk has its kinks.
+const PEAK_SAMPLES: usize = 160;
 /// Orders that are bounded: position, velocity, acceleration, jerk, and the deltas themselves.
 pub const ORDERS: usize = 5;
 /// The order of the deltas: bounds of the samples in the first spacings are those of the strokes that start there.
@@ -60,10 +60,14 @@ impl Grid {
         spacing as f64 + instant(phase)
     }
 
-    /// Positions at the samples.
-    pub(super) fn values(&self, deltas: &[f64]) -> Vec<f64> {
-        let taps = (0..PHASES).map(|phase| taps(self, 0, instant(phase))).collect();
-        let mut all = vec![0.0; self.samples()];
+    /// Positions at so many even instants of each spacing: all of the first instant, then those of the next.
+    pub(super) fn values(&self, deltas: &[f64], phases: usize) -> Vec<f64> {
+        self.derivative(deltas, 0, phases)
+    }
+
+    fn derivative(&self, deltas: &[f64], order: usize, phases: usize) -> Vec<f64> {
+        let taps = (0..phases).map(|phase| taps(self, order, phase as f64 / phases as f64)).collect();
+        let mut all = vec![0.0; self.spacings() * phases];
         Row { weight: 1.0, taps }.apply(self, &Values::of(deltas, self.overlap), &mut all);
         all
     }
@@ -71,11 +75,7 @@ impl Grid {
     /// Largest magnitude of a derivative of what strokes with such deltas do, in spacings.
     #[must_use]
     pub fn peak(&self, deltas: &[f64], order: usize) -> f64 {
-        let taps =
-            (0..PEAK_PHASES).map(|phase| taps(self, order, phase as f64 / PEAK_PHASES as f64)).collect();
-        let values = Values::of(deltas, self.overlap);
-        let mut all = vec![0.0; self.spacings() * PEAK_PHASES];
-        Row { weight: 1.0, taps }.apply(self, &values, &mut all);
+        let all = self.derivative(deltas, order, PEAK_SAMPLES.div_ceil(self.overlap));
         all.iter().fold(0.0, |most, value| most.max(value.abs()))
     }
 }

@@ -20,11 +20,15 @@ const EXPONENT: u32 = 7;
 /// Rounds of a fit.
 const ROUNDS: usize = 16;
 /// Durations that are tried, in durations of the law.
-const AIMS: [f64; 4] = [1.0, 1.06, 1.15, 1.3];
+const AIMS: [f64; 6] = [0.92, 0.96, 1.0, 1.05, 1.15, 1.3];
 /// Width of the tube of a fit, in what is allowed.
-const NARROWER: f64 = 0.8;
+const NARROWER: f64 = 0.7;
+/// Poses a spacing at which the distance from the path is measured.
+const PHASES: usize = 8;
+/// Largest share of the deviation there: a little more is possible between them.
+const USED_MAX: f64 = 0.99;
 /// What leaving the tube by its radius counts, against exceeding a limit by itself.
-const TUBE_WEIGHT: f64 = 1.0;
+const TUBE_WEIGHT: f64 = 2.0;
 
 /// Strokes through a path, and how far from it they are at most.
 pub(super) struct Rounded {
@@ -43,7 +47,7 @@ pub(super) fn through(path: &Path, deviations_rad: &[f64]) -> Option<Rounded> {
     let tube = Tube::new(path, deviations_rad);
     AIMS.iter().find_map(|aim| {
         let rounded = Fitted::new(path, &law, grid, *aim)?.run(&tube)?;
-        (rounded.used <= 1.0).then_some(rounded)
+        (rounded.used <= USED_MAX).then_some(rounded)
     })
 }
 
@@ -206,14 +210,15 @@ impl<'a> Fitted<'a> {
         (spacing_s.is_finite() && used.is_finite()).then_some(Rounded { strokes, deviation_rad, used })
     }
 
-    /// Farthest from the path at the samples, and the largest share of the tube's radius.
+    /// Farthest from the path, and the largest share of the tube's radius, at a fine sampling.
     fn off(&self, tube: &Tube) -> [f64; 2] {
-        let values: Vec<Vec<f64>> = self.deltas.iter().map(|deltas| self.grid.values(deltas)).collect();
+        let values: Vec<Vec<f64>> = self.deltas.iter().map(|d| self.grid.values(d, PHASES)).collect();
         let base_rad = &self.path.corners_rad[0];
-        self.segments.iter().enumerate().fold([0.0; 2], |most, (sample, segment)| {
+        let spacings = self.grid.spacings();
+        (0..spacings * PHASES).fold([0.0; 2], |most, sample| {
             let mut pose_rad = *base_rad;
             pose_rad.iter_mut().zip(&values).for_each(|(pose, values)| *pose += values[sample]);
-            let [off_rad, used] = tube.off(*segment, &pose_rad);
+            let [off_rad, used] = tube.off(self.segments[sample % spacings], &pose_rad);
             [f64::max(most[0], off_rad), f64::max(most[1], used)]
         })
     }

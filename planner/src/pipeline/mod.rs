@@ -3,6 +3,9 @@
 //! straight line -> RRT-Connect -> shortcuts -> timing with rounded corners -> proof -> improvement. The first path that is
 //! found is shortened, rounded and proven at once; from then on there is an answer, and later stages can only replace it by
 //! a better one. A longer deadline does the same work first, then more, so it can only give a better motion.
+mod corners;
+mod through;
+
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::kind::{Improvement, PlannerKind};
@@ -32,8 +35,9 @@ const MORE_SEARCHES: u64 = 60;
 const CORNER_S: f64 = 0.3;
 /// Shortcuts tried a path.
 const SHORTCUTS: usize = 120;
-/// How far from its corners a motion may pass, widest first (rad, length of the difference of all joints).
-const BLENDS_RAD: [f64; 6] = [0.4, 0.2, 0.1, 0.05, 0.025, 0.01];
+/// A motion that misses a limit is made slower by this factor, a few times.
+const SLOWER: f64 = 1.002;
+const SLOWER_TRIES: usize = 6;
 /// Evaluations of a refinement's first round; each later one has twice as many.
 const FIRST_REFINEMENT: usize = 64;
 
@@ -396,51 +400,11 @@ impl<'a> Pipeline<'a> {
     fn propose(&mut self, path: &[JointArray], how: &str) {
         let corners = self.whole_path(path);
         match self.path(&corners).stopping() {
-            Some(timed) => self.prove(&timed, how),
+            Some(timed) => {
+                self.prove(&timed, how);
+            }
             None => self.untimed = true,
         }
-    }
-
-    /// Rounds the corners of a path as far as that is free, and proves the motion; stops at them where nothing else is.
-    fn round(&mut self, path: &[JointArray], source: &str) {
-        let whole = self.whole_path(path);
-        let corners = whole.len().saturating_sub(2);
-        match self.rounded(&whole) {
-            Some(timed) => self.prove(&timed, &format!("{source}, {corners} corners rounded")),
-            None => self.propose(path, source),
-        }
-    }
-
-    /// The widest blend of all corners that is free, then of one corner after the other: a tight one must not hold back the
-    /// rest.
-    fn rounded(&self, whole: &[JointArray]) -> Option<Timed> {
-        let corners = whole.len().saturating_sub(2);
-        let mut left = self.stage_budgets.timings;
-        let mut attempt = |blends_rad: &[f64]| {
-            if left == 0 || self.space.budget.is_over() {
-                return None;
-            }
-            left -= 1;
-            self.path(whole).rounded(blends_rad).filter(|timed| self.keeps_apart(&timed.trajectory))
-        };
-        let found = BLENDS_RAD
-            .iter()
-            .enumerate()
-            .find_map(|(width, blend_rad)| attempt(&vec![*blend_rad; corners]).map(|timed| (width, timed)));
-        let (width, mut best) = found?;
-        let mut blends_rad = vec![BLENDS_RAD[width]; corners];
-        for wider in BLENDS_RAD[..width].iter().rev() {
-            for corner in 0..corners {
-                let narrow = std::mem::replace(&mut blends_rad[corner], *wider);
-                match attempt(&blends_rad) {
-                    Some(timed) if timed.trajectory.duration_s() < best.trajectory.duration_s() => {
-                        best = timed;
-                    }
-                    Some(_) | None => blends_rad[corner] = narrow,
-                }
-            }
-        }
-        Some(best)
     }
 
     /// Keeps a verified motion if it is better than what there is.
@@ -451,30 +415,29 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is shorter
-    /// than what there is.
-    fn prove(&mut self, timed: &Timed, how: &str) {
-        const SLOWER: f64 = 1.002;
+    /// Proves a timed path, a little slower if its peaks were met between samples, and keeps it if it is better than what there
+    /// is; false when it is not proven.
+    fn prove(&mut self, timed: &Timed, how: &str) -> bool {
         let mut timed = timed.clone();
-        for _ in 0..6 {
-            let Some(stretches) = self.stretches(&timed.trajectory) else { return };
+        for _ in 0..SLOWER_TRIES {
+            let Some(stretches) = self.stretches(&timed.trajectory) else { return false };
             let left_s = stretches.first().map(|s| s.span_s[1]);
             match verify_stretches(&stretches, &timed.trajectory, self.space.budget) {
                 Ok(proof) => {
                     let note = self.margin_exit.as_ref().and_then(|l| l.note.as_ref());
                     let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
-                    return self.keep(timed.trajectory, proof, format!("{note}{how}"));
+                    self.keep(timed.trajectory, proof, format!("{note}{how}"));
+                    return true;
                 }
                 Err(violation) => {
                     let limit = matches!(violation, Violation::Limit { .. });
                     self.violation = Some(violation);
-                    let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else {
-                        return;
-                    };
+                    let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else { return false };
                     timed = slower;
                 }
             }
         }
+        false
     }
 
     fn finish(self) -> Result<Plan, PlanError> {

@@ -1,0 +1,52 @@
+//! A path through given poses, leg by leg.
+use super::{Pipeline, SHORTCUTS};
+use crate::plan::{Plan, PlanError};
+use crate::rng::SeededRng;
+use crate::search::Searcher;
+use crate::shortcut::shorten;
+use taustream_motion::JointArray;
+
+impl Pipeline<'_> {
+    /// A motion that passes poses in their order.
+    ///
+    /// # Errors
+    /// What was tried in vain.
+    pub fn run_through(mut self, poses_rad: &[JointArray]) -> Result<Plan, PlanError> {
+        let legs = poses_rad.len().saturating_sub(1);
+        let mut whole: Vec<JointArray> = poses_rad.first().copied().into_iter().collect();
+        for (number, leg) in poses_rad.windows(2).enumerate() {
+            let Some(path) = self.leg(leg, number, self.stage_budgets.search_checks / legs.max(1)) else {
+                return self.finish();
+            };
+            whole.extend(path.iter().skip(1));
+        }
+        match whole.as_slice() {
+            [pose_rad] => self.stay(pose_rad),
+            [_, _] => self.propose(&whole, "straight line"),
+            _ => self.round(&whole, &format!("through {} poses", poses_rad.len())),
+        }
+        self.finish()
+    }
+
+    /// The straight line between two poses, or a shortened path around what blocks it.
+    fn leg(&mut self, leg: &[JointArray], number: usize, checks_max: usize) -> Option<Vec<JointArray>> {
+        let [from, to] = leg else { return None };
+        if self.space.is_edge_free(from, to) {
+            return Some(leg.to_vec());
+        }
+        let searcher = Searcher::RrtConnect;
+        let mut rng = SeededRng::new(self.options.seed, 10 + number as u64);
+        let search = searcher.search(&self.space, [from, to], checks_max, &mut rng);
+        let verdict = if search.path.is_some() { "" } else { ", nothing found" };
+        self.tried.push(format!(
+            "{} for leg {} ({} {}{verdict})",
+            searcher.title(),
+            number + 1,
+            search.nodes,
+            searcher.unit()
+        ));
+        let mut path = search.path?;
+        shorten(&self.space, &mut path, SHORTCUTS, &mut rng);
+        Some(path)
+    }
+}
