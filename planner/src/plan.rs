@@ -20,7 +20,7 @@ use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
 pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";
 
-/// How far from the corners of its path a motion may pass.
+/// How far from its path a motion may be where it rounds corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Blend {
     /// As far as the scene's margins allow, up to 0.4 rad.

@@ -62,10 +62,12 @@ pub(crate) struct PlanArgs {
     /// orientation of the tip is free.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) to_position: Option<Position>,
-    /// Pose to pass on the way, rad, within the blend; give it once for each pose, in their order.
+    /// Pose to pass on the way, rad; give it once for each pose, in their order.
+    ///
+    /// The motion keeps within the blend of the straight lines that join the poses.
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, conflicts_with = "to_position")]
     pub(crate) via: Vec<Angles>,
-    /// How far from its corners the motion may pass: the length of the difference of all joints, rad; 0 stops at each.
+    /// How far from its path the motion may be at corners: length of the difference of all joints, rad; 0 stops at each.
     ///
     /// Without it, corners are rounded as far as the scene's margins allow, up to 0.4 rad.
     #[arg(long, value_name = "RAD", allow_negative_numbers = true, value_parser = blend_amount)]

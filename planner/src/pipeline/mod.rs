@@ -33,6 +33,8 @@ const SEARCHES: u64 = 3;
 const MORE_SEARCHES: u64 = 60;
 /// What a corner costs in comparing paths: about what a stop there would (s).
 const CORNER_S: f64 = 0.3;
+/// A searched path is timed when it is estimated to be better than those before by this factor.
+const CLEARLY_LESS: f64 = 0.97;
 /// Shortcuts tried a path.
 const SHORTCUTS: usize = 120;
 /// A motion that misses a limit is made slower by this factor, a few times.
@@ -71,7 +73,7 @@ impl StageBudgets {
         Self {
             search_checks: search_checks(options.deadline),
             refinements: ms,
-            timings: (ms / 50).clamp(6, 40),
+            timings: (ms / 150).clamp(6, 12),
         }
     }
 }
@@ -109,6 +111,8 @@ pub struct Pipeline<'a> {
     /// What was done, as text.
     tried: Vec<String>,
     best: Option<Best>,
+    /// The least estimate of a path that was timed with rounded corners.
+    least_estimate_s: f64,
     /// Why the latest motion was not proven.
     violation: Option<Violation>,
     /// A path had no timing.
@@ -133,6 +137,7 @@ impl<'a> Pipeline<'a> {
             limits: world.robot().limits(),
             tried: Vec::new(),
             best: None,
+            least_estimate_s: f64::INFINITY,
             violation: None,
             untimed: false,
         }
@@ -336,9 +341,15 @@ impl<'a> Pipeline<'a> {
             found += 1;
             shorten(&self.space, &mut path, SHORTCUTS, &mut rng);
             let estimate_s = self.estimate_s(&path);
-            if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
-                // At once: an answer before time is spent on better ones.
+            let is_new = estimate_s < CLEARLY_LESS * self.least_estimate_s;
+            if is_new {
+                if self.best.is_none() {
+                    // An answer before time is spent on better ones.
+                    self.propose(&path, &searched(searcher));
+                }
                 self.round(&path, &searched(searcher));
+            }
+            if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
                 best = Some((estimate_s, path));
             }
         }

@@ -87,16 +87,16 @@ impl Path<'_> {
         Some(Timed { trajectory, deviation_rad: 0.0 })
     }
 
-    /// The motion that passes each inner corner at no more than its distance; `None` when there is none, or one that has to be
-    /// so slow that a stop is better.
+    /// The motion that rounds each inner corner and stays within its distance of the path; `None` when there is none, or one that has to be
+    /// so slow that a stop is better, or none that is expected in less than `most_s`.
     #[must_use]
-    pub fn rounded(&self, deviations_rad: &[f64]) -> Option<Timed> {
+    pub fn rounded(&self, deviations_rad: &[f64], most_s: f64) -> Option<Timed> {
         let inner = self.corners_rad.len().checked_sub(2)?;
         let is_usable = |deviation_rad: &f64| deviation_rad.is_finite() && *deviation_rad > 0.0;
         if inner == 0 || deviations_rad.len() != inner || !deviations_rad.iter().all(is_usable) {
             return None;
         }
-        let rounded = tube::through(self, deviations_rad)?;
+        let rounded = tube::through(self, deviations_rad, most_s)?;
         let trajectory = Trajectory::new(self.joints, *self.corners_rad.first()?, &rounded.strokes).ok()?;
         Some(Timed { trajectory, deviation_rad: rounded.deviation_rad })
     }

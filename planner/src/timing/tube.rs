@@ -20,7 +20,7 @@ const EXPONENT: u32 = 7;
 /// Rounds of a fit.
 const ROUNDS: usize = 16;
 /// Durations that are tried, in durations of the law.
-const AIMS: [f64; 6] = [0.92, 0.96, 1.0, 1.05, 1.15, 1.3];
+const AIMS: [f64; 4] = [0.92, 1.0, 1.1, 1.3];
 /// Width of the tube of a fit, in what is allowed.
 const NARROWER: f64 = 0.7;
 /// Poses a spacing at which the distance from the path is measured.
@@ -38,14 +38,14 @@ pub(super) struct Rounded {
     used: f64,
 }
 
-/// The shortest of the fits that keep within the deviation of each inner corner; `None` when none does.
-pub(super) fn through(path: &Path, deviations_rad: &[f64]) -> Option<Rounded> {
+/// The shortest of the fits that keep within the deviation of each inner corner; `None` when none does in less than `most_s`.
+pub(super) fn through(path: &Path, deviations_rad: &[f64], most_s: f64) -> Option<Rounded> {
     let law = Law::new(path, deviations_rad)?;
     let segments = path.corners_rad.len().checked_sub(1)?;
     let strokes = (STROKES[0] + STROKES[1] * segments).min(MAX_STROKES);
     let grid = Grid { strokes, overlap: OVERLAP, n: EXPONENT };
     let tube = Tube::new(path, deviations_rad);
-    AIMS.iter().find_map(|aim| {
+    AIMS.iter().filter(|aim| **aim * law.duration_s() < most_s).find_map(|aim| {
         let rounded = Fitted::new(path, &law, grid, *aim)?.run(&tube)?;
         (rounded.used <= USED_MAX).then_some(rounded)
     })

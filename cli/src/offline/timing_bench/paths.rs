@@ -86,7 +86,7 @@ fn row(arm: &Arm, args: &TimingArgs, blend_rad: f64, motions: &mut Vec<Sampled>)
         let corners_rad = random_path(&mut rng, arm.joints, length_rad);
         let path = Path { corners_rad: &corners_rad, joints: arm.joints, limits: &arm.limits };
         let begun = Instant::now();
-        let found = path.rounded(&vec![blend_rad; corners_rad.len() - 2]);
+        let found = path.rounded(&vec![blend_rad; corners_rad.len() - 2], f64::INFINITY);
         times_us.push(begun.elapsed().as_secs_f64() * 1e6);
         rounded += usize::from(found.is_some());
         let motion = found.or_else(|| path.stopping())?.trajectory;
