@@ -7,7 +7,6 @@ use rsruckig::prelude::{
 };
 use taustream_motion::limits::check_motion;
 use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Stroke, Trajectory};
-use taustream_planner::budget::Budget;
 use taustream_planner::replacement::{replacement, to_rest, without_ended};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::timing::Path;
@@ -39,7 +38,7 @@ fn straight(rng: &mut SeededRng, limits: &[JointLimits; MAX_JOINTS]) -> Trajecto
         to[joint] = from[joint] + rng.within(-reach, reach);
     }
     let path = Path { corners_rad: &[from, to], joints: JOINTS, limits };
-    path.fastest(&[], &Budget::unbounded()).unwrap().trajectory
+    path.stopping().unwrap().trajectory
 }
 
 /// A cut somewhere, and a goal up to 4 rad away.

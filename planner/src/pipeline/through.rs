@@ -23,7 +23,11 @@ impl Pipeline<'_> {
         match whole.as_slice() {
             [pose_rad] => self.stay(pose_rad),
             [_, _] => self.propose(&whole, "straight line"),
-            _ => self.round(&whole, &format!("through {} poses", poses_rad.len())),
+            _ => {
+                let source = format!("through {} poses", poses_rad.len());
+                self.propose(&whole, &source);
+                self.round(&whole, &source);
+            }
         }
         self.finish()
     }
