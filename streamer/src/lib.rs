@@ -19,6 +19,7 @@ pub mod check;
 pub mod commands;
 pub mod cycle;
 pub mod cycle_state;
+pub mod ending;
 pub mod guard;
 mod health;
 pub mod intake;

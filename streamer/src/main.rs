@@ -76,8 +76,8 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
 
     let outcome = run_real_time(core, settings, arguments.allow_non_realtime, &described);
     threads.finish();
-    if let Some(Err(e)) = recorder.map(Recorder::finish) {
-        tracing::error!("cycle log: {e}");
+    if let Some((Err(e), path)) = recorder.map(Recorder::finish).zip(arguments.cycle_log.as_ref()) {
+        tracing::error!("cycle log {}: {e}", path.display());
     }
     outcome
 }

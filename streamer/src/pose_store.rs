@@ -4,9 +4,12 @@
 //! reference is changed (`write_ahead.rs`). It carries a fresh epoch, which is noted for every drive first. *Rest*: written
 //! when every drive is off, nothing is requested, and the arm was measured still. Only rest tells the revolution of a joint
 //! after everything was off; whatever fails or is cut off in between leaves a record that is not believed.
+use crate::ending::{DISK_WITHIN, NotEnded, join_within};
 use crate::referencing::{LastPoses, Recorded, STILL_RAD, STILL_S};
 use crate::write_ahead::{JointNow, Place, Recorder, Request, StoreFault};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -110,6 +113,8 @@ pub struct PoseRecords {
     attempted: Nanos,
     stillness: [Stillness; MAX_JOINTS],
     failing: bool,
+    /// The epochs are what is being written, not the record: for the message about a disk that hangs.
+    at_epochs: Arc<AtomicBool>,
 }
 
 impl std::fmt::Debug for PoseRecords {
@@ -148,6 +153,7 @@ impl PoseRecords {
             attempted: Nanos(0),
             stillness: [Stillness::default(); MAX_JOINTS],
             failing: false,
+            at_epochs: Arc::default(),
         }
     }
 
@@ -246,6 +252,13 @@ impl PoseRecords {
 
     /// From now on no record of these drives is believed but one that carries this epoch.
     fn note_epoch(&mut self, epoch: Epoch) -> Result<(), StoreFault> {
+        self.at_epochs.store(true, Ordering::Relaxed);
+        let noted = self.write_epoch(epoch);
+        self.at_epochs.store(false, Ordering::Relaxed);
+        noted
+    }
+
+    fn write_epoch(&mut self, epoch: Epoch) -> Result<(), StoreFault> {
         self.epoch = None;
         let at = |fault| StoreFault { place: Place::Epochs, fault };
         let mut directory = self.disk.open(&self.directories.epochs, true).map_err(at)?;
@@ -398,10 +411,28 @@ fn moved(before: &[LastJoint], now: &[LastJoint]) -> bool {
     before.iter().zip(now).any(|(a, b)| (a.position_rad - b.position_rad).abs() > SAME_RAD)
 }
 
-/// The store on its thread. Dropping it ends the thread when what is being written is written.
+/// Why the thread of the store did not end.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotFinished {
+    /// An operation on this file does not return.
+    #[error(
+        "last pose: {} is not written: its disk has not answered for {} s. The streamer ends without it; joints that need the record \
+         may not be referenced at the next start",
+        .0.display(), DISK_WITHIN.as_secs()
+    )]
+    DiskHangs(PathBuf),
+    /// The thread has panicked.
+    #[error("the thread that keeps the last pose has panicked")]
+    Panicked,
+}
+
+/// The store on its thread. Dropping it finishes it.
 #[derive(Debug)]
 pub struct PoseStore {
     directories: Directories,
+    /// The record and the epochs.
+    files: [PathBuf; 2],
+    at_epochs: Arc<AtomicBool>,
     sender: Option<SyncSender<Report>>,
     writer: Option<JoinHandle<()>>,
 }
@@ -414,9 +445,29 @@ impl PoseStore {
     pub fn start(store: PoseRecords) -> std::io::Result<Self> {
         let (sender, reports) = sync_channel::<Report>(REPORTS);
         let directories = store.directories.clone();
+        let record = directories.state.join(LastPose::file_name(&store.arm));
+        let files = [record, directories.epochs.join(drive_epochs::FILE)];
+        let at_epochs = Arc::clone(&store.at_epochs);
         let work = move || run(store, &reports);
         let writer = thread::Builder::new().name("pose-store".into()).stack_size(256 << 10).spawn(work)?;
-        Ok(Self { directories, sender: Some(sender), writer: Some(writer) })
+        Ok(Self { directories, files, at_epochs, sender: Some(sender), writer: Some(writer) })
+    }
+
+    /// Ends the thread when what is being written is written, or leaves it to the end of the process after [`DISK_WITHIN`].
+    ///
+    /// # Errors
+    /// Which file could not be finished, and why.
+    pub fn finish(&mut self) -> Result<(), NotFinished> {
+        self.sender = None;
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        join_within(writer, DISK_WITHIN).map_err(|why| match why {
+            NotEnded::Panicked => NotFinished::Panicked,
+            NotEnded::Running => {
+                let [record, epochs] = &self.files;
+                let file = if self.at_epochs.load(Ordering::Relaxed) { epochs } else { record };
+                NotFinished::DiskHangs(file.clone())
+            }
+        })
     }
 
     /// Where it writes.
@@ -446,9 +497,8 @@ fn run(mut store: PoseRecords, reports: &Receiver<Report>) {
 
 impl Drop for PoseStore {
     fn drop(&mut self) {
-        self.sender = None;
-        if self.writer.take().is_some_and(|writer| writer.join().is_err()) {
-            error!("the thread that keeps the last pose has panicked");
+        if let Err(e) = self.finish() {
+            error!("{e}");
         }
     }
 }

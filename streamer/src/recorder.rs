@@ -5,6 +5,7 @@
 //! is counted, and the count is a line of the log.
 #![expect(clippy::disallowed_methods, reason = "this thread is not the real-time one and may sleep")]
 use crate::cycle_state::Transition;
+use crate::ending::{DISK_WITHIN, NotEnded, join_within};
 use crate::report::{CutRecord, CycleRecord, Record};
 use rtrb::Consumer;
 use serde_json::{Value, json};
@@ -81,13 +82,19 @@ impl Recorder {
         Ok(Self { thread, stop })
     }
 
-    /// Writes what is queued and ends.
+    /// Writes what is queued and ends, within [`DISK_WITHIN`].
     ///
     /// # Errors
-    /// When the log could not be written.
+    /// When the log could not be written, or its disk does not answer.
     pub fn finish(self) -> io::Result<()> {
         self.stop.store(true, Ordering::Release);
-        self.thread.join().unwrap_or_else(|_| Err(io::Error::other("the recorder thread has panicked")))
+        join_within(self.thread, DISK_WITHIN).unwrap_or_else(|why| match why {
+            NotEnded::Panicked => Err(io::Error::other("the recorder thread has panicked")),
+            NotEnded::Running => Err(io::Error::other(format!(
+                "a write has not returned within {} s: its disk, or the reader of its pipe, hangs; its end is missing",
+                DISK_WITHIN.as_secs()
+            ))),
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! The threads beside the cycle and the cycle log: started together, ended together.
 use crate::commands::CommandThread;
+use crate::ending::{NotEnded, THREADS_WITHIN, join_within};
 use crate::intake::CommandQueue;
 use crate::log::{self, CommandLog};
 use crate::names::Names;
@@ -112,19 +113,29 @@ impl Threads {
         Ok(())
     }
 
-    /// Ends all of them, after they have written what is left.
+    /// Ends all of them, after they have written what is left. One that hangs is named and left to the end of the process.
     pub fn finish(self) {
         self.watch_stop.store(true, Ordering::Release);
-        let watch_panicked = self.watch.is_some_and(|watch| watch.join().is_err());
-        self.stop.store(true, Ordering::Release);
-        if watch_panicked {
-            error!("the thread ports has panicked");
+        if let Some(watch) = self.watch {
+            finish(watch);
         }
+        self.stop.store(true, Ordering::Release);
         for thread in self.all {
-            let name = thread.thread().name().unwrap_or("without name").to_owned();
-            if thread.join().is_err() {
-                error!("the thread {name} has panicked");
-            }
+            finish(thread);
+        }
+    }
+}
+
+fn finish(thread: JoinHandle<()>) {
+    let name = thread.thread().name().unwrap_or("without name").to_owned();
+    match join_within(thread, THREADS_WITHIN) {
+        Ok(()) => {}
+        Err(NotEnded::Panicked) => error!("the thread {name} has panicked"),
+        Err(NotEnded::Running) => {
+            error!(
+                "the thread {name} has not ended within {} s; the process ends without it",
+                THREADS_WITHIN.as_secs()
+            );
         }
     }
 }

@@ -37,7 +37,7 @@ fn stop_with_a_log_that_nobody_reads_stops_the_moving_arm() {
     assert!(streamer.is_alive());
 }
 
-/// Goal: a disk that hangs does not delay a stop. Method: the cycle log goes into a pipe that is full for ever, which is what a hung
+/// Goal: a disk that hangs delays neither a stop nor the end. Method: the cycle log goes into a pipe that is full for ever, which is what a hung
 /// disk looks like to its writer.
 #[test]
 fn stop_with_a_disk_that_hangs_stops_the_moving_arm() {
@@ -53,12 +53,24 @@ fn stop_with_a_disk_that_hangs_stops_the_moving_arm() {
     .unwrap();
     let reader = OpenOptions::new().read(true).write(true).open(&log).unwrap();
     fcntl_setpipe_size(&reader, 4096).unwrap();
-    let _streamer = arm.streamer(&["--cycle-log", log.to_str().unwrap()], Stdio::null());
+    let errors = arm.root.join("stderr");
+    let stderr = Stdio::from(fs::File::create(&errors).unwrap());
+    let mut streamer = arm.streamer(&["--cycle-log", log.to_str().unwrap()], stderr);
     let mut operator = Operator::of(&arm);
     operator.set_out(&arm);
     thread::sleep(Duration::from_millis(300));
     assert!(operator.command(Command::Stop).is_accepted());
     operator.until(Phase::Holding);
+
+    // It ends all the same, and says which file is not whole.
+    streamer.signal(Signal::TERM);
+    let since = Instant::now();
+    while streamer.is_alive() {
+        assert!(since.elapsed() < GIVEN_UP_AFTER, "the streamer waits for its cycle log for ever");
+        thread::sleep(Duration::from_millis(20));
+    }
+    let said = fs::read_to_string(&errors).unwrap();
+    assert!(said.contains(&format!("cycle log {}: a write has not returned", log.display())), "{said}");
 }
 
 /// Goal: names in shared memory vanish in motion, and the arm is stopped all the same; then the services are open again.

@@ -20,6 +20,8 @@ pub enum Plan {
     From(u64, i32),
     /// The power is cut before this one has returned.
     Cut(u64),
+    /// This one never returns, nor any after it.
+    Hangs(u64),
 }
 
 #[derive(Clone, Debug, Default)]
@@ -120,12 +122,15 @@ impl State {
     fn step(&mut self, changes: bool) -> io::Result<()> {
         let now = self.operations;
         self.operations += 1;
+        while matches!(self.plan, Plan::Hangs(at) if now >= at) {
+            std::thread::park();
+        }
         self.dead |= matches!(self.plan, Plan::Cut(at) if now >= at);
         let errno = match self.plan {
             _ if self.dead => Some(EIO),
             Plan::Once(at, errno) => (now == at).then_some(errno),
             Plan::From(at, errno) => (now >= at && changes).then_some(errno),
-            Plan::Well | Plan::Cut(_) => None,
+            Plan::Well | Plan::Cut(_) | Plan::Hangs(_) => None,
         };
         errno.map_or(Ok(()), |errno| Err(io::Error::from_raw_os_error(errno)))
     }

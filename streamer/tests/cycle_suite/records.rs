@@ -4,6 +4,8 @@ mod fake_disk;
 
 use crate::harness::{CycleHarness, HOME_RAD, JOINTS, PERIOD_NS, shipped_settings};
 use fake_disk::{EIO, ENOSPC, EROFS, FakeDisk, Plan};
+use std::sync::mpsc::channel;
+use std::time::Duration;
 use taustream_arm::{Feedback, Settings};
 use taustream_drivers::{DriveState, DriveTarget};
 use taustream_messages::{Command, Phase, ReferenceState};
@@ -12,8 +14,8 @@ use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::intake::Shutdown;
 use taustream_streamer::names::Names;
-use taustream_streamer::pose_store::{Directories, PoseRecords};
-use taustream_streamer::write_ahead;
+use taustream_streamer::pose_store::{Directories, NotFinished, PoseRecords, PoseStore};
+use taustream_streamer::write_ahead::{self, JointNow};
 
 /// The feedback of joint 1 repeats itself this often, and its range holds many of them.
 const PERIOD_RAD: f64 = 0.2;
@@ -301,4 +303,25 @@ fn orderly_end_waits_for_the_record_of_rest_but_not_for_long() {
     };
     assert_eq!(ends(false), ReferenceState::Record);
     assert_eq!(ends(true), ReferenceState::RecordMoving);
+}
+
+/// Goal: a disk that never answers does not keep the process from ending, and the file that waits for it is named.
+#[test]
+fn end_with_a_disk_that_does_not_answer_comes_and_names_the_file() {
+    // The record is written first, by six operations, and then the epochs.
+    for (operation, file) in
+        [(0, "/a/vcan6.last-pose"), (5, "/a/vcan6.last-pose"), (6, "/epochs/drives.epochs")]
+    {
+        let disk = FakeDisk::new();
+        disk.begin(Plan::Hangs(operation));
+        let (mut requester, recorder) = write_ahead::pair();
+        requester.request(&[JointNow::UNKNOWN; MAX_JOINTS]);
+        let records = PoseRecords::new(&settings(), directories(), Box::new(disk), recorder);
+        let mut store = PoseStore::start(records).unwrap();
+        let (ended, end) = channel();
+        std::thread::spawn(move || ended.send(store.finish()));
+        let end = end.recv_timeout(Duration::from_secs(60)).expect("the end never came");
+        assert_eq!(end, Err(NotFinished::DiskHangs(file.into())));
+        assert!(end.unwrap_err().to_string().contains("has not answered for 3 s"));
+    }
 }
