@@ -58,7 +58,10 @@ impl Bus {
 
 /// All buses of the arm.
 #[derive(Debug)]
-pub struct Buses(Vec<Bus>);
+pub struct Buses {
+    all: Vec<Bus>,
+    local: Vec<bool>,
+}
 
 /// More buses than a cycle serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -71,35 +74,35 @@ impl Buses {
     /// # Errors
     /// When there are more than [`BUSES_MAX`].
     pub fn new(buses: Vec<Bus>) -> Result<Self, TooManyBuses> {
-        if buses.len() > BUSES_MAX { Err(TooManyBuses(buses.len())) } else { Ok(Self(buses)) }
+        if buses.len() > BUSES_MAX {
+            return Err(TooManyBuses(buses.len()));
+        }
+        let is_local = |bus: &Bus| bus.link.as_ref().is_some_and(|link| link.is_local());
+        Ok(Self { local: buses.iter().map(is_local).collect(), all: buses })
     }
 
     /// What the links are, for people.
     #[must_use]
     pub fn describe(&self) -> String {
-        let links: Vec<String> = self.0.iter().flat_map(|b| &b.link).map(|link| link.describe()).collect();
+        let links: Vec<String> = self.all.iter().flat_map(|b| &b.link).map(|link| link.describe()).collect();
         links.join(", ")
     }
 
-    /// Which of them are local links.
+    /// Which of them are local links, one value a bus.
     #[must_use]
-    pub fn local(&self) -> [bool; BUSES_MAX] {
-        let mut local = [false; BUSES_MAX];
-        for (local, bus) in local.iter_mut().zip(&self.0) {
-            *local = bus.link.as_ref().is_some_and(|link| link.is_local());
-        }
-        local
+    pub fn local(&self) -> &[bool] {
+        &self.local
     }
 
     pub(crate) fn links_mut(&mut self) -> impl Iterator<Item = &mut dyn CanLink> {
-        self.0.iter_mut().flat_map(|bus| &mut bus.link).map(|link| &mut **link as &mut dyn CanLink)
+        self.all.iter_mut().flat_map(|bus| &mut bus.link).map(|link| &mut **link as &mut dyn CanLink)
     }
 
     /// Writes every bus's frames. On a failed bus only torque off is sent.
     ///
     /// Real time: no allocation.
     pub fn encode(&mut self, now: Nanos, drive_target: DriveTarget, commands: &[JointCommand; MAX_JOINTS]) {
-        for bus in &mut self.0 {
+        for bus in &mut self.all {
             bus.live = matches!(drive_target, DriveTarget::Enabled | DriveTarget::Keep);
             bus.outgoing.clear();
             if !bus.health.is_silent() || drive_target == DriveTarget::TorqueOff {
@@ -112,7 +115,7 @@ impl Buses {
     ///
     /// Real time: one system call a bus, one more while own frames are overdue; never waits.
     pub fn send(&mut self, cycle_state: &mut CycleState) {
-        for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
+        for (bus, found) in self.all.iter_mut().zip(&mut cycle_state.buses) {
             let frames = bus.outgoing.frames();
             let asks = bus.health.asks_for_queue();
             found.queued = bus.link.as_ref().filter(|_| asks).map(|link| link.has_queued());
@@ -145,7 +148,7 @@ impl Buses {
     ///
     /// Real time: at most `RECEIVES_MAX` system calls a bus, never waits.
     pub fn receive(&mut self, now: Nanos, cycle_state: &mut CycleState) {
-        for (bus, found) in self.0.iter_mut().zip(&mut cycle_state.buses) {
+        for (bus, found) in self.all.iter_mut().zip(&mut cycle_state.buses) {
             let Bus { link, driver, health, incoming, live, .. } = bus;
             let mut seen = BusActivity { live: *live, queued: found.queued, ..BusActivity::default() };
             if let Some(link) = link {
@@ -184,7 +187,7 @@ impl Buses {
     ///
     /// Real time: no allocation.
     pub fn clear_faults(&mut self) {
-        for bus in &mut self.0 {
+        for bus in &mut self.all {
             bus.driver.clear_faults();
         }
     }
@@ -194,7 +197,7 @@ impl Buses {
     /// Real time: moves pointers.
     pub fn hand_out(&mut self) -> Links {
         let mut links: Links = Default::default();
-        for (bus, slot) in self.0.iter_mut().zip(&mut links) {
+        for (bus, slot) in self.all.iter_mut().zip(&mut links) {
             if bus.health.is_silent() {
                 *slot = bus.link.take();
             }
@@ -206,7 +209,7 @@ impl Buses {
     ///
     /// Real time: moves pointers, frees nothing.
     pub fn reclaim(&mut self, links: Links, recovered: bool) {
-        for (bus, link) in self.0.iter_mut().zip(links) {
+        for (bus, link) in self.all.iter_mut().zip(links) {
             let Some(link) = link else { continue };
             bus.link = Some(link);
             if recovered {

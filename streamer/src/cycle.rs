@@ -105,16 +105,14 @@ impl Core {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
         let cycle = &settings.cycle;
-        let local = buses.local();
-        let local = local.get(..settings.buses.len()).unwrap_or(&local);
         Self {
             intake,
             ledger: Ledger::new(settings),
             track: Track::new(settings),
             guard: Guard::new(limits, joints, cycle.period_us),
-            buses,
             supervisor: Supervisor::new(settings, Records::none()),
-            reporter: Reporter::new(settings.robot.digest, joints, local, cycle, reports),
+            reporter: Reporter::new(settings.robot.digest, joints, buses.local(), cycle, reports),
+            buses,
         }
     }
 

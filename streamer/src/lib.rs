@@ -37,6 +37,7 @@ pub mod recorder;
 pub mod referencing;
 pub mod report;
 pub mod rt;
+mod stall;
 pub mod stop_socket;
 pub mod successor;
 pub mod supervise;

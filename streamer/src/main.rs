@@ -52,7 +52,7 @@ fn run(arguments: &Arguments, settings: &Settings) -> Result<Next> {
     let runtime = taustream_arm::runtime::directory()?;
     let buses = open_buses(settings, arguments.link, &runtime)?;
     let described = buses.describe();
-    let names = Names::of(settings).with_local(buses.local());
+    let names = Names::of(settings).with_local(buses.local().iter().copied());
     let (queues, command_queue) = intake::pair();
     let shutdown_handle = command_queue.shutdown_handle();
     let recording = arguments.cycle_log.is_some();

@@ -280,7 +280,7 @@ impl Supervisor {
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
         let moving = self.phase == Phase::Moving;
-        let changes = moving && self.stalled_since.is_none();
+        let changes = moving && !self.stalls.is_frozen();
         if changes && !cycle_state.can_ramp {
             return Err(AnswerReason::TooManyRamps);
         }

@@ -9,6 +9,7 @@ use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
 use crate::record_first::{LEAVE_RECORD_S_MAX, Records};
 use crate::referencing::Referencing;
+use crate::stall::Stalls;
 use crate::watch::Watch;
 use taustream_arm::Settings;
 use taustream_arm::settings::Supervision;
@@ -19,10 +20,6 @@ use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// Highest speed override of a motion that begins outside the position limits.
 const INWARDS_SPEED_MAX: f64 = 0.25;
-/// How long the drives may take to come to rest after a stall before the arm stays paused, s.
-const STALL_REST_S: f64 = 1.0;
-/// How long after a stall a drive that has lost its master may say so, s: some tell by their next heartbeat but one.
-const STALL_BLAME_S: f64 = 1.0;
 /// How long leaving orderly may take after the longest stop of the arm: the drives' time-out, the record and a margin, s.
 const SHUTDOWN_AT_REST_S_MAX: f64 = 10.0;
 /// How long torque off is repeated before leaving at once, s.
@@ -53,10 +50,6 @@ pub struct Supervisor {
     pub(crate) rules: Supervision,
     pub(crate) limits: [JointLimits; MAX_JOINTS],
     pub(crate) joints: usize,
-    period_s: f64,
-    tolerated_s: f64,
-    stall_resume_s: f64,
-    watchdog_s: f64,
     pub(crate) watch: Watch,
     pub(crate) phase: Phase,
     since: Nanos,
@@ -74,14 +67,9 @@ pub struct Supervisor {
     pub(crate) speed_chosen: bool,
     /// Each enable begins at the first speed: a joint falls when commands stop.
     pub(crate) begins_slowly: bool,
-    /// A stall froze the motion; it continues when the drives rest.
-    pub(crate) stalled_since: Option<Nanos>,
-    /// How long no setpoint left before it, s.
-    stall_gap_s: f64,
+    pub(crate) stalls: Stalls,
     /// Why the arm is paused, or about to be.
     paused_by: Option<Pause>,
-    /// The newest stall of this loop that the drives do not bridge: when it ended, and how long it was, s.
-    stall: Option<(Nanos, f64)>,
     pub(crate) resetting_since: Option<Nanos>,
     /// Failed buses are being restarted, for this `clear-fault`.
     pub(crate) restoring: Option<u64>,
@@ -97,16 +85,11 @@ impl Supervisor {
     pub(crate) fn new(settings: &Settings, records: Records) -> Self {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
-        let (cycle, rules) = (&settings.cycle, &settings.supervision);
-        let period_s = f64::from(cycle.period_us) * 1e-6;
+        let rules = &settings.supervision;
         Self {
             rules: *rules,
             limits,
             joints,
-            period_s,
-            tolerated_s: f64::from(cycle.tolerated_gap_periods) * period_s,
-            stall_resume_s: f64::from(cycle.stall_resume_ms) * 1e-3,
-            watchdog_s: f64::from(cycle.drive_watchdog_ms) * 1e-3,
             watch: Watch::new(settings),
             phase: Phase::Configuring,
             since: Nanos(0),
@@ -119,10 +102,8 @@ impl Supervisor {
             begins_slowly: settings.servos.iter().any(|servo| servo.limp_risk_acknowledged),
             outside: false,
             speed: (rules.first_speed_percent / 100.0).clamp(0.0, 1.0),
-            stalled_since: None,
-            stall_gap_s: 0.0,
+            stalls: Stalls::new(&settings.cycle),
             paused_by: None,
-            stall: None,
             resetting_since: None,
             restoring: None,
             shutting_down: Shutdown::No,
@@ -263,7 +244,7 @@ impl Supervisor {
         }
         (self.phase, self.since) = (to, cycle_state.tick.wake_time);
         if event == Event::StalledLong {
-            self.paused_by = Some(Pause { reason: PauseReason::Stall, gap_s: self.stall_gap_s });
+            self.paused_by = Some(Pause { reason: PauseReason::Stall, gap_s: self.stalls.gap_s() });
         } else if event == Event::PauseRequested {
             self.paused_by = Some(Pause { reason: PauseReason::Operator, gap_s: 0.0 });
         } else if to != Phase::Paused {
@@ -277,11 +258,11 @@ impl Supervisor {
             }
             Phase::Stopping | Phase::Pausing => {
                 actions.speed = Some(SpeedRequest::Stop);
-                self.stalled_since = None;
+                self.stalls.release();
             }
             Phase::FastStopping => {
                 actions.speed = Some(SpeedRequest::FastStop);
-                self.stalled_since = None;
+                self.stalls.release();
             }
             Phase::Configuring
             | Phase::Disabled
@@ -300,7 +281,7 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) {
-        let cause = self.blame_stall(cause, cycle_state);
+        let cause = self.stalls.blame(cause, cycle_state);
         // Drives that were on their way to energised go back; drives that carry the arm hold.
         let requested = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep);
         let holds = requested && (self.phase != Phase::Enabling || self.adopted);
@@ -314,21 +295,9 @@ impl Supervisor {
         self.step(event, cycle_state, actions);
     }
 
-    /// A drive that has stopped because its master was silent is not to blame when this loop has just stalled.
-    fn blame_stall(&self, cause: Cause, cycle_state: &CycleState) -> Cause {
-        let lost_master = |joint: usize| cycle_state.servos.get(joint).is_some_and(|servo| servo.lost_master);
-        let is_recent = |at: Nanos| cycle_state.tick.wake_time.since_s(at) <= STALL_BLAME_S;
-        match (cause.joint, self.stall) {
-            (Some(joint), Some((at, gap_s))) if lost_master(joint) && is_recent(at) => {
-                Cause::new(FaultReason::Stall).at_joint(joint).amount(gap_s, 0.0)
-            }
-            _ => cause,
-        }
-    }
-
     fn evaluate_motion(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
         if cycle_state.trajectory_result.is_some_and(|v| matches!(v.decision, Decision::Accepted { .. })) {
-            self.stalled_since = None;
+            self.stalls.release();
             self.step(Event::Accepted, cycle_state, actions);
         }
         if let Some(trip) = cycle_state.trip {
@@ -345,41 +314,6 @@ impl Supervisor {
             self.step(Event::EndReached, cycle_state, actions);
         } else if cycle_state.at_rest {
             self.step(Event::AtRest, cycle_state, actions);
-        }
-    }
-
-    /// Gaps beyond what the drives bridge.
-    fn evaluate_stall(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
-        let energised = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep)
-            && self.phase != Phase::Fault;
-        // Not the gap between setpoints: a failed bus makes one, too, while this loop runs.
-        let loop_gap_s = (cycle_state.tick.skipped + 1) as f64 * self.period_s;
-        if loop_gap_s > self.tolerated_s {
-            self.stall = Some((cycle_state.tick.wake_time, loop_gap_s));
-        }
-        if energised && cycle_state.gap_s > self.watchdog_s {
-            let cause = Cause::new(FaultReason::Stall).amount(cycle_state.gap_s, self.watchdog_s);
-            self.raise(Event::StopFault, cause, cycle_state, actions);
-        }
-        if self.phase != Phase::Moving {
-            return;
-        }
-        if cycle_state.frozen {
-            self.stalled_since = Some(cycle_state.tick.wake_time);
-            self.stall_gap_s = cycle_state.gap_s;
-            if cycle_state.gap_s > self.stall_resume_s {
-                self.stalled_since = None;
-                self.step(Event::StalledLong, cycle_state, actions);
-            }
-            return;
-        }
-        let Some(since) = self.stalled_since else { return };
-        if self.watch.is_at_rest() && cycle_state.can_ramp {
-            self.stalled_since = None;
-            actions.speed = Some(SpeedRequest::Change(self.speed()));
-        } else if cycle_state.tick.wake_time.since_s(since) > STALL_REST_S {
-            self.stalled_since = None;
-            self.step(Event::StalledLong, cycle_state, actions);
         }
     }
 

@@ -175,14 +175,20 @@ impl<'a> Session<'a> {
     /// Switches the drives off and sums up.
     pub(crate) fn finish(self) -> Result<Summary, Failure> {
         self.look()?;
-        let moved = self.seen.borrow().tracking_error_rad_max;
+        // Before the drives are off: an arm that sags then has no error.
+        let tracking_error_rad_max = self.seen.borrow().tracking_error_rad_max;
         execute(&self.client, self.arm, Command::Disable, DRIVES_S_MAX)?;
         self.look()?;
         let seen = self.seen.into_inner();
         let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
-        Ok(Summary::new(&last, self.moves, (self.faults, self.pauses.into_inner()), seen.samples)
-            .with_tracking_error(moved)
-            .with_unmodelled_links(&self.arm.unmodelled_links))
+        Ok(Summary {
+            tracking_error_rad_max,
+            faults: self.faults,
+            pauses: self.pauses.into_inner(),
+            unmodelled_links: self.arm.unmodelled_links.clone(),
+            samples: seen.samples,
+            ..Summary::new(&last, self.moves)
+        })
     }
 
     /// A failure while the arm is in a fault is reported with the fault: it is the cause.

@@ -52,11 +52,12 @@ pub(crate) struct Summary {
     planned_s: f64,
     executed_s: f64,
     clearance_m: f64,
-    tracking_error_rad_max: f64,
+    /// The largest of any cycle.
+    pub(super) tracking_error_rad_max: f64,
     /// Faults that were recovered from, as text.
-    faults: Vec<String>,
+    pub(super) faults: Vec<String>,
     /// Pauses by stalls of the computer that were ended by a resume, as text.
-    pauses: Vec<String>,
+    pub(super) pauses: Vec<String>,
     frames_sent: u64,
     frames_lost: u64,
     frames_received: u64,
@@ -74,28 +75,23 @@ pub(crate) struct Summary {
     /// Pictures that were written.
     pub(crate) plots: Vec<PathBuf>,
     /// Links that move and have no shape.
-    unmodelled_links: Vec<String>,
+    pub(super) unmodelled_links: Vec<String>,
     /// What the pictures show.
     #[serde(skip)]
     pub(crate) samples: Vec<Sample>,
 }
 
 impl Summary {
-    /// Sums up what was seen until the last report.
-    pub(crate) fn new(
-        last: &Report,
-        moves: Vec<Move>,
-        (faults, pauses): (Vec<String>, Vec<String>),
-        samples: Vec<Sample>,
-    ) -> Self {
+    /// The moves and the last report; nothing else is known.
+    pub(super) fn new(last: &Report, moves: Vec<Move>) -> Self {
         let mut summary = Self {
             verdict: "DEMO OK",
             planned_s: 0.0,
             executed_s: 0.0,
             clearance_m: moves.iter().map(|m| m.clearance_m).fold(f64::INFINITY, f64::min),
             tracking_error_rad_max: 0.0,
-            faults,
-            pauses,
+            faults: Vec::new(),
+            pauses: Vec::new(),
             frames_sent: last.frames_sent,
             frames_lost: last.frames_lost,
             frames_received: last.frames_received,
@@ -111,23 +107,11 @@ impl Summary {
             executed_counted_in_cycles: false,
             plots: Vec::new(),
             unmodelled_links: Vec::new(),
-            samples,
+            samples: Vec::new(),
             moves,
         };
         summary.add_up();
         summary
-    }
-
-    /// Adds the links of which nothing is known.
-    pub(crate) fn with_unmodelled_links(mut self, unmodelled_links: &[String]) -> Self {
-        self.unmodelled_links = unmodelled_links.to_vec();
-        self
-    }
-
-    /// Adds the largest tracking error of any cycle.
-    pub(crate) fn with_tracking_error(mut self, tracking_error_rad_max: f64) -> Self {
-        self.tracking_error_rad_max = tracking_error_rad_max;
-        self
     }
 
     fn add_up(&mut self) {
