@@ -11,6 +11,8 @@ use crate::reader::Table;
 pub enum ScaleObject {
     /// Position range limit: beyond it the drive's position starts again at the other end.
     PositionRange = 0x607B,
+    /// Home offset: shifts the zero of the drive's positions.
+    HomeOffset = 0x607C,
     /// Software position limit: beyond it the drive cuts its target off.
     SoftLimit = 0x607D,
     /// Polarity: bit 7 turns the direction of positions round.
@@ -21,17 +23,21 @@ pub enum ScaleObject {
     GearRatio = 0x6091,
     /// Feed constant: position units a shaft revolution.
     FeedConstant = 0x6092,
+    /// Position factor: increments a position unit (removed in newer editions of CiA 402-2, and still in drives).
+    PositionFactor = 0x6093,
 }
 
 impl ScaleObject {
     /// Every object.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::PositionRange,
+        Self::HomeOffset,
         Self::SoftLimit,
         Self::Polarity,
         Self::EncoderResolution,
         Self::GearRatio,
         Self::FeedConstant,
+        Self::PositionFactor,
     ];
 
     /// Its index in the object dictionary.
@@ -49,21 +55,24 @@ impl ScaleObject {
     pub const fn name(self) -> &'static str {
         match self {
             Self::PositionRange => "position range limit",
+            Self::HomeOffset => "home offset",
             Self::SoftLimit => "software position limit",
             Self::Polarity => "polarity",
             Self::EncoderResolution => "position encoder resolution",
             Self::GearRatio => "gear ratio",
             Self::FeedConstant => "feed constant",
+            Self::PositionFactor => "position factor",
         }
     }
-    const fn bit(self) -> u8 {
-        1 << (self.index() % 8)
+    /// 0x607B to 0x607F are bits 11 to 15, 0x6091 to 0x6093 bits 1 to 3.
+    const fn bit(self) -> u16 {
+        1 << (self.index() % 16)
     }
 }
 
 /// Objects that are not compared, because the drive's are known to be wrong or to mean something else.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Overruled(u8);
+pub struct Overruled(u16);
 
 impl Overruled {
     /// Every object is compared.

@@ -26,6 +26,8 @@ pub struct Cia402 {
     pub gear_ratio: f64,
     /// Encoder counts a motor revolution.
     pub counts_per_rev: f64,
+    /// The drive's home offset (0x607C) with which the joint's zero was determined, counts.
+    pub home_offset_counts: i32,
     /// Objects of the drive that are not compared with these settings.
     pub overruled: Overruled,
 }
@@ -111,7 +113,7 @@ const EXPECTED: &str = "\"cia402\" (CANopen CiA 402, cyclic synchronous position
 /// Protocols that are planned for.
 const LATER: [&str; 5] = ["piper", "robstride", "myactuator", "cubemars", "odrive"];
 
-const CIA402_KEYS: [&str; 3] = ["gear_ratio", "counts_per_rev", "overruled_objects"];
+const CIA402_KEYS: [&str; 4] = ["gear_ratio", "counts_per_rev", "home_offset_counts", "overruled_objects"];
 const DAMIAO_KEYS: [&str; 9] = [
     "feedback_id",
     "mode",
@@ -139,6 +141,7 @@ const RANGE_NM: Bounds = Bounds::above(0.0, 10_000.0, "Nm");
 const STIFFNESS: Bounds = Bounds::above(0.0, 500.0, "Nm/rad");
 /// Never 0: stiffness without damping oscillates.
 const DAMPING: Bounds = Bounds::above(0.0, 5.0, "Nm s/rad");
+const HOME_OFFSET_COUNTS: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
 const WATCHDOG_MS: [i64; 2] = [1, 10_000];
 const GAIN_RAMP_MS: [i64; 2] = [1, 10_000];
 
@@ -188,8 +191,15 @@ fn read_id(table: &mut Table<'_>, [low, high]: [i64; 2]) -> Option<u8> {
 fn read_cia402(table: &mut Table<'_>) -> Option<Cia402> {
     let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
     let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
+    let [low, high] = HOME_OFFSET_COUNTS;
+    let home_offset = table.integer_or("home_offset_counts", 0, low, high);
     let overruled = drive_scale::read_overruled(table);
-    Some(Cia402 { gear_ratio: gear_ratio?, counts_per_rev: counts_per_rev?, overruled: overruled? })
+    Some(Cia402 {
+        gear_ratio: gear_ratio?,
+        counts_per_rev: counts_per_rev?,
+        home_offset_counts: i32::try_from(home_offset?).ok()?,
+        overruled: overruled?,
+    })
 }
 
 fn read_damiao(table: &mut Table<'_>) -> Option<Damiao> {

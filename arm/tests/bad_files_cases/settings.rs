@@ -259,6 +259,20 @@ pub(crate) const CASES: &[Case] = &[
     (
         Settings,
         "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nhome_offset_counts = 2147483648",
+        "servo[0].home_offset_counts",
+        "from -2147483648 to 2147483647",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nhome_offset_counts = 0.5",
+        "servo[0].home_offset_counts",
+        "integer",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
         "gear_ratio = 101.0\noverruled_objects = 0x6091",
         "servo[0].overruled_objects",
         "a list",

@@ -14,6 +14,7 @@ impl Serialize for ProtocolLine {
             Protocol::Cia402(cia402) => {
                 map.serialize_entry("gear_ratio", &cia402.gear_ratio)?;
                 map.serialize_entry("counts_per_rev", &cia402.counts_per_rev)?;
+                map.serialize_entry("home_offset_counts", &cia402.home_offset_counts)?;
                 let overruled: Vec<u16> = cia402.overruled.objects().map(ScaleObject::index).collect();
                 map.serialize_entry("overruled_objects", &overruled)?;
             }
@@ -43,6 +44,9 @@ impl fmt::Display for ProtocolLine {
         match &self.0 {
             Protocol::Cia402(cia402) => {
                 write!(f, "gear {}, {} counts/rev", cia402.gear_ratio, cia402.counts_per_rev)?;
+                if cia402.home_offset_counts != 0 {
+                    write!(f, ", home offset {} counts", cia402.home_offset_counts)?;
+                }
                 for object in cia402.overruled.objects() {
                     write!(f, ", 0x{:04X} ({}) of the drive NOT COMPARED", object.index(), object.name())?;
                 }

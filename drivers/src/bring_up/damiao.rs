@@ -5,16 +5,17 @@
 //! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
 //! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
 //! All times are on the driver's stall-free clock, which does not advance while the master itself is stalled.
-use crate::bring_up::damiao_fault::{DamiaoFault, differs, register_object, status_code};
-use crate::bring_up::damiao_plan::{CONFIGURE, CheckResult, Job, MotorPlan, VERIFY};
-use crate::bring_up::fault::BringUpFault;
+mod power;
+mod registers;
+
+use crate::bring_up::damiao_fault::{DamiaoFault, status_code};
+use crate::bring_up::damiao_plan::MotorPlan;
 use crate::bring_up::timing::{BringUpCycle, Timeouts};
 use crate::codec::damiao_frames::{
-    Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, STATUS_LOST_COMMUNICATION, Special,
+    Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, STATUS_LOST_COMMUNICATION,
 };
-use crate::codec::mit::{MitCommand, MitState};
+use crate::codec::mit::MitState;
 use crate::servo::{DriveState, DriveTarget, Nanos};
-use taustream_arm::DamiaoMode;
 
 /// Pause between two looks at a motor that is waited for.
 const OBSERVE_AGAIN: Nanos = Nanos(100_000_000);
@@ -171,7 +172,7 @@ impl Motor {
         match (self.stage, self.fault) {
             (MotorStage::Refused { code, object }, _) => (code, object),
             // Its target and gains came in frames: no register tells what it holds, so no hold can be adopted.
-            (MotorStage::Unowned, _) => (BringUpFault::Foreign.code(), 0),
+            (MotorStage::Unowned, _) => (DamiaoFault::Unowned.code(), 0),
             _ if self.received && self.in_error() => (status_code(self.feedback.status), 0),
             (_, Some(fault)) => (fault.code(), 0),
             (_, None) => (0, 0),
@@ -282,247 +283,6 @@ impl Motor {
         }
     }
 
-    fn observing(&mut self, cycle: BringUpCycle, since: Nanos, status: Option<u8>) -> Option<Request> {
-        match status {
-            Some(STATUS_ENABLED) => self.stage = MotorStage::Unowned,
-            Some(_) if cycle.other_master => self.fault = Some(DamiaoFault::OtherMaster),
-            Some(_)
-                if cycle.drive_target == DriveTarget::Disabled && age(cycle.now, since) >= OBSERVE_MIN.0 =>
-            {
-                self.fault = None;
-                return self.at_job(cycle.now, 0);
-            }
-            None if self.requested.is_some() && age(cycle.now, self.requested_at) >= OBSERVE_AGAIN.0 => {
-                self.received = false;
-                self.fault.get_or_insert(DamiaoFault::NoAnswer);
-            }
-            Some(_) | None => {}
-        }
-        self.look(cycle.now)
-    }
-
-    fn unowned(&mut self, cycle: BringUpCycle, status: Option<u8>) -> Option<Request> {
-        match status {
-            Some(status) if status != STATUS_ENABLED => self.observe(cycle.now, None),
-            _ => {}
-        }
-        let look = self.look(cycle.now)?;
-        // Its answer to the emergency is a feedback as good as any.
-        Some(if cycle.drive_target == DriveTarget::TorqueOff {
-            Request::Special(Special::Disable, 0)
-        } else {
-            look
-        })
-    }
-
-    fn configuring(&mut self, now: Nanos, status: Option<u8>, at: (usize, Nanos)) -> Option<Request> {
-        let (index, since) = at;
-        if status == Some(STATUS_ENABLED) {
-            self.stage = MotorStage::Unowned;
-            return None;
-        }
-        let Some(job) = CONFIGURE.get(index).copied() else {
-            self.stage = MotorStage::Ready;
-            return Some(Request::Refresh);
-        };
-        if let Some((_, _, value)) = self.answer.take() {
-            return match self.plan.check_value(job, Some(index), value) {
-                CheckResult::On(steps) => self.at_job(now, index + steps),
-                CheckResult::Differs => {
-                    let (code, object) = differs(job.register(), value);
-                    self.stage = MotorStage::Refused { code, object };
-                    None
-                }
-            };
-        }
-        if age(now, since) >= self.timeouts.step.0 {
-            let code = DamiaoFault::NoRegister.code();
-            self.stage = MotorStage::Refused { code, object: register_object(job.register()) };
-            return None;
-        }
-        self.request_job(now, job, since)
-    }
-
-    fn ready(&mut self, now: Nanos, status: Option<u8>, rises: bool) -> Option<Request> {
-        if status == Some(STATUS_ENABLED) {
-            // Another master has energised it.
-            self.stage = MotorStage::Unowned;
-            return None;
-        }
-        if age(now, self.measured_at) >= NO_REPLY.0 && age(now, self.requested_at) >= NO_REPLY.0 {
-            self.received = false;
-            self.observe(now, Some(DamiaoFault::NoReply));
-            return None;
-        }
-        if std::mem::take(&mut self.set_zero) {
-            return Some(Request::Special(Special::SetZero, 0));
-        }
-        if let Some((since, next)) = self.clearing {
-            if !self.in_error() {
-                (self.clearing, self.fault) = (None, None);
-            } else if age(now, since) >= self.timeouts.step.0 {
-                self.clearing = None;
-            } else if now >= next {
-                self.clearing = Some((since, later(now, REPEAT)));
-                return Some(Request::Special(Special::ClearError, 0));
-            }
-        }
-        if rises && !self.in_error() && self.fault.is_none() {
-            (self.requested, self.answer) = (None, None);
-            self.stage = MotorStage::Verify { job: 0, since: now };
-        }
-        Some(Request::Refresh)
-    }
-
-    /// Registers and feedback alternate, so that the position stays recent.
-    fn verifying(&mut self, now: Nanos, at: (usize, Nanos)) -> Option<Request> {
-        let (index, since) = at;
-        let Some(job) = VERIFY.get(index).copied() else {
-            self.stage = MotorStage::Arm { since: now };
-            return Some(Request::Refresh);
-        };
-        if let Some((_, _, value)) = self.answer.take() {
-            if self.plan.check_value(job, None, value) == CheckResult::Differs {
-                return self.go(DamiaoFault::Restarted);
-            }
-            self.stage = MotorStage::Verify { job: index + 1, since: now };
-            return Some(Request::Refresh);
-        }
-        if age(now, since) >= self.timeouts.step.0 {
-            return self.go(DamiaoFault::NoRegister);
-        }
-        self.request_job(now, job, since)
-    }
-
-    fn arming(&mut self, now: Nanos, target: Option<MotorTarget>, since: Nanos) -> Option<Request> {
-        if self.in_error() {
-            self.stage = MotorStage::Ready;
-            return Some(Request::Refresh);
-        }
-        if age(now, since) >= self.timeouts.step.0 {
-            return self.go(DamiaoFault::NoReply);
-        }
-        if self.measured_at <= since {
-            return Some(Request::Refresh);
-        }
-        // False for a position that is not known.
-        let near =
-            target.is_some_and(|t| (t.position_rad - self.measured.position_rad).abs() <= self.near_rad);
-        if !near {
-            return self.go(DamiaoFault::CommandFar);
-        }
-        self.sent_rad = self.measured.position_rad;
-        self.stage = MotorStage::Enable { since: now, next: now };
-        // A command without gains first: an earlier command of the motor must not take effect.
-        self.command(target, 0.0)
-    }
-
-    fn enabling(
-        &mut self,
-        now: Nanos,
-        status: Option<u8>,
-        target: Option<MotorTarget>,
-        at: (Nanos, Nanos),
-    ) -> Option<Request> {
-        let (since, next) = at;
-        if status == Some(STATUS_ENABLED) {
-            self.stage = MotorStage::Ramp { since: now };
-            return self.command(target, 0.0);
-        }
-        if self.in_error() {
-            self.stage = MotorStage::Ready;
-            return Some(Request::Refresh);
-        }
-        if age(now, since) >= self.timeouts.step.0 {
-            self.fault = Some(DamiaoFault::EnableTimeout);
-            return self.disable(now);
-        }
-        if now < next {
-            return self.command(target, 0.0);
-        }
-        self.stage = MotorStage::Enable { since, next: later(now, REPEAT) };
-        Some(Request::Special(Special::Enable, 0))
-    }
-
-    fn following(
-        &mut self,
-        cycle: BringUpCycle,
-        status: Option<u8>,
-        target: Option<MotorTarget>,
-    ) -> Option<Request> {
-        let now = cycle.now;
-        if matches!(cycle.drive_target, DriveTarget::Disabled | DriveTarget::TorqueOff) {
-            return self.disable(now);
-        }
-        match status {
-            None | Some(STATUS_ENABLED) => {}
-            Some(STATUS_DISABLED) => return self.go(DamiaoFault::DroppedOut),
-            Some(_) => {
-                self.stage = MotorStage::Ready;
-                return Some(Request::Refresh);
-            }
-        }
-        if age(now, self.measured_at) >= NO_REPLY.0 {
-            // A motor without feedback may still receive: it gets its commands until the target is `Disabled`.
-            self.fault.get_or_insert(DamiaoFault::NoReply);
-        }
-        let ramped = |since| ratio(age(now, since), self.plan.ramp_ns());
-        let share = if let MotorStage::Ramp { since } = self.stage { ramped(since) } else { 1.0 };
-        if share >= 1.0 {
-            self.stage = MotorStage::On;
-        }
-        self.command(target, share)
-    }
-
-    fn disabling(&mut self, now: Nanos, status: Option<u8>, since: Nanos) -> Option<Request> {
-        if status.is_some_and(|status| status != STATUS_ENABLED) {
-            self.stage = if self.fault.is_some() { MotorStage::Gone } else { MotorStage::Ready };
-            return Some(Request::Refresh);
-        }
-        if age(now, since) >= NO_REPLY.0 && age(now, self.measured_at) >= NO_REPLY.0 {
-            self.received = false;
-            self.observe(now, Some(DamiaoFault::NoReply));
-            return None;
-        }
-        Some(Request::Special(Special::Disable, 0))
-    }
-
-    fn gone(&mut self, cycle: BringUpCycle) -> Option<Request> {
-        if cycle.drive_target == DriveTarget::Disabled {
-            self.observe(cycle.now, self.fault);
-        }
-        // It was ours: should it be energised after all, it is not left to its last command.
-        let energised = self.feedback.status == STATUS_ENABLED;
-        Some(if energised { Request::Special(Special::Disable, 0) } else { Request::Refresh })
-    }
-
-    /// The emergency: in any stage, before anything else.
-    fn torque_off(&mut self, now: Nanos) -> Option<Request> {
-        match self.stage {
-            MotorStage::Observe { .. }
-            | MotorStage::Unowned
-            | MotorStage::Configure { .. }
-            | MotorStage::Gone
-            | MotorStage::Refused { .. } => {
-                self.requested = None;
-                Some(Request::Special(Special::Disable, 0))
-            }
-            MotorStage::Ready
-            | MotorStage::Verify { .. }
-            | MotorStage::Arm { .. }
-            | MotorStage::Enable { .. }
-            | MotorStage::Ramp { .. }
-            | MotorStage::On
-            | MotorStage::Disable { .. } => self.disable(now),
-        }
-    }
-
-    fn disable(&mut self, now: Nanos) -> Option<Request> {
-        (self.requested, self.answer, self.clearing) = (None, None, None);
-        self.stage = MotorStage::Disable { since: now };
-        Some(Request::Special(Special::Disable, 0))
-    }
-
     fn go(&mut self, fault: DamiaoFault) -> Option<Request> {
         (self.requested, self.answer, self.clearing) = (None, None, None);
         self.fault = Some(fault);
@@ -547,45 +307,6 @@ impl Motor {
         request
     }
 
-    fn at_job(&mut self, now: Nanos, job: usize) -> Option<Request> {
-        (self.requested, self.answer) = (None, None);
-        self.stage = MotorStage::Configure { job, since: now };
-        None
-    }
-
-    /// Asks for the answer to a job, again when it was lost.
-    fn request_job(&mut self, now: Nanos, job: Job, since: Nanos) -> Option<Request> {
-        let settling = matches!(job, Job::ReadSettled(_)) && age(now, since) < SETTLE.0;
-        let waiting = self.requested.is_some() && age(now, self.requested_at) < REQUEST_AGAIN.0;
-        (!settling && !waiting).then(|| self.send_request(now, self.plan.request(job)))
-    }
-
-    /// The command of this cycle with this share of the gains. What is no number never becomes one: the last good
-    /// angle stays.
-    fn command(&mut self, target: Option<MotorTarget>, share: f64) -> Option<Request> {
-        if let Some(target) = target {
-            self.sent_rad = target.position_rad;
-        }
-        let (velocity_rad_s, torque_nm) = target.map_or((0.0, 0.0), |t| (t.velocity_rad_s, t.torque_nm));
-        match self.plan.damiao.mode {
-            DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } => {
-                let command = MitCommand {
-                    position_rad: self.sent_rad,
-                    velocity_rad_s,
-                    stiffness_nm_rad: share * stiffness_nm_rad,
-                    damping_nm_s_rad: share * damping_nm_s_rad,
-                    torque_nm: share * torque_nm,
-                };
-                command.encode(&self.plan.ranges()).map(Request::Mit)
-            }
-            DamiaoMode::PosVel => {
-                #[expect(clippy::cast_possible_truncation, reason = "the frame has this width")]
-                let (position_rad, velocity_rad_s) = (self.sent_rad as f32, self.plan.speed_rad_s as f32);
-                Some(Request::PosVel { position_rad, velocity_rad_s })
-            }
-        }
-    }
-
     const fn in_error(&self) -> bool {
         self.feedback.status > STATUS_ENABLED
     }
@@ -593,15 +314,4 @@ impl Motor {
 
 const fn age(now: Nanos, then: Nanos) -> u64 {
     now.0.saturating_sub(then.0)
-}
-
-const fn later(now: Nanos, by: Nanos) -> Nanos {
-    Nanos(now.0.saturating_add(by.0))
-}
-
-/// `part` of `whole`, at most 1.
-fn ratio(part: u64, whole: u64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
-    let (part, whole_ns) = (part as f64, whole as f64);
-    if whole == 0 { 1.0 } else { (part / whole_ns).min(1.0) }
 }

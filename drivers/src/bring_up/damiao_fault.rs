@@ -27,11 +27,13 @@ pub enum DamiaoFault {
     NoReply = BASE | FINDING | 0x07,
     /// Its registers are not as they were left.
     Restarted = BASE | FINDING | 0x08,
+    /// It is energised, and this master did not energise it.
+    Unowned = BASE | FINDING | 0x09,
 }
 
 impl DamiaoFault {
     /// Every finding.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::NoAnswer,
         Self::NoRegister,
         Self::OtherMaster,
@@ -40,6 +42,7 @@ impl DamiaoFault {
         Self::DroppedOut,
         Self::NoReply,
         Self::Restarted,
+        Self::Unowned,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -66,6 +69,11 @@ impl DamiaoFault {
             Self::NoReply => "the motor stopped answering; check its power and the wiring",
             Self::Restarted => {
                 "the motor has restarted, or another program wrote its registers; clear the fault to set them again"
+            }
+            Self::Unowned => {
+                "the motor was energised before this streamer came, and no register tells what it holds, so it is not taken \
+                 over; end the program that uses it, or support the arm and `torque-off`, or wait until its own watchdog \
+                 (TIMEOUT) disables it; then `clear-fault`"
             }
         }
     }
@@ -119,7 +127,8 @@ pub fn explain_on(code: u32, has_cable: bool) -> Option<String> {
             | DamiaoFault::CommandFar
             | DamiaoFault::DroppedOut
             | DamiaoFault::NoReply
-            | DamiaoFault::Restarted => fault.sentence(),
+            | DamiaoFault::Restarted
+            | DamiaoFault::Unowned => fault.sentence(),
         };
         return Some(sentence.to_owned());
     }

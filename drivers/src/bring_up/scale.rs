@@ -6,7 +6,13 @@
 //! drive has must agree with the settings: one that does not would move the joint by another angle than commanded, with
 //! feedback that agrees. An object that the drive does not have says nothing.
 //!
-//! Sources: CiA 402-2, "Factor group" and "Position control function".
+//! The position factor (0x6093) is the increments of a position unit. Units that are not increments have another number of
+//! them in a motor revolution than the encoder resolution says, so it must be 1 as long as that must be `counts_per_rev`.
+//! The home offset (0x607C) shifts the drive's zero. When a drive applies it is its own affair: by CiA 402 at the end of
+//! homing; drives with absolute encoders apply a stored one at power-up, or at once. So nothing can be computed from it,
+//! and it must be what it was when the joint's zero was determined.
+//!
+//! Sources: CiA 402-2, "Factor group", "Position control function" and "Homing mode".
 use crate::codec::cia402_words::{CountScale, counts_from_rad};
 use crate::codec::object::{self, Address};
 use taustream_arm::{Overruled, RobotJoint, ScaleObject, Servo};
@@ -27,6 +33,8 @@ pub struct ExpectedScale {
     pub gear_ratio: f64,
     /// Lowest and highest target of the joint, in counts.
     pub range_counts: [i32; 2],
+    /// The home offset with which the joint's zero was determined, in counts.
+    pub home_offset_counts: i32,
     /// Objects that are not read.
     pub overruled: Overruled,
 }
@@ -42,6 +50,7 @@ impl ExpectedScale {
             counts_per_rev: cia402.counts_per_rev,
             gear_ratio: cia402.gear_ratio,
             range_counts: [low.min(high), low.max(high)],
+            home_offset_counts: cia402.home_offset_counts,
             overruled: cia402.overruled,
         })
     }
@@ -56,13 +65,16 @@ impl ExpectedScale {
 }
 
 /// The gear ratio before the feed constant, whose meaning depends on it.
-const ADDRESSES: [Address; 11] = [
+const ADDRESSES: [Address; 14] = [
     object::ENCODER_INCREMENTS,
     object::ENCODER_REVOLUTIONS,
     object::GEAR_MOTOR_REVOLUTIONS,
     object::GEAR_SHAFT_REVOLUTIONS,
     object::FEED,
     object::FEED_SHAFT_REVOLUTIONS,
+    object::FACTOR_INCREMENTS,
+    object::FACTOR_UNITS,
+    object::HOME_OFFSET,
     object::POLARITY,
     object::SOFT_LIMIT_MIN,
     object::SOFT_LIMIT_MAX,
@@ -124,6 +136,15 @@ impl StatedScale {
                 let meant = if self.gear_ratio.is_some() { &wanted[..1] } else { &wanted[..] };
                 self.ratio(object::FEED, value, meant).map(drop)
             }
+            object::FACTOR_UNITS => self.ratio(object::FACTOR_INCREMENTS, value, &[1.0]).map(drop),
+            object::HOME_OFFSET => match value.map(u32::cast_signed) {
+                Some(stated) if stated != expected.home_offset_counts => Err(Contradiction {
+                    object: address,
+                    stated: f64::from(stated),
+                    expected: f64::from(expected.home_offset_counts),
+                }),
+                Some(_) | None => Ok(()),
+            },
             object::POLARITY => match value {
                 Some(bits) if bits & POLARITY_POSITION != 0 => {
                     Err(Contradiction { object: address, stated: f64::from(bits), expected: 0.0 })
@@ -205,6 +226,18 @@ pub fn sentence(packed: u32, stated: f64, expected: f64) -> Option<String> {
         ScaleObject::FeedConstant => {
             ratio("position units a shaft revolution", "counts_per_rev x gear_ratio")
         }
+        ScaleObject::PositionFactor if stated.is_normal() => format!(
+            "object 0x{index:04X} ({name}) of the drive says {stated} increments a position unit, and by the settings a unit is \
+             an increment, with counts_per_rev of them in a motor revolution: the joint would move by {stated:.6} times the \
+             commanded angle; set it to 1 in the drive and save it, {overrule}"
+        ),
+        ScaleObject::PositionFactor => ratio("increments a position unit", "a unit is an increment"),
+        ScaleObject::HomeOffset => format!(
+            "object 0x{index:04X} ({name}) of the drive is {stated} counts, and zero_offset_rad belongs to {expected} \
+             (home_offset_counts): the drive's zero may have been shifted by the difference; compare the joint's angle with \
+             the arm, then correct zero_offset_rad and state home_offset_counts = {stated}, or set the object back and save \
+             it, {overrule}"
+        ),
         ScaleObject::Polarity => format!(
             "object 0x{index:04X} ({name}) of the drive is {stated}: bit 7 turns the direction of its positions round, and the \
              settings expect 0, with the direction in `sign`; clear the bit in the drive and save it, {overrule}"
@@ -233,6 +266,7 @@ mod tests {
         counts_per_rev: 131_072.0,
         gear_ratio: 101.0,
         range_counts: [-6_000_000, 6_000_000],
+        home_offset_counts: -500,
         overruled: Overruled::NONE,
     };
 
@@ -247,7 +281,7 @@ mod tests {
 
     #[test]
     fn drives_that_agree_or_have_no_such_objects_are_taken() {
-        let fits: [&[(u16, u8, u32)]; 9] = [
+        let fits: [&[(u16, u8, u32)]; 11] = [
             &[],
             &[(0x608F, 1, 131_072), (0x608F, 2, 1)],
             &[(0x608F, 1, 262_144), (0x608F, 2, 2), (0x6091, 1, 202), (0x6091, 2, 2)],
@@ -258,6 +292,8 @@ mod tests {
             // Bit 6 concerns velocities alone.
             &[(0x607E, 0, 0x40)],
             &[(0x607D, 1, 0), (0x607D, 2, 0), (0x607B, 1, 0), (0x607B, 2, 0)],
+            &[(0x6093, 1, 7), (0x6093, 2, 7)],
+            &[(0x607C, 0, (-500_i32).cast_unsigned())],
             &[(0x607D, 1, (-6_000_000_i32).cast_unsigned()), (0x607D, 2, 6_000_000)],
         ];
         for has in fits {
@@ -271,7 +307,7 @@ mod tests {
     #[test]
     fn drives_that_contradict_the_settings_are_refused_by_object_and_numbers() {
         let minus = |counts: i32| (-counts).cast_unsigned();
-        let cases: [Case<'_>; 12] = [
+        let cases: [Case<'_>; 18] = [
             (&[(0x608F, 1, 65_536), (0x608F, 2, 1)], (0x608F, 1)),
             (&[(0x608F, 1, 131_072), (0x608F, 2, 4)], (0x608F, 1)),
             (&[(0x608F, 1, 131_072), (0x608F, 2, 0)], (0x608F, 1)),
@@ -281,6 +317,12 @@ mod tests {
             (&[(0x6092, 1, 360_000), (0x6092, 2, 1)], (0x6092, 1)),
             // With the gear in the drive, its shaft is the link's.
             (&[(0x6091, 1, 101), (0x6091, 2, 1), (0x6092, 1, 131_072), (0x6092, 2, 1)], (0x6092, 1)),
+            (&[(0x6093, 1, 2), (0x6093, 2, 1)], (0x6093, 1)),
+            (&[(0x6093, 1, 131_072), (0x6093, 2, 360_000)], (0x6093, 1)),
+            (&[(0x6093, 1, 0), (0x6093, 2, 1)], (0x6093, 1)),
+            (&[(0x607C, 0, 0)], (0x607C, 0)),
+            (&[(0x607C, 0, 500)], (0x607C, 0)),
+            (&[(0x607C, 0, minus(501))], (0x607C, 0)),
             (&[(0x607E, 0, 0x80)], (0x607E, 0)),
             (&[(0x607D, 1, minus(5_999_998)), (0x607D, 2, 6_000_000)], (0x607D, 1)),
             (&[(0x607D, 1, minus(6_000_000)), (0x607D, 2, 0)], (0x607D, 2)),

@@ -134,6 +134,10 @@ objects! {
     FEED = 0x6092:1;
     /// Feed constant, in so many shaft revolutions, u32.
     FEED_SHAFT_REVOLUTIONS = 0x6092:2;
+    /// Position factor, increments, u32.
+    FACTOR_INCREMENTS = 0x6093:1;
+    /// Position factor, in so many position units, u32.
+    FACTOR_UNITS = 0x6093:2;
     /// Quick stop deceleration, u32.
     QUICK_STOP_DECELERATION = 0x6085:0;
     /// Position offset, i32, counts.

@@ -16,7 +16,8 @@ A fault is  joint=NAME|NUMBER,kind=KIND[,value=V][,after=start|enable|moving][,a
 Lines on the standard input do the same while it runs:  fault SPEC | clear | clear joint=NAME | status
 
 An object is  joint=NAME|NUMBER,object=0xINDEX:SUB,value=NUMBER|absent  (all joints without joint=). A drive whose gear ratio
-(0x6091), feed constant (0x6092) or polarity (0x607E) is changed counts as it says. [simulator] takes the same texts as a list: objects.
+(0x6091), feed constant (0x6092), position factor (0x6093), home offset (0x607C) or polarity (0x607E) is changed counts as it says.
+[simulator] takes the same texts as a list: objects.
 
 Examples:
   taustream-servosim --settings vcan6 --start-rad \"0,-1.57,1.57,-1.57,-1.57,0\"

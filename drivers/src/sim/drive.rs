@@ -33,6 +33,8 @@ pub struct DriveParameters {
     pub counts_per_rev: f64,
     /// Link angle at encoder count 0.
     pub zero_offset_rad: f64,
+    /// Its home offset (0x607C), which that angle includes, counts.
+    pub home_offset_counts: i32,
     /// It skips a part of an RPDO that a dummy entry of its mapping names.
     pub dummy_mapping: bool,
     /// Link angle at power-up.

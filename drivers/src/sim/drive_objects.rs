@@ -69,6 +69,7 @@ impl Drive {
             (0x6065, 0, register(window, 0, i32::MAX)),
             (0x6066, 0, i64::from(parameters.following_timeout_ms)),
             (0x6076, 0, register(parameters.plant.torque_nm_max * 1000.0, 0, i32::MAX)),
+            (0x607C, 0, i64::from(parameters.home_offset_counts)),
             (0x607D, 1, limits[0].min(limits[1])),
             (0x607D, 2, limits[0].max(limits[1])),
             (0x6084, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),

@@ -146,12 +146,18 @@ fn counted_as_stated(shipped: &DriveParameters, dictionary: &Dictionary) -> Driv
         Some(feed) => Some(feed / gear.unwrap_or(1.0)),
         None => ratio(object::ENCODER_INCREMENTS, object::ENCODER_REVOLUTIONS),
     };
+    let factor = ratio(object::FACTOR_INCREMENTS, object::FACTOR_UNITS);
     let turned_round = dictionary.get(object::POLARITY.index, 0) & 0x80 != 0;
-    DriveParameters {
-        counts_per_rev: stated.unwrap_or(shipped.counts_per_rev),
+    let counted = DriveParameters {
+        counts_per_rev: stated.unwrap_or(shipped.counts_per_rev) / factor.unwrap_or(1.0),
         sign: if turned_round { -shipped.sign } else { shipped.sign },
         ..*shipped
-    }
+    };
+    // CiA 402: the zero lies at the home position plus the offset.
+    let home_offset = dictionary.get(object::HOME_OFFSET.index, 0) - i64::from(shipped.home_offset_counts);
+    #[expect(clippy::cast_precision_loss, reason = "a difference of two 32-bit numbers")]
+    let shift_rad = home_offset as f64 / counted.counts_per_rad();
+    DriveParameters { zero_offset_rad: shipped.zero_offset_rad + shift_rad, ..counted }
 }
 
 /// Two 32-bit numbers whose ratio is this; none when there are none.

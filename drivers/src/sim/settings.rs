@@ -203,6 +203,7 @@ impl Section<'_> {
             gear_ratio: cia402.gear_ratio,
             counts_per_rev: cia402.counts_per_rev,
             zero_offset_rad: servo.zero_offset_rad,
+            home_offset_counts: cia402.home_offset_counts,
             dummy_mapping: self.flag("dummy_mapping", at, true),
             start_rad: self.start_rad(at, limits),
             plant,

@@ -1,8 +1,8 @@
 //! From silence to a configured motor: what is looked at, what is written, and what is refused.
-use super::{Arm, edited, motor_of, pos_vel};
+use super::{Arm, JOINTS, edited, motor_of, pos_vel};
 use taustream_arm::BusKind;
 use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
-use taustream_drivers::{CanFrame, DriveState, DriveTarget};
+use taustream_drivers::{CanFrame, DriveState, DriveTarget, drivers};
 
 /// Everything that motor 1 is sent, without repetitions of the same frame.
 fn requests(arm: &mut Arm, cycles: u32) -> Vec<Request> {
@@ -141,6 +141,37 @@ fn motor_that_somebody_else_has_energised_is_left_alone_until_torque_off() {
     assert_eq!(arm.nibble(2), 0, "the emergency reaches it in the same cycle");
     arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::Disabled);
+}
+
+/// Goal: motors that a streamer has left energised are never adopted by guess, in either mode: the next one says so, what to
+/// do, and sends nothing but requests for feedback; an arm that was made safe comes up.
+#[test]
+fn motors_that_a_dead_streamer_left_energised_are_unowned_in_each_mode() {
+    for settings in [edited(&[]), pos_vel()] {
+        let mut arm = Arm::enabled(settings.clone());
+        arm.driver = drivers::of_bus(&settings, 0).unwrap();
+        arm.drive_target = DriveTarget::Disabled;
+        arm.until(DriveState::EnergisedUnowned);
+        for joint in 0..JOINTS {
+            let said = arm.why(joint);
+            for words in ["energised before this streamer came", "`torque-off`", "TIMEOUT", "`clear-fault`"] {
+                assert!(said.contains(words), "{said}");
+            }
+        }
+        arm.step();
+        for frame in &arm.sent {
+            let node = frame.data()[0];
+            let request = Request::decode(frame, node);
+            assert!(
+                matches!(request, None | Some(Request::Refresh)),
+                "an energised motor was sent {frame:?}"
+            );
+        }
+        // Nobody commands them: their own watchdogs disable them, which is a fault until it is cleared.
+        arm.until(DriveState::Fault);
+        arm.clear_faults();
+        arm.enable();
+    }
 }
 
 #[test]

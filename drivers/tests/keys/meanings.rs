@@ -203,6 +203,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: servo[].zero_offset_rad", "Joint angle where the drive's position is 0."),
     ("Settings files: servo[].gear_ratio", "CiA 402: motor revolutions for one of the joint."),
     ("Settings files: servo[].counts_per_rev", "CiA 402: position counts for one motor revolution."),
+    (
+        "Settings files: servo[].home_offset_counts",
+        "CiA 402: what the drive stated as its home offset (0x607C) when `zero_offset_rad` was determined; 0.",
+    ),
     ("Settings files: servo[].feedback", "What the encoder knows after power-up."),
     ("Settings files: servo[].feedback_range_rad", "Joint angles that the feedback tells apart."),
     ("Settings files: servo[].reaction", "What the drive does when setpoints stop coming."),

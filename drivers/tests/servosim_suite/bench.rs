@@ -15,6 +15,7 @@ pub(crate) fn parameters() -> DriveParameters {
         gear_ratio: 100.0,
         counts_per_rev: 4096.0,
         zero_offset_rad: ZERO_RAD,
+        home_offset_counts: 0,
         dummy_mapping: true,
         start_rad: START_RAD,
         plant: PlantParameters {

@@ -17,12 +17,15 @@ fn with_objects(texts: &[&str]) -> Settings {
 /// Goal: each object that contradicts refuses that drive before anything is energised, and no other.
 #[test]
 fn planted_contradictions_are_refused_at_the_one_joint_that_has_them() {
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["object=0x608F:01,value=65536"], "0x608F (position encoder resolution) of the drive says 65536"),
         (&["object=0x608F:02,value=2"], "0x608F (position encoder resolution) of the drive says 65536"),
         (&["object=0x6091:01,value=50"], "0x6091 (gear ratio) of the drive says 50"),
         (&["object=0x6091:02,value=0"], "a zero in it"),
         (&["object=0x6092:01,value=1000000"], "0x6092 (feed constant) of the drive says 1000000"),
+        (&["object=0x6093:01,value=2"], "0x6093 (position factor) of the drive says 2 increments"),
+        (&["object=0x6093:02,value=0"], "a zero in it"),
+        (&["object=0x607C,value=-4096"], "0x607C (home offset) of the drive is -4096 counts"),
         (&["object=0x607E,value=0x80"], "0x607E (polarity) of the drive is 128"),
         (
             &["object=0x607D:02,value=1000"],
@@ -46,10 +49,10 @@ fn planted_contradictions_are_refused_at_the_one_joint_that_has_them() {
 /// Goal: drives that do not have the objects come up as they always did.
 #[test]
 fn drives_without_the_objects_come_up() {
-    let gone: Vec<String> = ["0x608F", "0x6091", "0x6092", "0x607D", "0x607B"]
+    let gone: Vec<String> = ["0x608F", "0x6091", "0x6092", "0x6093", "0x607D", "0x607B"]
         .iter()
         .flat_map(|index| [1, 2].map(|sub| format!("object={index}:{sub:02},value=absent")))
-        .chain(["object=0x607E,value=absent".to_owned()])
+        .chain(["0x607C", "0x607E"].map(|index| format!("object={index},value=absent")))
         .collect();
     let gone: Vec<&str> = gone.iter().map(String::as_str).collect();
     let mut arm = Arm::with(with_objects(&gone));
@@ -81,6 +84,55 @@ fn overruled_gear_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
     assert!(error_rad < 0.005, "feedback differs by {error_rad} rad");
     // Half the units a motor revolution: 0.2 rad commanded are 0.4 rad of the link.
     assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
+}
+
+/// The settings with these objects of the elbow's drive overruled.
+fn overruling(objects: &[ScaleObject], mut settings: Settings) -> Settings {
+    let Protocol::Cia402(cia402) = &mut settings.servos[2].protocol else { unreachable!() };
+    for object in objects {
+        cia402.overruled = cia402.overruled.with(*object);
+    }
+    settings
+}
+
+/// Goal: the same for the position factor.
+#[test]
+fn overruled_position_factor_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
+    let settings = with_objects(&["object=0x6093:01,value=2", "object=0x607D:01,value=absent"]);
+    let mut arm = Arm::with(overruling(&[ScaleObject::PositionFactor, ScaleObject::SoftLimit], settings));
+    arm.enable();
+    let before_rad = arm.simulator.drive(2).unwrap().position_rad();
+    for _ in 0..400 {
+        arm.commands[2].position_rad += 0.5e-3;
+        arm.cycle(DriveTarget::Enabled);
+    }
+    for _ in 0..200 {
+        arm.cycle(DriveTarget::Enabled);
+    }
+    let moved_rad = arm.simulator.drive(2).unwrap().position_rad() - before_rad;
+    let error_rad = (arm.status(2).position_rad - arm.commands[2].position_rad).abs();
+    assert!(error_rad < 0.005, "feedback differs by {error_rad} rad");
+    assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
+}
+
+/// Goal: a home offset shifts where the drive says that the joint is; one that the settings state is part of its zero.
+#[test]
+fn home_offset_shifts_the_zero_unless_the_settings_state_it() {
+    const OFFSET_COUNTS: i32 = 1_000_000;
+    let shift_rad = f64::from(OFFSET_COUNTS) / (131_072.0 * 101.0) * std::f64::consts::TAU;
+    let planted = || with_objects(&["object=0x607C,value=1000000"]);
+    let mut lying = Arm::with(overruling(&[ScaleObject::HomeOffset], planted()));
+    lying.reach(DriveTarget::Disabled, DriveState::Disabled);
+    let off_rad = lying.simulator.drive(2).unwrap().position_rad() - lying.status(2).position_rad;
+    assert!((off_rad.abs() - shift_rad).abs() < 1e-4, "off by {off_rad} rad instead of {shift_rad}");
+
+    let mut stated = shipped();
+    let Protocol::Cia402(cia402) = &mut stated.servos[2].protocol else { unreachable!() };
+    cia402.home_offset_counts = OFFSET_COUNTS;
+    let mut arm = Arm::with(stated.clone());
+    arm.enable();
+    let off_rad = arm.simulator.drive(2).unwrap().position_rad() - arm.status(2).position_rad;
+    assert!(off_rad.abs() < 1e-3, "off by {off_rad} rad");
 }
 
 /// Goal: an energised drive that counts otherwise is not taken over.
