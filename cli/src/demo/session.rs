@@ -181,14 +181,12 @@ impl<'a> Session<'a> {
         self.look()?;
         let seen = self.seen.into_inner();
         let last = seen.last.ok_or_else(|| Failure::Failed("no report was received".to_owned()))?;
-        Ok(Summary {
-            tracking_error_rad_max,
-            faults: self.faults,
-            pauses: self.pauses.into_inner(),
-            unmodelled_links: self.arm.unmodelled_links.clone(),
-            samples: seen.samples,
-            ..Summary::new(&last, self.moves)
-        })
+        let mut summary = Summary::new(&last, self.moves);
+        summary.tracking_error_rad_max = tracking_error_rad_max;
+        (summary.faults, summary.pauses) = (self.faults, self.pauses.into_inner());
+        summary.unmodelled_links.clone_from(&self.arm.unmodelled_links);
+        summary.samples = seen.samples;
+        Ok(summary)
     }
 
     /// A failure while the arm is in a fault is reported with the fault: it is the cause.
