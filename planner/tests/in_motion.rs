@@ -8,7 +8,6 @@ use taustream_motion::cut::{difference, kept};
 use taustream_motion::limits::check_motion_from;
 use taustream_motion::{JointLimits, MAX_JOINTS, Trajectory};
 use taustream_planner::PlanOptions;
-use taustream_planner::budget::Budget;
 use taustream_planner::in_motion::{CutPoint, NoReplacement, Surroundings};
 use taustream_planner::timing::Path;
 
@@ -20,7 +19,7 @@ const THERE: [f64; 6] = [-0.6, -1.5, 1.5, -1.57, -1.57, 0.0];
 fn train(limits: &[JointLimits; MAX_JOINTS]) -> Trajectory {
     let corners_rad = [pose(HOME), pose(AWAY)];
     let path = Path { corners_rad: &corners_rad, joints: 6, limits };
-    path.fastest(&[], &Budget::unbounded()).expect("a timing").trajectory
+    path.stopping().expect("a timing").trajectory
 }
 
 /// Highest use of the motion limits of acceleration and jerk from a cut on, by a dense scan.
