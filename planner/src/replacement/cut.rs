@@ -28,7 +28,9 @@ pub(super) struct Cut<'a> {
     pub limits: &'a [JointLimits; MAX_JOINTS],
     /// The strokes that have begun.
     pub kept: &'a [Stroke],
-    /// Pose after them.
+    /// Those that have not.
+    pub dropped: &'a [Stroke],
+    /// Pose after the kept ones.
     pub kept_end_rad: JointArray,
     /// When the last of them ends, after the cut (s); 0 when all have.
     pub kept_end_s: f64,
@@ -51,12 +53,13 @@ impl<'a> Cut<'a> {
             return None;
         }
         let begun = running.strokes().partition_point(|stroke| stroke.start_s < at_s);
-        let kept = running.strokes().get(..begun)?;
+        let (kept, dropped) = running.strokes().split_at(begun);
         let mut cut = Self {
             running,
             at_s,
             limits,
             kept,
+            dropped,
             kept_end_rad: *running.base_rad(),
             kept_end_s: 0.0,
             kernel_s: f64::INFINITY,

@@ -14,7 +14,7 @@ mod factor;
 mod fit;
 mod reference;
 
-use basis::{Instants, Slot, Widths, slots};
+use basis::{Instants, Slot, Widths, continued, slots};
 use cut::{AllRates, Cut};
 use factor::Factor;
 use fit::{Problem, Rates, System};
@@ -136,10 +136,15 @@ impl<'a> Attempt<'a> {
         let (middle_s, last_s) = (MIDDLE * duration_s, LAST * duration_s);
         // Narrower than what they have to cancel, but not narrower each time that a replacement is replaced.
         let first_s = cut.kernel_s.min((FIRST * cut.kernel_s).max(last_s)).min(middle_s);
+        let continued = continued(cut.dropped, cut.at_s, duration_s);
+        let first_s = continued.first().map_or(first_s, |slot| slot.width_s);
         let widths = Widths { duration_s, first_s, middle_s, last_s };
-        let slots = slots(&widths).filter(|slots| cut.kept.len() + slots.len() <= MAX_STROKES)?;
+        // Strokes made elsewhere may end more steeply than ours.
+        let fine_until_s =
+            continued.last().map_or(0.0, |slot| slot.start_s + slot.width_s).max(cut.kept_end_s);
+        let slots = slots(continued, &widths).filter(|slots| cut.kept.len() + slots.len() <= MAX_STROKES)?;
         let instants = Instants::fitted(&slots);
-        let checked = instants.checked(&slots, duration_s, cut.kept_end_s);
+        let checked = instants.checked(&slots, duration_s, fine_until_s);
         let motion = cut.limits[slowest].motion;
         let weights = [motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3]
             .map(|limit| 1.0 / (limit * limit));
@@ -159,7 +164,7 @@ impl<'a> Attempt<'a> {
         strokes.extend(self.slots.iter().map(|slot| Stroke {
             start_s: self.cut.at_s + slot.start_s,
             duration_s: slot.width_s,
-            n: basis::EXPONENT,
+            n: slot.n,
             delta_rad: [0.0; MAX_JOINTS],
         }));
         let new = self.cut.kept.len();
