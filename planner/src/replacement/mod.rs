@@ -58,7 +58,10 @@ pub fn replacement(
     if !goal_rad.iter().all(|goal| goal.is_finite()) {
         return None;
     }
-    search(&cut, Some(goal_rad), f64::INFINITY).or_else(|| rest_first(&cut, goal_rad))
+    let direct = search(&cut, Some(goal_rad), f64::INFINITY);
+    // Soon after the start of a motion the other way, coming to rest first may be quicker than turning in motion.
+    let below_s = direct.as_ref().map_or(f64::INFINITY, Trajectory::duration_s);
+    rest_first(&cut, goal_rad, below_s).or(direct)
 }
 
 /// The motion that keeps the strokes that have begun at `cut_s` (`start_s < cut_s`), and comes to rest as soon as it can
@@ -87,11 +90,11 @@ pub fn without_ended(running: &Trajectory, from_s: f64) -> Trajectory {
     Trajectory::new(running.joints(), base_rad, left).unwrap_or_else(|_| running.clone())
 }
 
-/// To rest, and from there to the goal.
-fn rest_first(cut: &Cut, goal_rad: &JointArray) -> Option<Trajectory> {
+/// To rest, and from there to the goal, if that ends before `below_s`.
+fn rest_first(cut: &Cut, goal_rad: &JointArray, below_s: f64) -> Option<Trajectory> {
     let at_rest = to_rest(cut.running, cut.at_s, cut.limits)?;
     let from_rest = Cut::new(&at_rest, at_rest.duration_s().max(cut.at_s), cut.limits)?;
-    search(&from_rest, Some(goal_rad), f64::INFINITY)
+    search(&from_rest, Some(goal_rad), below_s - from_rest.at_s)
 }
 
 /// The shortest motion found that takes less than `below_s` from the cut on.
