@@ -1,6 +1,6 @@
 //! Motions that are replaced while they run, over the real processes. The recording is checked to the bit, as for every scenario:
 //! each trajectory makes the setpoints from its cut on, and gives the same bits there as the one that it cuts.
-use crate::scenarios::{CheckMode, Goals, Scenario, arrive_within, enable};
+use crate::scenarios::{CheckMode, Goals, Scenario, arrive_within, enable, end_at};
 use crate::test_bench::TestBench;
 use crate::virtual_arm::random::SeededRng;
 use anyhow::{Context, Result, ensure};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use taustream_messages::Phase;
 
 /// Replans of one run; `TAUSTREAM_REPLANS` replaces it.
-const REPLANS: u64 = 20;
+const REPLANS: u64 = 8;
 /// How far a servo may be from the goal when the arm holds.
 const AT_GOAL_RAD: f64 = 5e-3;
 
@@ -75,11 +75,5 @@ fn queue(bench: &mut TestBench, goals: &Goals) -> Result<()> {
         let words = words(goal)?;
         bench.cli_done(&words.iter().map(String::as_str).collect::<Vec<_>>())?;
     }
-    let goal_rad = goals.rad(2)?;
-    let report = bench.await_through_stalls("the last goal of the queue", |report, phase| {
-        phase == Phase::Holding
-            && goal_rad.iter().zip(report.command_rad).all(|(goal, at)| (goal - at).abs() < 1e-9)
-    })?;
-    ensure!(report.guard_trips == 0, "the guard tripped {} times", report.guard_trips);
-    Ok(())
+    end_at(bench, goals.rad(2)?)
 }

@@ -170,17 +170,27 @@ fn three_goals(bench: &mut TestBench, goals: &Goals) -> Result<()> {
 
 fn pause_and_resume(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     enable(bench)?;
-    let motion = set_off(bench, goals, 0, 0.2)?;
+    set_off(bench, goals, 0, 0.2)?;
     bench.cli_done(&["pause"])?;
     let paused = bench.await_phase(Phase::Paused)?;
     ensure!(paused.sigma == 0.0, "paused at sigma = {}", paused.sigma);
     ensure!(paused.trajectory_s < paused.trajectory_duration_s, "the motion had ended before the pause");
-    bench.cli_refused(&["replan", "--goal", &goals.text(1)?], "paused")?;
+    // A goal for afterwards is taken, and waits.
+    bench.cli_done(&["replan", "--after-current", "--goal", &goals.text(1)?])?;
     let still = bench.report()?.0;
     let bits = |report: &Report| report.command_rad.map(f64::to_bits);
     ensure!(bits(&still) == bits(&paused), "the command moved while paused");
     bench.cli_done(&["resume"])?;
-    arrive(bench, motion, goals.rad(0)?)?;
+    end_at(bench, goals.rad(1)?)
+}
+
+/// Waits until everything that was accepted has run, and the arm holds at a goal.
+pub(crate) fn end_at(bench: &mut TestBench, goal_rad: &[f64]) -> Result<()> {
+    let report = bench.await_through_stalls("the last goal", |report, phase| {
+        phase == Phase::Holding
+            && goal_rad.iter().zip(report.command_rad).all(|(goal, at)| (goal - at).abs() < 1e-9)
+    })?;
+    ensure!(report.guard_trips == 0, "the guard tripped {} times", report.guard_trips);
     Ok(())
 }
 
