@@ -55,7 +55,9 @@ fn licences(place: &Place) -> Result<Outcome> {
     let tools = place.target.join("tools");
     let mut path = env::var_os("PATH").unwrap_or_default();
     if !packages::exists("cargo-deny") {
-        let install = ["install", "--locked", "--quiet", "cargo-deny", "--version", DENY_VERSION, "--root"];
+        // Without optimisation: building takes most of the time.
+        let install =
+            ["install", "--debug", "--locked", "--quiet", "cargo-deny", "--version", DENY_VERSION, "--root"];
         let what = "cargo-deny from crates.io (some minutes, once)";
         perform(what, place.cargo().args(install).arg(&tools))?;
         let all = std::iter::once(tools.join("bin")).chain(env::split_paths(&path));
