@@ -95,7 +95,7 @@ fn planning_one_seed_gives_one_answer_on_any_thread() {
     // Only a run that the clock did not cut promises the same answer; a busy machine may need some tries for one.
     let run = || -> Plan {
         for _ in 0..20 {
-            let options = options(7, 700, PlannerKind::RrtConnect);
+            let options = options(7, 2_000, PlannerKind::RrtConnect);
             let plan = plan(&robot, &scene, &start, &goal, &options).expect("found");
             if !plan.how.contains("cut short") {
                 return plan;
@@ -111,7 +111,7 @@ fn planning_one_seed_gives_one_answer_on_any_thread() {
     for other in [second, third] {
         assert_eq!((&first.trajectory, &first.how), (&other.trajectory, &other.how));
     }
-    let other_seed = plan(&robot, &scene, &start, &goal, &options(8, 700, PlannerKind::RrtConnect));
+    let other_seed = plan(&robot, &scene, &start, &goal, &options(8, 2_000, PlannerKind::RrtConnect));
     assert_ne!(first.trajectory, other_seed.expect("found").trajectory, "another seed, another motion");
 }
 
