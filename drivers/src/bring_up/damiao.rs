@@ -37,11 +37,11 @@ enum MotorStage {
     Observe { since: Nanos },
     /// Found energised; watched, left alone.
     Unowned,
-    /// At this job of [`CONFIGURE`].
+    /// At this job of [`crate::bring_up::damiao_plan::CONFIGURE`].
     Configure { job: usize, since: Nanos },
     /// Configured, not energised.
     Ready,
-    /// At this job of [`VERIFY`], on the way to energised.
+    /// At this job of [`crate::bring_up::damiao_plan::VERIFY`], on the way to energised.
     Verify { job: usize, since: Nanos },
     /// Waiting for a fresh position.
     Arm { since: Nanos },

@@ -3,8 +3,8 @@
 //! The strokes that have begun at the cut run on, bit by bit as they are; the others are dropped and new ones are added. The
 //! sum is C3 whatever the new ones are, but not inside the limits: pending strokes of a train cancel running ones, so
 //! dropping them alone takes several times the acceleration and jerk that the arm may use. The weights of the new strokes
-//! are therefore fitted so that kept and new ones *together* follow a time-optimal reference ([`reference`]), and are
-//! projected into the limits ([`fit`]). The duration is raised in steps until the sum fits.
+//! are therefore fitted so that kept and new ones *together* follow a time-optimal reference (`reference`), and are
+//! projected into the limits (`fit`). The duration is raised in steps until the sum fits.
 //!
 //! Everything here is a pure function of its arguments. What it returns holds the motion limits at closely spaced instants;
 //! [`crate::verify()`] proves the rest, positions and clearance included.
