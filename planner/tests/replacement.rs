@@ -5,9 +5,10 @@ use rsruckig::prelude::{
     ControlInterface, InputParameter, Ruckig, Synchronization, ThrowErrorHandler,
     Trajectory as RuckigTrajectory,
 };
+use taustream_motion::cut::kept;
 use taustream_motion::limits::check_motion;
 use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Stroke, Trajectory};
-use taustream_planner::replacement::{replacement, to_rest, without_ended};
+use taustream_planner::replacement::{replacement, to_rest};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::timing::Path;
 
@@ -231,7 +232,8 @@ fn motion_without_its_ended_strokes_has_the_same_bits() {
         let (cut_s, goal_rad) = cut(&mut rng, &running, 0.0);
         let new = replacement(&running, cut_s, &goal_rad, &limits).unwrap();
         let from_s = cut_s + (new.duration_s() - cut_s) * rng.within(0.0, 1.1);
-        let short = without_ended(&new, from_s);
+        let kept = kept(&new, f64::INFINITY, from_s);
+        let short = Trajectory::new(JOINTS, kept.base_rad, kept.strokes).unwrap();
         assert!(short.strokes().len() <= new.strokes().len());
         for part in 0..100 {
             let t_s = from_s + f64::from(part) * 0.01;

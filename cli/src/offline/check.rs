@@ -11,7 +11,7 @@ use std::fmt;
 use std::path::Path;
 use taustream_arm::stopping::STOP_S_MAX;
 use taustream_arm::text::counted;
-use taustream_arm::{Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
+use taustream_arm::{Faults, Reaction, Robot, Scene, Servo, Settings, TrajectoryFile};
 
 /// Reads whatever kind of file it is, and prints what it says; every fault at once when it is not sound.
 pub(crate) fn run(form: Form, args: &CheckArgs) -> Result<(), Failure> {
@@ -58,26 +58,28 @@ fn check_robot(form: Form, path: &Path) -> Result<(), Failure> {
     let robot = Robot::load(path)?;
     let shown = CheckedRobot::of(&robot);
     let Err(faults) = robot.require_stops(STOP_S_MAX) else { return form.print(&Verdict(shown)) };
-    if form == Form::Text {
-        form.progress(&faults);
-        form.print(&shown)?;
-        return Err(Failure::unfit(path, format!("REFUSED: {} fault(s), listed first", faults.0.len())));
-    }
-    form.print(&shown)?;
-    Err(faults.into())
+    Err(refused(form, path, &shown, faults))
 }
 
 /// Settings whose only fault is a bus that is too full are shown with its table and the remedies, and refused all the same.
 fn check_settings(form: Form, path: &Path) -> Result<(), Failure> {
     let shown = CheckedSettings::of(&Settings::load_overloaded(path)?);
     let Err(faults) = Settings::load(path) else { return form.print(&Verdict(shown)) };
+    Err(refused(form, path, &shown, faults))
+}
+
+/// Shows what is refused, after its faults.
+fn refused(form: Form, path: &Path, shown: &(impl Serialize + fmt::Display), faults: Faults) -> Failure {
     if form == Form::Text {
         form.progress(&faults);
-        form.print(&shown)?;
-        return Err(Failure::unfit(path, format!("REFUSED: {} fault(s), listed first", faults.0.len())));
     }
-    form.print(&shown)?;
-    Err(faults.into())
+    match form.print(shown) {
+        Err(unwritten) => unwritten,
+        Ok(()) if form == Form::Text => {
+            Failure::unfit(path, format!("REFUSED: {} fault(s), listed first", faults.0.len()))
+        }
+        Ok(()) => faults.into(),
+    }
 }
 
 /// A scene that is sound.

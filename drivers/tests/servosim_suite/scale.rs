@@ -70,6 +70,13 @@ fn overruled_gear_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
     }
     assert_ne!(cia402.overruled, Overruled::NONE);
     let mut arm = Arm::with(settings);
+    let moved_rad = moved_by_fifth_of_a_radian(&mut arm);
+    // Half the units a motor revolution: 0.2 rad commanded are 0.4 rad of the link.
+    assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
+}
+
+/// Commands the elbow 0.2 rad on, with feedback that agrees; by how much its link has moved, rad.
+fn moved_by_fifth_of_a_radian(arm: &mut Arm) -> f64 {
     arm.enable();
     let before_rad = arm.simulator.drive(2).unwrap().position_rad();
     for _ in 0..400 {
@@ -82,8 +89,7 @@ fn overruled_gear_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
     let moved_rad = arm.simulator.drive(2).unwrap().position_rad() - before_rad;
     let error_rad = (arm.status(2).position_rad - arm.commands[2].position_rad).abs();
     assert!(error_rad < 0.005, "feedback differs by {error_rad} rad");
-    // Half the units a motor revolution: 0.2 rad commanded are 0.4 rad of the link.
-    assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
+    moved_rad
 }
 
 /// The settings with these objects of the elbow's drive overruled.
@@ -100,18 +106,7 @@ fn overruling(objects: &[ScaleObject], mut settings: Settings) -> Settings {
 fn overruled_position_factor_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
     let settings = with_objects(&["object=0x6093:01,value=2", "object=0x607D:01,value=absent"]);
     let mut arm = Arm::with(overruling(&[ScaleObject::PositionFactor, ScaleObject::SoftLimit], settings));
-    arm.enable();
-    let before_rad = arm.simulator.drive(2).unwrap().position_rad();
-    for _ in 0..400 {
-        arm.commands[2].position_rad += 0.5e-3;
-        arm.cycle(DriveTarget::Enabled);
-    }
-    for _ in 0..200 {
-        arm.cycle(DriveTarget::Enabled);
-    }
-    let moved_rad = arm.simulator.drive(2).unwrap().position_rad() - before_rad;
-    let error_rad = (arm.status(2).position_rad - arm.commands[2].position_rad).abs();
-    assert!(error_rad < 0.005, "feedback differs by {error_rad} rad");
+    let moved_rad = moved_by_fifth_of_a_radian(&mut arm);
     assert!((moved_rad - 0.4).abs() < 0.02, "moved by {moved_rad} rad");
 }
 

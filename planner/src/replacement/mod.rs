@@ -74,22 +74,6 @@ pub fn to_rest(running: &Trajectory, cut_s: f64, limits: &[JointLimits; MAX_JOIN
     search(&cut, None, running.duration_s() - cut_s).or_else(|| Some(running.clone()))
 }
 
-/// The same motion from `from_s` on, with the strokes that have ended before it added to the base: up to the first stroke that
-/// still runs, in their order, so that every sample from `from_s` on has the same bits. For motions that are replaced many
-/// times, whose begun strokes would fill a message.
-#[must_use]
-pub fn without_ended(running: &Trajectory, from_s: f64) -> Trajectory {
-    let ended = running.strokes().iter().take_while(|stroke| stroke.has_ended(from_s)).count();
-    let (ended, left) = running.strokes().split_at(ended);
-    let mut base_rad = *running.base_rad();
-    for stroke in ended {
-        for (base, delta) in base_rad.iter_mut().zip(&stroke.delta_rad) {
-            *base += delta;
-        }
-    }
-    Trajectory::new(running.joints(), base_rad, left).unwrap_or_else(|_| running.clone())
-}
-
 /// To rest, and from there to the goal, if that ends before `below_s`.
 fn rest_first(cut: &Cut, goal_rad: &JointArray, below_s: f64) -> Option<Trajectory> {
     let at_rest = to_rest(cut.running, cut.at_s, cut.limits)?;

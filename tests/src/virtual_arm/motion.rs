@@ -25,13 +25,7 @@ pub fn random_train(
     let mut strokes = Vec::new();
     let mut start_s = 0.0;
     for _ in 0..rng.whole(1, 3) {
-        let mut delta_rad = [0.0; MAX_JOINTS];
-        for joint in 0..joints {
-            let [low, high] = limits[joint].position_rad;
-            let goal_rad = home_rad[joint] + rng.within(-REACH_RAD, REACH_RAD);
-            delta_rad[joint] = goal_rad.clamp(low + 0.1, high - 0.1) - at_rad[joint];
-            at_rad[joint] += delta_rad[joint];
-        }
+        let delta_rad = random_delta(rng, robot, home_rad, &mut at_rad);
         let duration_s = rng.within(0.3, 0.6);
         let n = u32::try_from(rng.whole(5, 8)).ok()?;
         strokes.push(Stroke { start_s, duration_s, n, delta_rad });
@@ -48,6 +42,23 @@ pub fn random_train(
         }
     }
     None
+}
+
+/// The way to a random pose around home, which `at_rad` then is.
+fn random_delta(
+    rng: &mut SeededRng,
+    robot: &Robot,
+    home_rad: &JointArray,
+    at_rad: &mut JointArray,
+) -> JointArray {
+    let mut delta_rad = [0.0; MAX_JOINTS];
+    for (joint, described) in robot.joints.iter().enumerate() {
+        let [low, high] = described.limits.position_rad;
+        let goal_rad = home_rad[joint] + rng.within(-REACH_RAD, REACH_RAD);
+        delta_rad[joint] = goal_rad.clamp(low + 0.1, high - 0.1) - at_rad[joint];
+        at_rad[joint] += delta_rad[joint];
+    }
+    delta_rad
 }
 
 /// A straight move that cruises, as fast as the limits allow: strokes of one form at even spacing, of which pending ones cancel
@@ -111,13 +122,7 @@ pub fn random_replacement(
     let mut new = Vec::new();
     let mut after_s = rng.within(0.0, 0.3);
     for _ in 0..rng.whole(1, 2) {
-        let mut delta_rad = [0.0; MAX_JOINTS];
-        for joint in 0..joints {
-            let [low, high] = limits[joint].position_rad;
-            let goal_rad = home_rad[joint] + rng.within(-REACH_RAD, REACH_RAD);
-            delta_rad[joint] = goal_rad.clamp(low + 0.1, high - 0.1) - at_rad[joint];
-            at_rad[joint] += delta_rad[joint];
-        }
+        let delta_rad = random_delta(rng, robot, home_rad, &mut at_rad);
         let duration_s = rng.within(0.3, 0.6);
         new.push(Stroke { start_s: after_s, duration_s, n: u32::try_from(rng.whole(5, 8)).ok()?, delta_rad });
         after_s += duration_s * rng.within(0.6, 1.1);
