@@ -1,6 +1,6 @@
 //! Experiments that check the claims of five papers (docs/papers.md) and show our numbers beside the printed ones.
 //!
-//! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_planner::papers`]) and answers
+//! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_optimizers::papers`]) and answers
 //! with tables, pictures and claims. The papers' own values are the only constants in them ([`Cell::Paper`]);
 //! everything else was measured in this run, and a verdict follows from those numbers by a rule that stands beside
 //! it. One seed gives one answer on any number of threads. Nothing here plans for a real arm, and no time is measured

@@ -1,7 +1,7 @@
 //! How much work an experiment may do, and how its runs are spread over threads.
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use taustream_planner::optimize::Refusal;
-use taustream_planner::papers::spline::SplineError;
+use taustream_optimizers::Refusal;
+use taustream_optimizers::papers::spline::SplineError;
 
 /// How much work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

@@ -1,7 +1,7 @@
 //! One run of a method, and many of them beside each other.
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, quantile};
-use taustream_planner::optimize::{End, Optimizer, Problem, Progress, Run, Solution};
+use taustream_optimizers::{End, Optimizer, Problem, Progress, Run, Solution};
 
 /// Points of a convergence curve.
 const CHECKPOINTS: usize = 100;

@@ -8,8 +8,8 @@
 use std::path::Path;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
+use taustream_optimizers::METHODS;
 use taustream_planner::margin_exit::is_clear;
-use taustream_planner::optimize::METHODS;
 use taustream_planner::position::one_try;
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;

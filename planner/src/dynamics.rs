@@ -7,11 +7,11 @@
 //! Source: Luh, Walker and Paul, "On-line computational scheme for mechanical manipulators", Journal of Dynamic
 //! Systems, Measurement, and Control 102, 1980. The energy is what Sengupta et al. (2011) should have minimised: it
 //! integrates kinetic plus potential energy over time, whose unit is an action.
-use crate::papers::quadrature::gauss;
 use nalgebra::{Matrix3, Vector3};
 use taustream_arm::{LinkMass, Robot};
 use taustream_motion::chain::Pose;
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
+use taustream_optimizers::papers::quadrature::gauss;
 
 /// Everything that moves with one joint, as one body.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,5 @@
 //! Which method looks for the path, by the names that users write.
-use crate::optimize::{METHODS, Method};
+use taustream_optimizers::{METHODS, Method};
 
 /// Which method looks for the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! World, search, optimisation, timing, verification and the replan service.
+//! World, search, refinement, timing, verification and the replan service.
 //!
 //! [`plan()`] goes from two poses to a verified motion; [`verify()`] proves any trajectory; the service
 //! (`taustream-planner`) answers replan requests and hands motions to the streamer. An ordinary process: it may
@@ -8,7 +8,6 @@
 pub mod arguments;
 pub mod budget;
 pub mod collide;
-pub mod cost;
 pub mod dynamics;
 pub mod enter;
 pub mod foraging;
@@ -17,8 +16,6 @@ pub mod in_motion;
 pub mod kind;
 pub mod margin_exit;
 pub mod objective;
-pub mod optimize;
-pub mod papers;
 pub mod pipeline;
 pub mod plan;
 pub mod position;
@@ -35,7 +32,6 @@ pub mod world;
 
 pub use taustream_arm::rng;
 
-pub use cost::{ControlPointCost, CostError, CostModel, PaperCost, paper_cost};
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
 pub use plan::{Blend, Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};

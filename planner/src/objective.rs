@@ -1,9 +1,9 @@
 //! What makes one verified motion better than another, by the names that users write.
-use crate::cost::CostModel;
 use crate::dynamics::{Dynamics, NoMasses};
 use crate::verify::Proof;
 use taustream_arm::Robot;
 use taustream_motion::{JointArray, Trajectory};
+use taustream_optimizers::cost::CostModel;
 
 /// What makes one verified motion better than another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,6 @@ use crate::enter::Entry;
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::{MarginExit, Relaxed, find_margin_exit, is_clear};
 use crate::objective::{Evaluator, Objective};
-use crate::optimize::Reading;
 use crate::pipeline::Pipeline;
 use crate::verify::{Contact, Proof, Violation};
 use crate::world::World;
@@ -16,6 +15,7 @@ use taustream_arm::{Robot, Scene};
 use taustream_motion::digits::{Amount, OutsideRange};
 use taustream_motion::range::INSIDE_RAD;
 use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
+use taustream_optimizers::Reading;
 
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
 pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";

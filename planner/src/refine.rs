@@ -4,15 +4,16 @@
 //! distances are the world's own, of every shape, and the penalty's width is the radii and the margin. What comes
 //! out is a proposal: its edges are proven like any other path's.
 use crate::budget::Budget;
-use crate::cost::CostModel;
 use crate::dynamics::Dynamics;
-use crate::optimize::{Optimizer, Problem, Progress, Refusal, Run, Solution};
 use crate::rng::SeededRng;
 use crate::timing::Path;
 use crate::tree::Space;
 use crate::world::{Snapshot, World};
 use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_optimizers::cost::CostModel;
+use taustream_optimizers::papers::control_points::with_control_points;
+use taustream_optimizers::{Optimizer, Problem, Progress, Refusal, Run, Solution};
 
 /// Control points between start and goal (the paper's M).
 pub const CONTROL_POINTS: usize = 3;
@@ -154,49 +155,5 @@ impl Problem for PathProblem<'_> {
             None => length * length_m + travel * travel_rad,
         };
         leading_term + penalty
-    }
-}
-
-/// The same path with a number of inner corners: the longest segments are halved, or the corner whose removal changes
-/// least goes.
-pub(crate) fn with_control_points(path: &[JointArray], count: usize) -> Vec<JointArray> {
-    let distance = |a: &JointArray, b: &JointArray| -> f64 {
-        a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
-    };
-    let mut corners = path.to_vec();
-    while corners.len() < count + 2 {
-        let longest = (1..corners.len())
-            .max_by(|a, b| {
-                let length = |i: usize| distance(&corners[i - 1], &corners[i]);
-                length(*a).total_cmp(&length(*b)).then(b.cmp(a))
-            })
-            .unwrap_or(1);
-        corners.insert(longest, Space::between(&corners[longest - 1], &corners[longest], 0.5));
-    }
-    while corners.len() > count + 2 {
-        let detour = |i: usize| {
-            distance(&corners[i - 1], &corners[i]) + distance(&corners[i], &corners[i + 1])
-                - distance(&corners[i - 1], &corners[i + 1])
-        };
-        let least = (1..corners.len() - 1).min_by(|a, b| detour(*a).total_cmp(&detour(*b))).unwrap_or(1);
-        corners.remove(least);
-    }
-    corners
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn control_points_are_three_whatever_the_path_and_ends_stay() {
-        for corners in 2..12_u32 {
-            let path: Vec<JointArray> = (0..corners)
-                .map(|i| std::array::from_fn(|j| (f64::from(i) * (j as f64 + 1.0)).sin()))
-                .collect();
-            let five = with_control_points(&path, CONTROL_POINTS);
-            assert_eq!(five.len(), CONTROL_POINTS + 2);
-            assert_eq!((five.first(), five.last()), (path.first(), path.last()));
-        }
     }
 }

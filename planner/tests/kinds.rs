@@ -5,7 +5,7 @@ use common::{assert_safe, pose, sphere, ur5};
 use std::path::PathBuf;
 use std::time::Duration;
 use taustream_arm::Scene;
-use taustream_planner::optimize::{METHODS, Reading};
+use taustream_optimizers::{METHODS, Reading};
 use taustream_planner::{Improvement, PlanError, PlanOptions, PlannerKind, plan, verify};
 
 const DEADLINE_MS: u64 = 1_000;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::optimize::METHODS;
+use taustream_optimizers::METHODS;
 use taustream_planner::position::{ERROR_M_MAX, error_m, polish};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::{

@@ -2,7 +2,7 @@
 
 Usage: optimisers_mealpy.py BENCHMARKS
 
-BENCHMARKS is the built example (`cargo build --release -p taustream-planner --example benchmarks`), which says where
+BENCHMARKS is the built example (`cargo build --release -p taustream-optimizers --example benchmarks`), which says where
 the optimum is and what our runs find. mealpy's programs share no line with this project. SMA and DE are the same
 methods there, and are held to it: medians within a factor of three, and the rank test of Mann and Whitney (two-sided)
 above 0.001 where the factor is not within one and a half. Its GWO keeps a move only when it is better, ours always; it

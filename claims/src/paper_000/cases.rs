@@ -10,8 +10,8 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Moments, Paired, Summary, welch, wilcoxon};
 use crate::table::{Cell, Table};
-use taustream_planner::optimize::{Parameters, Reading};
-use taustream_planner::papers::control_points::CONTROL_POINTS;
+use taustream_optimizers::papers::control_points::CONTROL_POINTS;
+use taustream_optimizers::{Parameters, Reading};
 
 /// Above any schedule of the paper's.
 const ENOUGH: usize = 50_000_000;

@@ -1,5 +1,5 @@
 //! The methods that the paper's tables hold against each other, and the variants that say why they differ.
-use taustream_planner::optimize::{
+use taustream_optimizers::{
     Bfoa, Bso, BsoStep, Exempt, Ibfoa, Optimizer, Parameters, Sampling, Schedule, Setup,
 };
 

@@ -7,8 +7,8 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, wilcoxon};
 use crate::table::{Cell, Table};
-use taustream_planner::optimize::{End, Parameters, Progress, Reading, Run};
-use taustream_planner::papers::control_point_count::{Chosen, Growth};
+use taustream_optimizers::papers::control_point_count::{Chosen, Growth};
+use taustream_optimizers::{End, Parameters, Progress, Reading, Run};
 
 const RUNS: usize = 60;
 const QUICK_EVALUATIONS: usize = 40;

@@ -1,7 +1,7 @@
 //! One run of a method with the whole course of its population.
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::quantile;
-use taustream_planner::optimize::{End, Optimizer, Problem, Progress, Run, Solution};
+use taustream_optimizers::{End, Optimizer, Problem, Progress, Run, Solution};
 
 /// What a run found, and its state after every iteration.
 pub(super) struct Course {

@@ -9,8 +9,8 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, wilcoxon};
 use crate::table::{Cell, Table};
-use taustream_planner::optimize::{Parameters, Reading, Swarming};
-use taustream_planner::papers::control_points::CONTROL_POINTS;
+use taustream_optimizers::papers::control_points::CONTROL_POINTS;
+use taustream_optimizers::{Parameters, Reading, Swarming};
 use taustream_planner::rng::SeededRng;
 
 const RUNS: usize = 100;

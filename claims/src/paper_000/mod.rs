@@ -14,9 +14,9 @@ use crate::run_context::{RunContext, Stop};
 use std::fmt::Display;
 use std::path::Path;
 use taustream_arm::Robot;
-use taustream_planner::CostModel;
-use taustream_planner::optimize::Reading;
-use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_optimizers::Reading;
+use taustream_optimizers::cost::CostModel;
+use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
 
 /// The arm of the comparisons: the paper's six joints have no name.
 const UR5: &str = include_str!("../../../config/robots/ur5.toml");

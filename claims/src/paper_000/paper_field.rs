@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::f64::consts::PI;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, MAX_JOINTS};
-use taustream_planner::CostModel;
-use taustream_planner::cost::ControlPointCost;
-use taustream_planner::optimize::Reading;
+use taustream_optimizers::Reading;
+use taustream_optimizers::cost::ControlPointCost;
+use taustream_optimizers::cost::CostModel;
 use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Field;
 

@@ -4,9 +4,9 @@ use crate::run_context::Stop;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
 use taustream_motion::profile::Profile;
-use taustream_planner::cost::ControlPointCost;
-use taustream_planner::papers::control_points::CONTROL_POINTS;
-use taustream_planner::{CostModel, PaperCost};
+use taustream_optimizers::cost::ControlPointCost;
+use taustream_optimizers::cost::{CostModel, PaperCost};
+use taustream_optimizers::papers::control_points::CONTROL_POINTS;
 
 /// The clearance is found to this (m), from none to this.
 const CLEARANCE_M: [f64; 2] = [1e-4, 1.0];

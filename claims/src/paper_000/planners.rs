@@ -17,9 +17,9 @@ use std::cell::Cell as Count;
 use taustream_arm::Robot;
 use taustream_motion::profile::{Profile, TauJ, TauJStar};
 use taustream_motion::{JointArray, MAX_JOINTS};
-use taustream_planner::CostModel;
-use taustream_planner::optimize::{Parameters, Reading};
-use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_optimizers::cost::CostModel;
+use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_optimizers::{Parameters, Reading};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::rrt;
 

@@ -8,8 +8,8 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Moments, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, convergence, minimise};
-use taustream_planner::optimize::{Reading, Setup, by_name};
-use taustream_planner::papers::{Benchmark, Function};
+use taustream_optimizers::papers::{Benchmark, Function};
+use taustream_optimizers::{Reading, Setup, by_name};
 
 /// The five, the paper's own last.
 pub(super) const METHODS: [&str; 5] = ["boa", "gwo", "ssa", "sma", "isma"];

@@ -7,8 +7,8 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::mann_whitney;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
-use taustream_planner::optimize::{Isma, Optimizer, Reading, Setup, Sma};
-use taustream_planner::papers::Function;
+use taustream_optimizers::papers::Function;
+use taustream_optimizers::{Isma, Optimizer, Reading, Setup, Sma};
 
 /// Runs and evaluations: 1000 iterations of SMA.
 const RUNS: usize = 10;

@@ -8,9 +8,9 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::wilcoxon;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
-use taustream_planner::optimize::{Reading, Setup, by_name};
-use taustream_planner::papers::spline::{Spline, conditions};
-use taustream_planner::papers::spline_time::{JointLimit, SplineTime};
+use taustream_optimizers::papers::spline::{Spline, conditions};
+use taustream_optimizers::papers::spline_time::{JointLimit, SplineTime};
+use taustream_optimizers::{Reading, Setup, by_name};
 
 /// Table 4: joint angles of the eight nodes. The table says rad; the numbers are degrees.
 const NODES_DEGREES: [[f64; 6]; 8] = [
@@ -142,7 +142,7 @@ fn times(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
             })?;
             let decided =
                 trials.iter().map(|t| problem.evaluate(&t.found.x)).collect::<Result<Vec<_>, _>>()?;
-            let sample = |figure: fn(&taustream_planner::papers::spline_time::SplineCost) -> f64| {
+            let sample = |figure: fn(&taustream_optimizers::papers::spline_time::SplineCost) -> f64| {
                 Sample::of(decided.iter().map(figure).collect()).summary()
             };
             let parts = [sample(|j| j.time_s), sample(|j| j.jerk_rad_s3), sample(|j| j.broken as f64)];

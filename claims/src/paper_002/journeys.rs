@@ -5,7 +5,7 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Summary, quantile};
 use crate::table::{Cell, Table};
-use taustream_planner::papers::planar::{Journey, Numbers};
+use taustream_optimizers::papers::planar::{Journey, Numbers};
 
 /// Printed numbers of virtual obstacles in the L and in the U.
 const VIRTUAL_L: f64 = 3.0;
@@ -16,7 +16,7 @@ const TIME_THREE_S: f64 = 8.98;
 
 /// All journeys through one scene, in the order of [`Method::ALL`].
 pub(super) struct Visit {
-    pub(super) scene: taustream_planner::papers::planar::PlanarScene,
+    pub(super) scene: taustream_optimizers::papers::planar::PlanarScene,
     pub(super) journeys: Vec<Vec<Journey>>,
 }
 

@@ -4,8 +4,10 @@ mod pictures;
 pub(crate) mod robots;
 
 use crate::run_context::{RunContext, Stop};
-use taustream_planner::optimize::Reading;
-use taustream_planner::papers::planar::{Journey, Numbers, Obstacle, PlanarDrive, PlanarScene, Rule, drive};
+use taustream_optimizers::Reading;
+use taustream_optimizers::papers::planar::{
+    Journey, Numbers, Obstacle, PlanarDrive, PlanarScene, Rule, drive,
+};
 
 /// Runs of everything; the paper shows one of each.
 const RUNS: usize = 30;

@@ -4,7 +4,7 @@ use super::journeys::Visit;
 use crate::chart::{Curve, FilledArea, Panel, Point, palette};
 use crate::figure::Figure;
 use std::f64::consts::TAU;
-use taustream_planner::papers::planar::{Journey, Obstacle, PlanarShape};
+use taustream_optimizers::papers::planar::{Journey, Obstacle, PlanarShape};
 
 /// Corners of a circle.
 const CORNERS: u32 = 48;

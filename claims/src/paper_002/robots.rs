@@ -5,7 +5,7 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::{Paired, Summary, wilcoxon};
 use crate::table::{Cell, Table};
-use taustream_planner::papers::planar::{Journey, Numbers, PlanarScene};
+use taustream_optimizers::papers::planar::{Journey, Numbers, PlanarScene};
 
 /// Printed: robots that plain BFO leaves behind.
 const STUCK: usize = 3;

@@ -10,8 +10,8 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::{quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
-use taustream_planner::optimize::{De, Exchange, Ga, Iepso, Pso, Reading, Setup};
-use taustream_planner::papers::reach::{FiveJointArm, Reach};
+use taustream_optimizers::papers::reach::{FiveJointArm, Reach};
+use taustream_optimizers::{De, Exchange, Ga, Iepso, Pso, Reading, Setup};
 
 /// Runs, and evaluations of the paper's 1000 generations of 40 after the first one.
 pub(super) const RUNS: usize = 30;

@@ -4,8 +4,8 @@ use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
-use taustream_planner::optimize::Reading;
-use taustream_planner::papers::reach::{FiveJointArm, Reach};
+use taustream_optimizers::Reading;
+use taustream_optimizers::papers::reach::{FiveJointArm, Reach};
 
 /// A row of table 5: angles in radians, F, error in millimetres. IEPSO's error is printed "6.96-14".
 pub(super) struct Printed {

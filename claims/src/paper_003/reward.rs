@@ -8,8 +8,8 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::{quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
-use taustream_planner::optimize::Reading;
-use taustream_planner::papers::reach::{FiveJointArm, Reward};
+use taustream_optimizers::Reading;
+use taustream_optimizers::papers::reach::{FiveJointArm, Reward};
 
 /// Ranges of the outer and of the inner reward in table 4.
 const RANGES: [[f64; 2]; 2] = [[-12.0, 0.0], [-24.0, -12.0]];

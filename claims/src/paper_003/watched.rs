@@ -2,8 +2,8 @@
 use crate::run_context::{RunContext, Stop};
 use crate::trial::{Trial, minimise};
 use std::cell::{Cell, RefCell};
-use taustream_planner::optimize::{Optimizer, Problem};
-use taustream_planner::papers::reach::Reach;
+use taustream_optimizers::papers::reach::Reach;
+use taustream_optimizers::{Optimizer, Problem};
 
 /// What is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,9 +8,9 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
-use taustream_planner::optimize::{Iwo, Problem, Reading};
-use taustream_planner::papers::two_link::{Moving, TwoLink};
-use taustream_planner::papers::two_link_energy::{CubicSearch, Cubics, PieceEnergy, moving};
+use taustream_optimizers::papers::two_link::{Moving, TwoLink};
+use taustream_optimizers::papers::two_link_energy::{CubicSearch, Cubics, PieceEnergy, moving};
+use taustream_optimizers::{Iwo, Problem, Reading};
 
 const RUNS: usize = 30;
 const EVALUATIONS: usize = 10_000;

@@ -8,10 +8,10 @@ use crate::run_context::{RunContext, Stop};
 use crate::statistics::quantile;
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
-use taustream_planner::optimize::{Iwo, Reading};
-use taustream_planner::papers::two_link::TwoLink;
-use taustream_planner::papers::two_link_energy::CubicSearch;
-use taustream_planner::papers::two_link_via::{STEP_RAD, ViaTask};
+use taustream_optimizers::papers::two_link::TwoLink;
+use taustream_optimizers::papers::two_link_energy::CubicSearch;
+use taustream_optimizers::papers::two_link_via::{STEP_RAD, ViaTask};
+use taustream_optimizers::{Iwo, Reading};
 
 /// Runs; the paper shows one.
 const RUNS: usize = 100;

@@ -1,5 +1,5 @@
 //! Who takes part: a planner by name, and for the default, how it improves what it found.
-use taustream_planner::optimize::METHODS;
+use taustream_optimizers::METHODS;
 use taustream_planner::{Improvement, PlannerKind};
 
 /// Who takes part.

@@ -5,7 +5,7 @@ use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
-use taustream_planner::optimize::{METHODS, Method, Reading};
+use taustream_optimizers::{METHODS, Method, Reading};
 use taustream_planner::{Blend, Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\

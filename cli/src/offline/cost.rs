@@ -6,8 +6,8 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use taustream_arm::text::counted;
+use taustream_optimizers::cost::{CostError, CostModel, paper_cost};
 use taustream_planner::dynamics::Dynamics;
-use taustream_planner::{CostError, CostModel, paper_cost};
 
 /// The cost and its parts.
 #[derive(Debug, Serialize)]

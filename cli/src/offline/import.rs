@@ -11,11 +11,11 @@ use std::path::Path;
 use taustream_arm::text::counted;
 use taustream_arm::{MotionTable, Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
+use taustream_optimizers::papers::spline_time::SplineCost;
 use taustream_planner::import::{
     ImportError, Imported, Reference, TimedBy, Via, ViaProfile, fitted_durations_s, import, import_strokes,
     optimised_durations_s, poses_of,
 };
-use taustream_planner::papers::spline_time::SplineCost;
 
 /// Speeds at the ends of a table that are worth a word (rad/s).
 const AT_REST_RAD_S: f64 = 0.01;

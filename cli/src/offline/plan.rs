@@ -11,7 +11,7 @@ use std::time::Duration;
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
-use taustream_planner::optimize::Method;
+use taustream_optimizers::Method;
 use taustream_planner::{
     Plan, PlanOptions, PositionError, PositionTask, StartMargin, plan, plan_through, plan_to_position,
 };

@@ -1,11 +1,11 @@
 //! One search: its steps, its trace, and how it gets out of a trap.
 use super::Numbers;
-use crate::optimize::Refusal;
 use crate::rng::SeededRng;
 use crate::tree::Space;
 use crate::world::{Pair, Snapshot};
 use std::collections::VecDeque;
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_optimizers::Refusal;
 
 /// What a search came to.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,5 +1,5 @@
 //! The numbers of the method.
-use crate::optimize::Refusal;
+use taustream_optimizers::Refusal;
 
 /// The numbers of the method. Lengths in joint space are metres of weighted distance.
 #[derive(Clone, Copy, Debug, PartialEq)]

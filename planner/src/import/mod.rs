@@ -15,7 +15,6 @@ pub use places::{TimedBy, optimised_durations_s, poses_of};
 pub use profiles::{K_DEFAULT, ProfileError, ViaProfile};
 pub use reference::{Reference, Via, fitted_durations_s};
 
-use crate::papers::spline::SplineError as SeventhError;
 use crate::timing::{SLACK, scale_to_fit};
 use crate::verify::{Proof, Violation, verify};
 use fit::{Candidate, candidates, scaled};
@@ -26,6 +25,7 @@ use taustream_motion::profile::KError;
 use taustream_motion::spline::SplineError as CubicError;
 use taustream_motion::stroke::END_S_MAX;
 use taustream_motion::{MAX_STROKES, Stroke, Trajectory, TrajectoryError};
+use taustream_optimizers::papers::spline::SplineError as SeventhError;
 
 /// How near the strokes shall come where nothing else is requested (rad).
 pub const TOLERANCE_RAD_DEFAULT: f64 = 0.005;

@@ -2,11 +2,11 @@
 use super::ImportError;
 use super::profiles::ViaProfile;
 use super::reference::fitted_durations_s;
-use crate::optimize::{Progress, Reading, Run, Setup, by_name};
-use crate::papers::spline_time::{SplineCost, SplineTime};
 use crate::position::{ERROR_M_MAX, error_m, polish};
 use taustream_arm::{PathFile, PathPoint, Robot};
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_optimizers::papers::spline_time::{SplineCost, SplineTime};
+use taustream_optimizers::{Progress, Reading, Run, Setup, by_name};
 
 /// The poses of a path's points. A place is reached from the pose of the point before it (the first from the file's
 /// `near_rad`) by damped least squares, which go the shortest way in joint space, so that neighbours stay neighbours.

@@ -2,7 +2,6 @@
 use super::ImportError;
 use super::profiles::ViaProfile;
 use super::rows::Rows;
-use crate::papers::spline::Spline;
 use crate::timing::used;
 use taustream_arm::MotionTable;
 use taustream_motion::peaks::PeakConstants;
@@ -10,6 +9,7 @@ use taustream_motion::profile::Profile;
 use taustream_motion::spline::{CubicSpline, Ends};
 use taustream_motion::stroke::DURATION_S_MIN;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
+use taustream_optimizers::papers::spline::Spline;
 
 /// A motion of all joints from time 0 on.
 pub struct Reference {

@@ -11,7 +11,6 @@ use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
 use crate::objective::{Evaluator, Objective};
-use crate::optimize::{METHODS, Method, Optimizer, Setup};
 use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions, Remedy};
 use crate::refine::{self, PathProblem, refine};
 use crate::rng::SeededRng;
@@ -24,6 +23,7 @@ use crate::world::World;
 use std::ops::Range;
 use std::time::Duration;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
+use taustream_optimizers::{METHODS, Method, Optimizer, Setup};
 
 /// Poses that differ by less are one: far below a count of any encoder.
 const SAME_RAD: f64 = 1e-12;

@@ -9,7 +9,6 @@ mod swarm;
 use crate::budget::Budget;
 use crate::margin_exit::is_clear;
 use crate::objective::Objective;
-use crate::optimize::{METHODS, Method, Reading, Refusal};
 use crate::plan::{
     CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside,
     plan_until,
@@ -22,6 +21,7 @@ use std::time::Duration;
 use swarm::Search;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
+use taustream_optimizers::{METHODS, Method, Reading, Refusal};
 
 pub use polish::{error_m, polish};
 

@@ -5,11 +5,11 @@
 //! ε = 5e-6 m and s = 5e-10 m are precisions, `e_max` is twice the arm's reach, K and j are in seconds like the time
 //! of the joint that has farthest to go.
 use crate::budget::Budget;
-use crate::optimize::{Method, Problem, Progress, Reading, Refusal, Run, Setup};
-use crate::papers::reach::{Reach, Reward};
 use crate::world::{Snapshot, World};
 use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_optimizers::papers::reach::{Reach, Reward};
+use taustream_optimizers::{Method, Problem, Progress, Reading, Refusal, Run, Setup};
 
 /// Evaluations a try: the paper's population for fifty generations. From there polishing is quicker.
 pub(super) const EVALUATIONS: usize = 2_000;

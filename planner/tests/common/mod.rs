@@ -6,9 +6,9 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
+use taustream_arm::rng::SeededRng;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene, Settings, Shape};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
-use taustream_planner::rng::SeededRng;
 
 pub(crate) fn config(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config").join(name)

@@ -4,8 +4,11 @@
 Prints what tests/rrt.rs compares with: for each seed a line with the nodes of the tree and its path's coordinates.
 `python3 rrt.py > rrt.txt` makes the file again.
 """
+import pathlib
+import sys
 from math import hypot
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[3] / "optimizers/tests/oracles"))
 from draws import Draw
 
 DISCS = [((0.0, 0.0), 1.2), ((0.5, -2.0), 0.7)]

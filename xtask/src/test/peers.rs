@@ -54,7 +54,7 @@ fn kinematics(place: &Place) -> Result<Outcome> {
 /// The optimisers against programs that walk them from their papers.
 fn walks(place: &Place) -> Result<Outcome> {
     let mut walks = Command::new("python3");
-    walks.arg(place.root.join("planner/tests/oracles/walks.py")).arg("--check");
+    walks.arg(place.root.join("optimizers/tests/oracles/walks.py")).arg("--check");
     perform("walks of the optimisers by programs written from the papers", &mut walks)?;
     Ok(Outcome::Passed)
 }

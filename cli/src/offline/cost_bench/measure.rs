@@ -7,10 +7,11 @@ use serde::Serialize;
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 use taustream_arm::Robot;
-use taustream_planner::cost::{ControlPointCost, Level};
-use taustream_planner::optimize::{Ibfoa, Optimizer, Parameters, Problem, Progress, Run, Solution};
-use taustream_planner::papers::control_points::{CONTROL_POINTS, Case};
-use taustream_planner::{CostModel, PaperCost, rng::SeededRng};
+use taustream_arm::rng::SeededRng;
+use taustream_optimizers::cost::{ControlPointCost, Level};
+use taustream_optimizers::cost::{CostModel, PaperCost};
+use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_optimizers::{Ibfoa, Optimizer, Parameters, Problem, Progress, Run, Solution};
 
 /// Decision vectors that are timed together: few, so that a batch seldom loses the processor on the way.
 const BATCH: usize = 5;
