@@ -7,6 +7,7 @@ use crate::limit_notices;
 use crate::link_margin::LinkMargins;
 use crate::mass::{self, Weight};
 use crate::modelled::{self, Listed};
+use crate::named_pose::{self, NamedPose};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row, RowKind};
@@ -48,6 +49,8 @@ pub(crate) struct Description {
     pub(crate) payload: Option<Weight>,
     /// Gravity in the base's frame.
     pub(crate) gravity_m_s2: [f64; 3],
+    /// Poses that the robot file names.
+    pub(crate) poses: Vec<NamedPose>,
     /// What the owner should know about the joints' limits, as text.
     pub(crate) notices: Vec<String>,
 }
@@ -80,6 +83,8 @@ impl Description {
         let allowed_contacts = read_contacts(&mut top, read.links.as_deref());
         let margins = LinkMargins::read(&mut top, read.links.as_deref());
         let payload = read_payload(&mut top);
+        let joints = read.whole.as_ref().map(|(joints, _)| joints.as_slice());
+        let poses = named_pose::read(&mut top, joints);
         let gravity_m_s2 = Weight::read_gravity(&mut top);
         top.done();
         let (joints, geometry) = read.whole?;
@@ -94,6 +99,7 @@ impl Description {
             unmodelled_links: listed.iter().map(|listed| listed.name.clone()).collect(),
             payload,
             gravity_m_s2,
+            poses,
             notices,
         };
         modelled::check(fault_list, &listed, &read.links.unwrap_or_default(), |link| {

@@ -66,7 +66,7 @@ pub(crate) fn of_bytes(bytes: &[u8]) -> [u8; 32] {
 fn bytes(description: &Description) -> Vec<u8> {
     // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
     // Gravity and moments of inertia weigh proven motions against each other, and change none.
-    // A link that is acknowledged to have no shape has none either way.
+    // A pose's name moves nothing. A link that is acknowledged to have no shape has none either way.
     let Description {
         name,
         joints,
@@ -77,6 +77,7 @@ fn bytes(description: &Description) -> Vec<u8> {
         unmodelled_links: _,
         payload,
         gravity_m_s2: _,
+        poses: _,
         notices: _,
     } = description;
     let mut out = HEADER.to_vec();

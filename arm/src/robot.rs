@@ -4,6 +4,7 @@ use crate::contact::ContactRule;
 use crate::description::{Description, Geometry};
 use crate::link_margin::LinkMargins;
 use crate::mass::LinkMass;
+use crate::named_pose::{self, GroupState, NamedPose};
 use crate::reader::FaultList;
 use crate::rows::{Row, RowKind};
 use crate::{Faults, scene::Shape};
@@ -12,7 +13,7 @@ use nalgebra::{Point3, Vector3};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointLimits, MAX_JOINTS};
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
 
 /// One joint, base to tip.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +64,8 @@ pub struct Robot {
     pub unlisted_links: Vec<String>,
     /// The URDF's link whose frame is the base, and the one whose frame is the tip; none for rows.
     pub ends: Option<[String; 2]>,
+    /// Poses with a name: of the robot file, then of the SRDF.
+    pub poses: Vec<NamedPose>,
     /// What was left out of a URDF or deserves a look, as text.
     pub notices: Vec<String>,
     /// Link pairs (lower index first) that may touch because the robot file says so.
@@ -131,6 +134,8 @@ impl Robot {
         let listed = |name: &String| description.unmodelled_links.contains(name);
         let unlisted_links = parts.moving_bare.iter().filter(|name| !listed(name)).cloned().collect();
         let payload = description.payload.map(|weight| LinkMass::placed(&weight, parts.tip_link, tip));
+        let (states, mut notices) = (&parts.states, Vec::new());
+        let poses = named_pose::of_states(states, &description.joints, &description.poses, &mut notices);
         let joints = description.joints.iter();
         Some(Self {
             name: description.name.clone(),
@@ -144,7 +149,8 @@ impl Robot {
             unmodelled_links: description.unmodelled_links.clone(),
             unlisted_links,
             ends: parts.ends,
-            notices: [parts.notices, description.notices.clone(), outside].concat(),
+            poses,
+            notices: [parts.notices, description.notices.clone(), outside, notices].concat(),
             allowed_by_file: description.allowed_contacts.clone(),
             allowed_by_srdf: parts.allowed,
             allowed_by_rule: ruled.allowed,
@@ -153,6 +159,11 @@ impl Robot {
             digest: digest::of(description),
             chain,
         })
+    }
+    /// The pose of a name.
+    #[must_use]
+    pub fn pose(&self, name: &str) -> Option<JointArray> {
+        self.poses.iter().find(|pose| pose.name == name).map(|pose| pose.position_rad)
     }
     /// Limits as the motion crate takes them; unused slots are zero.
     #[must_use]
@@ -201,6 +212,7 @@ struct Parts {
     ends: Option<[String; 2]>,
     neighbours: Vec<(usize, usize)>,
     allowed: Vec<(usize, usize)>,
+    states: Vec<GroupState>,
     notices: Vec<String>,
 }
 
@@ -219,6 +231,7 @@ impl Parts {
                 ends: arm.ends(),
                 neighbours: arm.neighbours(),
                 allowed: arm.allowed.clone(),
+                states: arm.states.clone(),
                 notices: arm.notices.clone(),
             },
         }
@@ -245,6 +258,7 @@ impl Parts {
             ends: None,
             neighbours: (0..rows.len()).map(|link| (link, link + 1)).collect(),
             allowed: Vec::new(),
+            states: Vec::new(),
             notices: Vec::new(),
         }
     }

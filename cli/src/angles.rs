@@ -1,5 +1,6 @@
 //! Lists of joint angles on the command line: `"0,-1.57,1.57,0,0,0"`, in rad where no unit says otherwise (`90deg`).
 use crate::failure::Failure;
+use nalgebra::{Quaternion, UnitQuaternion};
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 use taustream_arm::Robot;
@@ -151,6 +152,77 @@ impl FromStr for Position {
             return Err(format!("{} values; a position is three: \"0.4,-0.2,0.3\" (m)", words.len()));
         };
         Ok(Self([parse(('x', x))?, parse(('y', y))?, parse(('z', z))?]))
+    }
+}
+
+/// Numbers apart by commas, each finite.
+fn finite(text: &str, what: &str) -> Result<Vec<f64>, String> {
+    let parse = |(i, word): (usize, &str)| match word.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) => Err(format!("value {} is {value}; {what} must be finite", i + 1)),
+        Err(_) => Err(format!("value {} is `{}`, which is no number", i + 1, word.trim())),
+    };
+    text.split(',').enumerate().map(parse).collect()
+}
+
+/// A quaternion's length may differ from 1 by so much: rounding of a few printed digits.
+const UNIT_MAX: f64 = 0.01;
+
+/// A pose of the tip: `plan --to-pose`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TipPose {
+    /// In the base's frame.
+    pub(crate) position_m: [f64; 3],
+    /// The tip's axes in the base's frame.
+    pub(crate) rotation: UnitQuaternion<f64>,
+}
+
+impl FromStr for TipPose {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        const FORMS: &str = "a pose of the tip is six numbers (x,y,z in m, roll,pitch,yaw in rad) or seven (x,y,z in m, then \
+                             a quaternion x,y,z,w)";
+        match *finite(text, "a pose")?.as_slice() {
+            [x, y, z, roll, pitch, yaw] => {
+                let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+                Ok(Self { position_m: [x, y, z], rotation })
+            }
+            [x, y, z, qx, qy, qz, qw] => {
+                let quaternion = Quaternion::new(qw, qx, qy, qz);
+                let length = quaternion.norm();
+                if (length - 1.0).abs() > UNIT_MAX {
+                    return Err(format!(
+                        "the quaternion's length is {length:.4}; it must be 1 (order x,y,z,w)"
+                    ));
+                }
+                Ok(Self { position_m: [x, y, z], rotation: UnitQuaternion::from_quaternion(quaternion) })
+            }
+            ref other => Err(format!("{} values; {FORMS}", other.len())),
+        }
+    }
+}
+
+/// How far a tip may be turned about each of its axes: `plan --tolerance-rad`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tolerances(pub(crate) [f64; 3]);
+
+impl FromStr for Tolerances {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |word: &str| match word.trim() {
+            "free" => Ok(f64::INFINITY),
+            word => match angle_rad(word, 1.0) {
+                Some(value) if value.is_finite() && value >= 0.0 => Ok(value),
+                _ => Err(format!("`{word}` is no tolerance; write rad (0 or more), 5deg, or free")),
+            },
+        };
+        match *text.split(',').map(parse).collect::<Result<Vec<f64>, String>>()?.as_slice() {
+            [all] => Ok(Self([all; 3])),
+            [x, y, z] => Ok(Self([x, y, z])),
+            ref other => Err(format!("{} values; give one, or one about each of x, y, z", other.len())),
+        }
     }
 }
 

@@ -51,13 +51,17 @@ fn settings(file: &Path, text: &str) -> Result<(), Faults> {
 }
 
 fn kinds() -> Vec<Kind> {
+    let pose = "[[pose]]\nname = \"home\"\nposition_rad = [0, 0, 0, 0, 0, 0]\n";
     let payload = "payload = { mass_kg = 1.0, center_m = [0.0, 0.0, 0.0] }\n";
     vec![
         Kind {
             title: "Robot files",
             about: "`config/robots`; [robots.md](robots.md) explains how to describe an arm.",
             samples: vec![
-                shipped("config/robots/ur5.toml", &[("name = ", &format!("{payload}name = "))]),
+                shipped(
+                    "config/robots/ur5.toml",
+                    &[("name = ", &format!("{payload}name = ")), ("[[joint]]", &format!("{pose}[[joint]]"))],
+                ),
                 shipped("config/robots/piper.toml", &[]),
                 shipped("tests/robots/nasty.toml", &[]),
             ],

@@ -11,6 +11,7 @@ pub mod collide;
 pub mod dynamics;
 pub mod enter;
 pub mod foraging;
+pub mod goals;
 pub mod import;
 pub mod in_motion;
 pub mod kind;
@@ -18,7 +19,6 @@ pub mod margin_exit;
 pub mod objective;
 pub mod pipeline;
 pub mod plan;
-pub mod position;
 pub mod refine;
 pub mod replacement;
 pub mod search;
@@ -32,8 +32,8 @@ pub mod world;
 
 pub use taustream_arm::rng;
 
+pub use goals::{Finder, GoalError, Orientation, Reached, Situation, TipTarget, plan_to_any, plan_to_tip};
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
 pub use plan::{Blend, Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
-pub use position::{PositionError, PositionTask, Reached, plan_to_position};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -11,6 +11,7 @@ use crate::document::{self, Value, shown};
 use crate::mass::{LinkMass, Weight};
 use crate::mesh;
 use crate::modelled::Listed;
+use crate::named_pose::GroupState;
 use crate::reader::{FaultList, Table};
 use crate::robot::LinkShape;
 use crate::scene::{self, Shape};
@@ -71,6 +72,8 @@ pub(crate) struct UrdfArm {
     pub(crate) skipped: Vec<usize>,
     /// Pairs that may touch by the SRDF, lower index first, in rising order.
     pub(crate) allowed: Vec<(usize, usize)>,
+    /// Group states of the SRDF.
+    pub(crate) states: Vec<GroupState>,
     /// What was left out, as text.
     pub(crate) notices: Vec<String>,
 }
@@ -102,8 +105,9 @@ impl UrdfArm {
         let parts = read_parts(&own, &model, (&keys, listed));
         let faults = own.close(Some(())).err();
         faults.into_iter().for_each(|faults| top.fault_list().merge(faults));
-        let allowed =
+        let semantics =
             keys.srdf.as_ref().map(|file| srdf::load(top.fault_list(), file, &model)).unwrap_or_default();
+        let (allowed, states) = (semantics.allowed, semantics.states);
         let tip = named_link(top, &model, &tree, "tip_link", keys.tip_link.as_deref());
         let base = match &keys.base_link {
             Some(name) => named_link(top, &model, &tree, "base_link", Some(name)),
@@ -116,8 +120,20 @@ impl UrdfArm {
         let fixed_joints = fixed_joints(&model, &moving, &mut notices);
         say_bare_links(&model, &mut notices);
         say_odd_moments(&model, &mut notices);
-        let arm =
-            Self { model, tree, base, tip, path, moving, fixed_joints, parts, skipped, allowed, notices };
+        let arm = Self {
+            model,
+            tree,
+            base,
+            tip,
+            path,
+            moving,
+            fixed_joints,
+            parts,
+            skipped,
+            allowed,
+            states,
+            notices,
+        };
         top.fault_list().is_clean().then_some(arm)
     }
     /// What the file says about the arm's joints, base to tip.

@@ -23,6 +23,7 @@ impl UrdfArm {
             parts,
             skipped: _,
             allowed,
+            states: _,
             notices: _,
         } = self;
         let Model { name: _, links, joints } = model;

@@ -1,22 +1,47 @@
-//! Which links may touch by an SRDF file. Nothing else of it is used.
+//! What an SRDF file says: which links may touch, and poses with a name. Nothing else of it is used.
 use super::model::Model;
 use super::xml::{self, Context, Element};
 use crate::document::shown;
-use crate::reader::FaultList;
+use crate::named_pose::GroupState;
+use crate::reader::{Bounds, FaultList};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Pairs of links that may touch, lower index first, in rising order; faults go into the book.
-pub(crate) fn read(fault_list: &FaultList, model: &Model) -> Vec<(usize, usize)> {
-    let pairs = (|| {
+/// What is used of an SRDF file.
+#[derive(Debug, Default)]
+pub(crate) struct Semantics {
+    /// Pairs of links that may touch, lower index first, in rising order.
+    pub(crate) allowed: Vec<(usize, usize)>,
+    /// Every `group_state`, of this arm or not.
+    pub(crate) states: Vec<GroupState>,
+}
+
+/// A revolute joint turns; a finger of a gripper slides, and its state is not used.
+const VALUE: Bounds = Bounds::within(-1e3, 1e3, "rad or m");
+
+/// Reads a file; faults go into the book.
+pub(crate) fn read(fault_list: &FaultList, model: &Model) -> Semantics {
+    let read = (|| {
         let text = xml::read(fault_list.file(), WHAT).map_err(|faults| fault_list.merge(faults)).ok()?;
         let document =
             xml::parse(fault_list.file(), &text).map_err(|faults| fault_list.merge(faults)).ok()?;
         let context = Context::new(fault_list, &text);
         let robot = Element::robot(&context, &document)?;
-        Some(pairs(&robot, model))
+        let allowed = pairs(&robot, model).into_iter().collect();
+        Some(Semantics { allowed, states: states(&robot) })
     })();
-    pairs.unwrap_or_default().into_iter().collect()
+    read.unwrap_or_default()
+}
+
+/// The group states, each joint with the first of its values (others have joints of several).
+fn states(robot: &Element<'_, '_, '_>) -> Vec<GroupState> {
+    let state = |element: &Element<'_, '_, '_>| {
+        let name = element.name("name")?;
+        let value = |joint: &Element<'_, '_, '_>| Some((joint.name("name")?, joint.number("value", &VALUE)?));
+        let joints = element.children("joint").iter().filter_map(value).collect();
+        Some(GroupState { name, joints })
+    };
+    robot.children("group_state").iter().filter_map(state).collect()
 }
 
 const WHAT: &str = "an SRDF file";
@@ -62,15 +87,15 @@ fn link_of(element: &Element<'_, '_, '_>, attribute: &str, model: &Model) -> Opt
     link
 }
 
-/// Reads the pairs of a file into the faults of the one that names it.
-pub(crate) fn load(fault_list: &FaultList, file: &Path, model: &Model) -> Vec<(usize, usize)> {
+/// Reads a file into the faults of the one that names it.
+pub(crate) fn load(fault_list: &FaultList, file: &Path, model: &Model) -> Semantics {
     let own = FaultList::new(file);
-    let pairs = read(&own, model);
-    match own.close(Some(pairs)) {
-        Ok(pairs) => pairs,
+    let semantics = read(&own, model);
+    match own.close(Some(semantics)) {
+        Ok(semantics) => semantics,
         Err(faults) => {
             fault_list.merge(faults);
-            Vec::new()
+            Semantics::default()
         }
     }
 }

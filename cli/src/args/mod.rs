@@ -1,4 +1,5 @@
 //! The command line. Every name has its unit; the help states every default.
+mod goal;
 mod import;
 mod live;
 mod offline;
@@ -6,6 +7,7 @@ mod papers;
 mod planners;
 mod timing;
 
+pub(crate) use goal::Goal;
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
     CancelArgs, CommandArgs, DemoArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs,
@@ -142,7 +144,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Action {
     /// Plan a collision-free motion offline and write it to a file.
-    Plan(PlanArgs),
+    Plan(Box<PlanArgs>),
     /// Convert a table of positions, or way points and a profile, into a verified trajectory file.
     Import(ImportArgs),
     /// Print a trajectory file as a table of positions, velocities, accelerations and jerks.

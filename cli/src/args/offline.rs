@@ -1,5 +1,6 @@
 //! Arguments of the commands that need no running process.
-use crate::angles::{Angles, Position, Times};
+use super::goal::GoalArgs;
+use crate::angles::{Angles, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
@@ -16,6 +17,9 @@ Examples:
   taustream plan ... --planner bfoa --reading printed
   taustream plan ... --objective energy --deadline-ms 5000
   taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
+  taustream plan ... --to-pose 0.4,-0.3,0.35,0,3.1416,0 --tolerance-rad 0.01,0.01,free
+  taustream plan ... --to-named home          a [[pose]] of the robot file, or a group_state of its SRDF
+  taustream plan ... --by 0,0,0,0,0,90deg     relative to the start
   taustream plan ... --via 0.3,-1.2,1.2,-1.6,-1.57,0 --via 0.8,-1,1,-1.6,-1.57,0 --blend-rad 0.1
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
@@ -38,34 +42,13 @@ pub(crate) struct PlanArgs {
     /// The same in degrees.
     #[arg(long, value_name = "DEG,..", allow_hyphen_values = true, value_parser = Angles::of_degrees, conflicts_with = "start")]
     start_deg: Option<Angles>,
-    /// Goal pose, rad, one value per joint; a value may have a unit: "90deg".
-    #[arg(
-        long,
-        value_name = "RAD,..",
-        allow_hyphen_values = true,
-        required_unless_present_any = ["to_position", "goal_deg"],
-        conflicts_with = "to_position"
-    )]
-    goal: Option<Angles>,
-    /// The same in degrees.
-    #[arg(
-        long,
-        value_name = "DEG,..",
-        allow_hyphen_values = true,
-        value_parser = Angles::of_degrees,
-        conflicts_with_all = ["to_position", "goal"]
-    )]
-    goal_deg: Option<Angles>,
-    /// Goal position of the tip, m, in the base frame, instead of a pose: "0.4,-0.2,0.3".
-    ///
-    /// Swarms search clear poses with the tip at this position. The result is the best verified motion to one of them. The
-    /// orientation of the tip is free.
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    pub(crate) to_position: Option<Position>,
+    /// Where to go.
+    #[command(flatten)]
+    pub(crate) goal: GoalArgs,
     /// Pose to pass on the way, rad; give it once for each pose, in their order.
     ///
     /// The motion keeps within the blend of the straight lines that join the poses.
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, conflicts_with = "to_position")]
+    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, conflicts_with_all = ["to_position", "to_pose"])]
     pub(crate) via: Vec<Angles>,
     /// How far from its path the motion may be at corners: length of the difference of all joints, rad; 0 stops at each.
     ///
@@ -75,8 +58,8 @@ pub(crate) struct PlanArgs {
     /// The same as a distance by which any point of the arm may be off, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "blend_rad", value_parser = blend_amount)]
     blend_m: Option<f64>,
-    /// Optimiser that searches poses for --to-position; without it the best two alternate.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg"], value_parser = method())]
+    /// Search poses for --to-position by a swarm (an optimiser by name) instead of inverse kinematics.
+    #[arg(long, value_name = "NAME", requires = "to_position", value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
     /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
@@ -112,12 +95,6 @@ impl PlanArgs {
     pub(crate) fn blend(&self) -> Blend {
         let in_metres = self.blend_m.map(Blend::Metres);
         self.blend_rad.map(Blend::Radians).or(in_metres).unwrap_or_default()
-    }
-
-    /// Where to go, and the option that says so.
-    pub(crate) fn goal(&self) -> Option<(&Angles, &'static str)> {
-        let given = self.goal.as_ref().map(|angles| (angles, "--goal"));
-        given.or_else(|| self.goal_deg.as_ref().map(|angles| (angles, "--goal-deg")))
     }
 }
 

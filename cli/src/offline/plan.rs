@@ -1,7 +1,6 @@
-//! `taustream plan`: from two poses, or a pose and a position, to a verified trajectory file.
+//! `taustream plan`: from a pose to a goal, as a verified trajectory file.
 use super::verify::{PeakTable, PeakUse, Unmodelled, clearance_words, peak_use};
-use crate::angles::Position;
-use crate::args::PlanArgs;
+use crate::args::{Goal, PlanArgs};
 use crate::arm;
 use crate::failure::Failure;
 use crate::output::{Form, deliver};
@@ -9,11 +8,12 @@ use serde::Serialize;
 use std::fmt;
 use std::time::Duration;
 use taustream_arm::text::counted;
-use taustream_arm::{Robot, Scene, TrajectoryFile};
+use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
-use taustream_optimizers::Method;
+use taustream_planner::goals::TipError;
 use taustream_planner::{
-    Plan, PlanOptions, PositionError, PositionTask, StartMargin, plan, plan_through, plan_to_position,
+    Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
+    plan_to_tip,
 };
 
 /// The summary of a plan.
@@ -42,6 +42,10 @@ struct Summary {
     target_m: Option<[f64; 3]>,
     /// Upper bound of how far off it ends.
     position_error_m: Option<f64>,
+    /// How the tip was to be turned (x, y, z, w), when that was requested.
+    target_quaternion_xyzw: Option<[f64; 4]>,
+    /// By what angle it ends turned from that, about the axes that are not free.
+    orientation_error_rad: Option<f64>,
 }
 
 impl fmt::Display for Summary {
@@ -59,7 +63,9 @@ impl fmt::Display for Summary {
         )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
-            writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off, in the pose")?;
+            let turned = self.orientation_error_rad.map(|rad| format!(", turned by {rad:.1e} rad"));
+            let turned = turned.unwrap_or_default();
+            writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off{turned}, in the pose")?;
             let angles: Vec<String> = self.goal_rad.iter().map(|q| format!("{q:.6}")).collect();
             writeln!(f, "              {} rad", angles.join(","))?;
         }
@@ -86,9 +92,12 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         blend: args.blend(),
         ..PlanOptions::default()
     };
-    let end = End::of(args, &robot)?;
-    let found =
-        end.plan((&robot, &scene), start_rad, &options).map_err(|error| explain(&error, args, &robot))?;
+    let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
+    let found = match args.goal.of(&robot, &start_rad)? {
+        Goal::Tip(target) => to_tip(&situation, &target, (args, &options)),
+        Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options))?,
+    };
+    let found = found.map_err(|error| explain(&error, args, &robot))?;
     let json = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
@@ -100,71 +109,48 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     deliver(form, args.output.as_deref(), &json, &summary)
 }
 
-/// What a motion is planned to.
-enum End {
-    Pose(JointArray),
-    /// The last of several poses.
-    Through(Vec<JointArray>),
-    Position([f64; 3], Option<&'static Method>),
-}
-
-/// A plan, and by how much it misses the position that was requested.
+/// A plan, and by how much it misses the target of the tip.
 struct Planned {
     plan: Plan,
-    position: Option<([f64; 3], f64)>,
+    tip: Option<(TipTarget, TipError)>,
 }
 
-impl End {
-    fn of(args: &PlanArgs, robot: &Robot) -> Result<Self, Failure> {
-        match (args.goal(), args.to_position) {
-            (_, Some(Position(target_m))) => Ok(Self::Position(target_m, args.reach_with)),
-            (Some((goal, option)), None) if args.via.is_empty() => {
-                goal.pose_of(robot, option).map(Self::Pose)
-            }
-            (Some((goal, option)), None) => {
-                let mut poses_rad =
-                    args.via.iter().map(|via| via.pose_of(robot, "--via")).collect::<Result<Vec<_>, _>>()?;
-                poses_rad.push(goal.pose_of(robot, option)?);
-                Ok(Self::Through(poses_rad))
-            }
-            (None, None) => Err(Failure::Usage("give --goal, --goal-deg or --to-position".to_owned())),
-        }
-    }
+fn to_tip(
+    situation: &Situation,
+    target: &TipTarget,
+    (args, options): (&PlanArgs, &PlanOptions),
+) -> Result<Planned, GoalError> {
+    let finder = args.reach_with.map_or(Finder::Inverse, Finder::Swarm);
+    let reached = plan_to_tip(situation, (target, finder), options, None)?;
+    Ok(Planned { plan: reached.plan, tip: Some((*target, reached.error)) })
+}
 
-    fn plan(
-        &self,
-        (robot, scene): (&Robot, &Scene),
-        start_rad: JointArray,
-        options: &PlanOptions,
-    ) -> Result<Planned, PositionError> {
-        match self {
-            Self::Through(poses_rad) => {
-                let all_rad: Vec<JointArray> =
-                    std::iter::once(&start_rad).chain(poses_rad).copied().collect();
-                let plan = plan_through(robot, scene, &all_rad, options)?;
-                Ok(Planned { plan, position: None })
-            }
-            Self::Pose(goal_rad) => {
-                let plan = plan(robot, scene, &start_rad, goal_rad, options)?;
-                Ok(Planned { plan, position: None })
-            }
-            &Self::Position(target_m, method) => {
-                let margin = StartMargin::Scene;
-                let task = PositionTask { robot, scene, start_rad, target_m, margin, method };
-                let reached = plan_to_position(&task, options, None)?;
-                Ok(Planned { plan: reached.plan, position: Some((target_m, reached.error_m)) })
-            }
-        }
-    }
+/// To the best of several poses, or through way points to the only one.
+fn to_poses(
+    situation: &Situation,
+    goals_rad: &[JointArray],
+    (args, options): (&PlanArgs, &PlanOptions),
+) -> Result<Result<Planned, GoalError>, Failure> {
+    let Situation { robot, scene, start_rad, .. } = *situation;
+    let plan = if args.via.is_empty() {
+        plan_to_any(situation, goals_rad, options, None).map(|(plan, _)| plan)
+    } else if let [goal_rad] = goals_rad {
+        let via = args.via.iter().map(|via| via.pose_of(robot, "--via")).collect::<Result<Vec<_>, _>>()?;
+        let all_rad: Vec<JointArray> =
+            std::iter::once(start_rad).chain(via).chain(std::iter::once(*goal_rad)).collect();
+        plan_through(robot, scene, &all_rad, options).map_err(GoalError::Plan)
+    } else {
+        return Err(Failure::Usage("--via needs one goal; several were given".to_owned()));
+    };
+    Ok(plan.map(|plan| Planned { plan, tip: None }))
 }
 
 /// A second sentence for positions that look like millimetres.
-fn millimetres_hint(error: &PositionError, args: &PlanArgs) -> Option<String> {
-    let (PositionError::TooFar { distance_m, reach_m }, Some(Position(target_m))) = (error, args.to_position)
-    else {
+fn millimetres_hint(error: &GoalError, args: &PlanArgs) -> Option<String> {
+    let (GoalError::TooFar { distance_m, reach_m }, Some(target)) = (error, args.goal.tip()) else {
         return None;
     };
-    let largest = target_m.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    let largest = target.position_m.iter().map(|x| x.abs()).fold(0.0, f64::max);
     (*distance_m > 10.0 * reach_m && largest <= 1e3 * reach_m).then(|| {
         format!(
             "positions are in m, and {largest} looks like millimetres: {largest} mm = {} m",
@@ -173,8 +159,8 @@ fn millimetres_hint(error: &PositionError, args: &PlanArgs) -> Option<String> {
     })
 }
 
-fn explain(error: &PositionError, args: &PlanArgs, robot: &Robot) -> Failure {
-    let goal_hint = || args.goal().and_then(|(goal, _)| goal.degrees_hint(robot));
+fn explain(error: &GoalError, args: &PlanArgs, robot: &Robot) -> Failure {
+    let goal_hint = || args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot));
     let hint =
         args.start().0.degrees_hint(robot).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
     Failure::Refused(match hint {
@@ -183,7 +169,7 @@ fn explain(error: &PositionError, args: &PlanArgs, robot: &Robot) -> Failure {
     })
 }
 
-fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &PlanArgs) -> Summary {
+fn summarise(robot: &Robot, Planned { plan: found, tip }: Planned, args: &PlanArgs) -> Summary {
     let goal_rad = found.trajectory.end_rad().iter().take(robot.joints.len()).copied().collect();
     let (a, b) = found.proof.clearance_between;
     Summary {
@@ -204,7 +190,11 @@ fn summarise(robot: &Robot, Planned { plan: found, position }: Planned, args: &P
         clearance_required_m: found.proof.clearance_required_m,
         peak_use: peak_use(robot, &found.proof.peaks),
         goal_rad,
-        target_m: position.map(|(target_m, _)| target_m),
-        position_error_m: position.map(|(_, error_m)| error_m),
+        target_m: tip.map(|(target, _)| target.position_m),
+        position_error_m: tip.map(|(_, error)| error.position_m),
+        target_quaternion_xyzw: tip
+            .and_then(|(target, _)| target.orientation)
+            .map(|o| o.rotation.coords.into()),
+        orientation_error_rad: tip.and_then(|(target, error)| error.angle_rad(&target)),
     }
 }

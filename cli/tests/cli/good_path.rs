@@ -77,6 +77,70 @@ fn plan_to_a_position_says_pose_and_error_and_writes_a_file_that_verifies() {
     assert_eq!(summary["target_m"][1], -0.3, "{summary}");
 }
 
+#[test]
+fn plan_to_a_pose_of_the_tip_says_both_errors_and_writes_a_file_that_verifies() {
+    let scratch = Scratch::new();
+    let plan = |more: &[&str]| -> Vec<String> {
+        let words = [&["plan", "--robot", "ur5", "--scene", "open", "--start", HOME], more].concat();
+        words.into_iter().map(str::to_owned).collect()
+    };
+    let run = |more: &[&str]| {
+        let words = plan(more);
+        scratch.run(&words.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let rpy = "0.4,-0.3,0.35,3.1,0.1,0.2";
+    let by_rpy = run(&["--to-pose", rpy, "-o", "move.json", "--json"]).json();
+    for (key, most) in [("position_error_m", 2e-6), ("orientation_error_rad", 2e-6)] {
+        let error = by_rpy[key].as_f64().expect("a number");
+        assert!((0.0..=most).contains(&error), "{key}: {by_rpy}");
+    }
+    let verify = ["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "move.json", "--json"];
+    assert_eq!(scratch.run(&verify).json()["verified"], true);
+    // The same pose by its quaternion is the same goal.
+    let quaternion: Vec<String> = by_rpy["target_quaternion_xyzw"]
+        .as_array()
+        .expect("four numbers")
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let by_quaternion = format!("0.4,-0.3,0.35,{}", quaternion.join(","));
+    let again = run(&["--to-pose", &by_quaternion, "--json"]).json();
+    for (a, b) in [(0, 0), (3, 3), (5, 5)] {
+        let [a, b] =
+            [by_rpy["goal_rad"][a].as_f64(), again["goal_rad"][b].as_f64()].map(|q| q.expect("a number"));
+        assert!((a - b).abs() < 1e-6, "{by_rpy} {again}");
+    }
+    assert!(run(&["--to-pose", rpy]).done().contains("turned by"));
+}
+
+#[test]
+fn plan_takes_named_relative_and_several_goals_and_the_nearest_turn() {
+    let scratch = Scratch::new();
+    let shipped = fs::read_to_string(config().join("robots/ur5.toml")).unwrap();
+    let wide = shipped.replace("position_rad = [-3.1416, 3.1416]", "position_rad = [-6.2832, 6.2832]");
+    let pose = "[[pose]]\nname = \"tucked\"\nposition_rad = [0, -2.0, 2.0, -1.57, -1.57, 3.0]\n";
+    scratch.write("named.toml", &format!("{wide}\n{pose}"));
+    let goal = |more: &[&str]| -> Vec<f64> {
+        let start = "0,-1.57,1.57,-1.57,-1.57,-3";
+        let words = [&["plan", "--robot", "named.toml", "--scene", "open", "--json", "--start", start], more]
+            .concat();
+        let summary = scratch.run(&words).json();
+        summary["goal_rad"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|q| q.as_f64().expect("a number"))
+            .collect()
+    };
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    assert!(near(goal(&["--to-named", "tucked"])[5], 3.0));
+    assert!(near(goal(&["--to-named", "tucked", "--nearest-turn"])[5], 3.0 - std::f64::consts::TAU));
+    let by = goal(&["--by-deg", "10,0,0,0,0,0"]);
+    assert!(near(by[0], 10.0_f64.to_radians()) && near(by[5], -3.0), "{by:?}");
+    let (far, close) = ("2,-1.57,1.57,-1.57,-1.57,-3", "0.2,-1.57,1.57,-1.57,-1.57,-3");
+    assert!(near(goal(&["--goal", far, "--goal", close])[0], 0.2));
+}
+
 /// Goal: energy is stated for robots with masses, chosen by on request, and left out for robots without.
 #[test]
 fn energy_is_stated_for_robots_with_masses_and_chosen_by_on_request() {

@@ -4,7 +4,13 @@
 pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Robot files: name", "Name of the arm's model. It stands in trajectory files."),
     ("Robot files: urdf", "URDF file, relative to this one, instead of Denavit-Hartenberg rows."),
-    ("Robot files: srdf", "SRDF file beside a URDF: pairs of links that may touch."),
+    (
+        "Robot files: srdf",
+        "SRDF file beside a URDF: pairs of links that may touch, and group states as named poses.",
+    ),
+    ("Robot files: pose", "A pose with a name, for `--to-named`."),
+    ("Robot files: pose[].name", "Its name."),
+    ("Robot files: pose[].position_rad", "One angle for each joint, base to tip."),
     ("Robot files: tip_link", "Link of the URDF whose frame is the tip."),
     ("Robot files: base_link", "Link of the URDF whose frame is the base; without it the root of the tree."),
     (

@@ -2,7 +2,7 @@
 use super::ImportError;
 use super::profiles::ViaProfile;
 use super::reference::fitted_durations_s;
-use crate::position::{ERROR_M_MAX, error_m, polish};
+use crate::goals::{ERROR_M_MAX, Inverse, TipTarget};
 use taustream_arm::{PathFile, PathPoint, Robot};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::papers::spline_time::{SplineCost, SplineTime};
@@ -30,8 +30,9 @@ pub fn poses_of(robot: &Robot, path: &PathFile) -> Result<Vec<JointArray>, Impor
             PathPoint::Joints(angles) => pose(angles)?,
             PathPoint::Place(position_m) => {
                 let from_rad = near_rad.ok_or(ImportError::NoNear)?;
-                let reached_rad = polish(robot, &from_rad, position_m);
-                let off_m = error_m(robot, &reached_rad, position_m);
+                let target = TipTarget::position((*position_m).into());
+                let reached_rad = Inverse::new(robot, &target, 1.0).polish(&from_rad);
+                let off_m = target.error(robot, &reached_rad).position_m;
                 if off_m.is_nan() || off_m > ERROR_M_MAX {
                     return Err(ImportError::NotReached { point, off_m });
                 }

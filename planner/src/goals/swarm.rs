@@ -18,8 +18,8 @@ const NEAR: f64 = 0.1;
 /// What touching costs: between the punishments of 0.1 and of 0.3 of the reach, and far above any way's time.
 const TOLL: [f64; 2] = [100.0, 200.0];
 
-/// What a swarm is requested.
-pub(super) struct Search<'a> {
+/// What a swarm is asked.
+pub(super) struct Swarm<'a> {
     /// What the pose must keep from.
     pub(super) world: &'a World<'a>,
     /// The clock.
@@ -34,7 +34,7 @@ pub(super) struct Search<'a> {
     pub(super) reading: Reading,
 }
 
-impl Search<'_> {
+impl Swarm<'_> {
     /// The best pose of one run.
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl Search<'_> {
             reward: Reward { error_max_m: 2.0 * self.reach_m, reading: self.reading, ..Reward::PAPER_003 },
         }
         .checked()?;
-        let problem = ClearReach { reach, search: self, snapshot: RefCell::default() };
+        let problem = ClearReach { reach, swarm: self, snapshot: RefCell::default() };
         let optimizer = (method.make)(Setup { reading: self.reading, evaluations: Some(EVALUATIONS) });
         let (is_over, mut watch) = (|| self.budget.is_over(), |_: &Progress| ());
         let run = Run {
@@ -76,7 +76,7 @@ impl Search<'_> {
 /// The paper's problem with obstacles.
 struct ClearReach<'a> {
     reach: Reach<'a>,
-    search: &'a Search<'a>,
+    swarm: &'a Swarm<'a>,
     /// Scratch memory; the trait's evaluation takes no mutable access.
     snapshot: RefCell<Snapshot>,
 }
@@ -88,10 +88,10 @@ impl Problem for ClearReach<'_> {
 
     fn cost(&self, x: &[f64]) -> f64 {
         let cost = self.reach.cost(x);
-        if self.reach.error_m(x) > NEAR * self.search.reach_m {
+        if self.reach.error_m(x) > NEAR * self.swarm.reach_m {
             return cost;
         }
-        let (world, snapshot) = (self.search.world, &mut *self.snapshot.borrow_mut());
+        let (world, snapshot) = (self.swarm.world, &mut *self.snapshot.borrow_mut());
         world.place(&pose_of(x), snapshot);
         let hinges: f64 = world.pairs().iter().map(|pair| world.hinge(pair, snapshot)).sum();
         let [least, more] = TOLL;
