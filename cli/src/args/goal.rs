@@ -54,7 +54,7 @@ pub(crate) struct GoalArgs {
         allow_hyphen_values = true,
         default_value = "0",
         hide_default_value = true,
-        requires = "to_pose"
+        conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_position"]
     )]
     tolerance_rad: Tolerances,
     /// Take each joint with more than one turn to the nearest angle at which its link stands as in the goal.

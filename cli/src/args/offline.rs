@@ -59,7 +59,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "blend_rad", value_parser = blend_amount)]
     blend_m: Option<f64>,
     /// Search poses for --to-position by a swarm (an optimiser by name) instead of inverse kinematics.
-    #[arg(long, value_name = "NAME", requires = "to_position", value_parser = method())]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_pose"], value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
     /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]

@@ -33,7 +33,6 @@ fn words_that_are_wrong_are_refused_by_name() {
     let with = |goal: &str| format!("plan --robot ur5 --scene open --start HOME --goal={goal} -o never.json");
     let to =
         |to: &str| format!("plan --robot ur5 --scene open --start HOME --to-position={to} -o never.json");
-    let pose = |to: &str| format!("plan --robot ur5 --scene open --start HOME --to-pose={to} -o never.json");
     let scratch = Scratch::new();
     refuse_all(
         &scratch,
@@ -55,21 +54,6 @@ fn words_that_are_wrong_are_refused_by_name() {
             (&to("0.4,0,0.3,1"), 2, &["--to-position", "4 values"]),
             (&to("0.4,nan,0.3"), 2, &["--to-position", "y is NaN"]),
             (&to("inf,0,0"), 2, &["--to-position", "x is inf"]),
-            (&pose("0.4,0,0.3"), 2, &["--to-pose", "3 values", "quaternion"]),
-            (&pose("0.4,0,0.3,0,0,0,0"), 2, &["--to-pose", "length is 0"]),
-            (&pose("0.4,0,0.3,nan,0,0"), 2, &["--to-pose", "value 4 is NaN"]),
-            (&pose("0.4,0,0.3,0,0,0 --tolerance-rad=-1"), 2, &["--tolerance-rad", "0 or more"]),
-            (&pose("0.4,0,0.3,0,0,0 --tolerance-rad=1,2"), 2, &["--tolerance-rad", "2 values"]),
-            (&pose("0.4,0,0.3,0,0,0 --tolerance-m=-1"), 1, &["tolerance of the position"]),
-            (&pose("0.4,0,0.3,0,0,0 --nearest-turn"), 2, &["--nearest-turn"]),
-            (&pose("0.4,0,0.3,0,0,0 --reach-with de"), 2, &["--reach-with"]),
-            (&pose("0.84,0,0.1,0,0,0"), 1, &["out of reach", "rad off", "tolerance"]),
-            (
-                "plan --robot ur5 --scene open --start HOME --to-named nowhere",
-                2,
-                &["no pose `nowhere`", "[[pose]]"],
-            ),
-            ("plan --robot ur5 --scene open --start HOME --by 0,0", 2, &["--by has 2 values"]),
             (&to("0.4,0,up"), 2, &["--to-position", "z is `up`"]),
             (&to("400,0,300"), 1, &["out of reach", "too short", "millimetres", "0.4 m"]),
             (&to("0,0,0.75 --seed 3"), 1, &["out of reach", "tries", "0.0268"]),
@@ -275,6 +259,31 @@ fn poses_that_cannot_be_are_refused_with_joint_or_contact() {
 }
 
 /// Goal: an honest no. Method: walls, lid and floor leave only a gap round the base, which no upper arm passes.
+#[test]
+fn goals_of_the_tip_that_are_wrong_are_refused_by_name() {
+    let pose = |to: &str| format!("plan --robot ur5 --scene open --start HOME --to-pose={to} -o never.json");
+    refuse_all(
+        &Scratch::new(),
+        &[
+            (&pose("0.4,0,0.3"), 2, &["--to-pose", "3 values", "quaternion"]),
+            (&pose("0.4,0,0.3,0,0,0,0"), 2, &["--to-pose", "length is 0"]),
+            (&pose("0.4,0,0.3,nan,0,0"), 2, &["--to-pose", "value 4 is NaN"]),
+            (&pose("0.4,0,0.3,0,0,0 --tolerance-rad=-1"), 2, &["--tolerance-rad", "0 or more"]),
+            (&pose("0.4,0,0.3,0,0,0 --tolerance-rad=1,2"), 2, &["--tolerance-rad", "2 values"]),
+            (&pose("0.4,0,0.3,0,0,0 --tolerance-m=-1"), 1, &["tolerance of the position"]),
+            (&pose("0.4,0,0.3,0,0,0 --nearest-turn"), 2, &["--nearest-turn"]),
+            (&pose("0.4,0,0.3,0,0,0 --reach-with de"), 2, &["--reach-with"]),
+            (&pose("0.88,0,0.1,0,-1.5708,0"), 1, &["out of reach", "rad off", "tolerance"]),
+            (
+                "plan --robot ur5 --scene open --start HOME --to-named nowhere",
+                2,
+                &["no pose `nowhere`", "[[pose]]"],
+            ),
+            ("plan --robot ur5 --scene open --start HOME --by 0,0", 2, &["--by has 2 values"]),
+        ],
+    );
+}
+
 #[test]
 fn goal_behind_a_closed_wall_is_refused_within_the_deadline() {
     let scratch = Scratch::new();

@@ -112,18 +112,17 @@ pub fn plan_to_any(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<(Plan, JointArray), GoalError> {
+    let Situation { robot, scene, start_rad, margin } = *situation;
+    if let [goal_rad] = *goals_rad {
+        let task = Task { robot, scene, start_rad, goal_rad, margin };
+        return Ok((plan_until(&task, options, cancel)?, goal_rad));
+    }
     let budget = Budget::until(options.clock(), cancel);
     let mut nearest_first = goals_rad.to_vec();
-    let Situation { robot, start_rad, .. } = situation;
-    nearest_first.sort_by(|a, b| time_s(robot, start_rad, a).total_cmp(&time_s(robot, start_rad, b)));
+    nearest_first.sort_by(|a, b| time_s(robot, &start_rad, a).total_cmp(&time_s(robot, &start_rad, b)));
     let goals = goals_rad.len();
-    let (mut plan, goal_rad) =
-        best_motion(situation, &nearest_first, options, (&budget, cancel))?.map_err(|(_, error)| {
-            let none = |error: Box<PlanError>| {
-                if goals == 1 { GoalError::Plan(*error) } else { GoalError::NoneOf { goals, error } }
-            };
-            error.map_or(GoalError::NoTime, none)
-        })?;
+    let (mut plan, goal_rad) = best_motion(situation, &nearest_first, options, (&budget, cancel))?
+        .map_err(|(_, error)| error.map_or(GoalError::NoTime, |error| GoalError::NoneOf { goals, error }))?;
     plan.planning_s = budget.elapsed_s();
     Ok((plan, goal_rad))
 }
@@ -197,7 +196,7 @@ fn best_motion(
         return Err(GoalError::NoGoal);
     }
     let Situation { robot, scene, start_rad, margin } = *situation;
-    let each_plan = if poses.len() == 1 { options.deadline } else { options.deadline / 8 };
+    let each_plan = options.deadline / 8;
     let (mut best, mut planned, mut failure, mut cut) = (None::<(Plan, JointArray)>, 0, None, false);
     for goal_rad in poses {
         if budget.is_over() || (planned >= GOALS_MAX && best.is_some()) {
