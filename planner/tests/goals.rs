@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
-use taustream_planner::goals::{ERROR_M_MAX, ERROR_RAD_MAX, Inverse, Orientation};
+use taustream_planner::goals::{
+    ERROR_M_MAX, ERROR_RAD_MAX, Inverse, LineError, Orientation, TipSpeed, plan_line,
+};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::{
     Finder, GoalError, PlanOptions, Reached, Situation, StartMargin, TipTarget, plan_to_any, plan_to_tip,
@@ -361,4 +363,58 @@ fn best_of_several_goals_is_taken_and_an_unreachable_one_does_no_harm() {
     let error = plan_to_any(&situation, &[folded, folded], &options, None).unwrap_err();
     assert!(matches!(error, GoalError::NoneOf { goals: 2, .. }), "{error}");
     assert!(matches!(plan_to_any(&situation, &[], &options, None), Err(GoalError::NoGoal)));
+}
+
+/// Goal: the tip keeps to its line, its speed and its orientation, by independent kinematics.
+#[test]
+fn tip_keeps_to_its_straight_line_its_speed_and_its_orientation() {
+    let (robot, empty) = (ur5(), scene(Vec::new()));
+    let start_rad = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let situation = Situation { robot: &robot, scene: &empty, start_rad, margin: StartMargin::Scene };
+    let from_m = ur5_origins_m(&start_rad)[6];
+    for (by_m, linear_m_s) in [([0.1, 0.0, 0.0], 0.25), ([0.0, 0.3, -0.1], 0.1), ([-0.05, -0.2, 0.2], 1.0)] {
+        let to_m: [f64; 3] = std::array::from_fn(|i| from_m[i] + by_m[i]);
+        let speed = TipSpeed { linear_m_s, ..TipSpeed::default() };
+        let line = plan_line(&situation, &TipTarget::position(to_m), &speed)
+            .unwrap_or_else(|e| panic!("{by_m:?}: {e}"));
+        let motion = &line.imported.trajectory;
+        assert_eq!(verify(&robot, &empty, motion).as_ref(), Ok(&line.imported.proof));
+        let length_m = distance_m(from_m, to_m);
+        let mut before_m = from_m;
+        let steps = (motion.duration_s() / 1e-3).ceil();
+        let mut k = 0.0;
+        while k <= steps {
+            let q = motion.sample(k * 1e-3).position_rad;
+            let tip_m = ur5_origins_m(&q)[6];
+            let way: [f64; 3] = std::array::from_fn(|i| tip_m[i] - from_m[i]);
+            let share = way.iter().zip(by_m).map(|(w, b)| w * b).sum::<f64>() / (length_m * length_m);
+            let foot_m: [f64; 3] = std::array::from_fn(|i| from_m[i] + share.clamp(0.0, 1.0) * by_m[i]);
+            assert!(distance_m(tip_m, foot_m) <= 1e-3, "{by_m:?}: {} m off", distance_m(tip_m, foot_m));
+            let speed_m_s = distance_m(tip_m, before_m) / 1e-3;
+            assert!(speed_m_s <= linear_m_s * 1.02, "{by_m:?}: {speed_m_s} m/s");
+            assert!(angle_between_rad(&robot, &start_rad, &q) < 5e-3, "{by_m:?} turns");
+            before_m = tip_m;
+            k += 1.0;
+        }
+        assert!(distance_m(before_m, to_m) < 1e-6, "{by_m:?}: ends at {before_m:?}, not {to_m:?}");
+    }
+}
+
+#[test]
+fn straight_line_that_the_arm_cannot_follow_is_refused_with_place_and_reason() {
+    let (robot, empty) = (ur5(), scene(Vec::new()));
+    let start_rad = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let situation = Situation { robot: &robot, scene: &empty, start_rad, margin: StartMargin::Scene };
+    let [x, y, z] = ur5_origins_m(&start_rad)[6];
+    // Out of reach half way, and across the axis of the base.
+    for (to_m, words) in [([x + 0.55, y, z], "left after"), ([-x, -y, z], "left after")] {
+        let error = plan_line(&situation, &TipTarget::position(to_m), &TipSpeed::default()).unwrap_err();
+        assert!(matches!(error, LineError::Left { .. }) && error.to_string().contains(words), "{error}");
+    }
+    let here = plan_line(&situation, &TipTarget::position([x, y, z]), &TipSpeed::default());
+    assert_eq!(here.unwrap_err(), LineError::Still);
+    let ball = scene(vec![sphere("ball", [x, y + 0.15, z - 0.01], 0.03)]);
+    let blocked = Situation { scene: &ball, ..situation };
+    let error = plan_line(&blocked, &TipTarget::position([x, y + 0.3, z]), &TipSpeed::default()).unwrap_err();
+    assert!(error.to_string().contains("ball"), "{error}");
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_optimizers::{METHODS, Method, Reading};
+use taustream_planner::goals::TipSpeed;
 use taustream_planner::{Blend, Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\
@@ -18,6 +19,7 @@ Examples:
   taustream plan ... --objective energy --deadline-ms 5000
   taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
   taustream plan ... --to-pose 0.4,-0.3,0.35,0,3.1416,0 --tolerance-rad 0.01,0.01,free
+  taustream plan ... --to-position 0.4,-0.3,0.35 --linear --tip-speed-m-s 0.1
   taustream plan ... --to-named home          a [[pose]] of the robot file, or a group_state of its SRDF
   taustream plan ... --by 0,0,0,0,0,90deg     relative to the start
   taustream plan ... --via 0.3,-1.2,1.2,-1.6,-1.57,0 --via 0.8,-1,1,-1.6,-1.57,0 --blend-rad 0.1
@@ -45,6 +47,18 @@ pub(crate) struct PlanArgs {
     /// Where to go.
     #[command(flatten)]
     pub(crate) goal: GoalArgs,
+    /// Lead the tip straight to --to-position (its orientation stays) or --to-pose (it turns evenly).
+    #[arg(long, conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "via", "reach_with", "blend_rad", "blend_m"])]
+    pub(crate) linear: bool,
+    /// Speed of the tip along the straight line, m/s.
+    #[arg(long, value_name = "M_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().linear_m_s, requires = "linear")]
+    tip_speed_m_s: f64,
+    /// Turning speed of the tip along the straight line, rad/s.
+    #[arg(long, value_name = "RAD_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().angular_rad_s, requires = "linear")]
+    tip_speed_rad_s: f64,
+    /// How far the tip may be from the straight line, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = TipSpeed::default().off_m_max, requires = "linear")]
+    line_off_m: f64,
     /// Pose to pass on the way, rad; give it once for each pose, in their order.
     ///
     /// The motion keeps within the blend of the straight lines that join the poses.
@@ -89,6 +103,13 @@ impl PlanArgs {
             (Some(angles), _) => (angles, "--start"),
             (None, None) => (Angles::NONE, "--start"),
         }
+    }
+
+    /// How the tip goes along a straight line.
+    pub(crate) fn tip_speed(&self) -> TipSpeed {
+        let (linear_m_s, angular_rad_s, off_m_max) =
+            (self.tip_speed_m_s, self.tip_speed_rad_s, self.line_off_m);
+        TipSpeed { linear_m_s, angular_rad_s, off_m_max }
     }
 
     /// How far from its corners the motion may pass.

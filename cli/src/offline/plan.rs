@@ -6,11 +6,11 @@ use crate::failure::Failure;
 use crate::output::{Form, deliver};
 use serde::Serialize;
 use std::fmt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
-use taustream_planner::goals::TipError;
+use taustream_planner::goals::{Line, LineError, TipError, plan_line};
 use taustream_planner::{
     Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
     plan_to_tip,
@@ -46,6 +46,10 @@ struct Summary {
     target_quaternion_xyzw: Option<[f64; 4]>,
     /// By what angle it ends turned from that, about the axes that are not free.
     orientation_error_rad: Option<f64>,
+    /// Length of the straight line of the tip, when one was requested.
+    line_m: Option<f64>,
+    /// How far the tip is from it at most.
+    line_off_m: Option<f64>,
 }
 
 impl fmt::Display for Summary {
@@ -68,6 +72,13 @@ impl fmt::Display for Summary {
             writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off{turned}, in the pose")?;
             let angles: Vec<String> = self.goal_rad.iter().map(|q| format!("{q:.6}")).collect();
             writeln!(f, "              {} rad", angles.join(","))?;
+        }
+        if let (Some(line_m), Some(off_m)) = (self.line_m, self.line_off_m) {
+            writeln!(
+                f,
+                "straight line {line_m:.4} m of the tip, which is at most {:.3} mm off it",
+                1e3 * off_m
+            )?;
         }
         write!(f, "{}", PeakTable(&self.peak_use))?;
         match &self.file {
@@ -94,6 +105,9 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
     let found = match args.goal.of(&robot, &start_rad)? {
+        Goal::Tip(target) if args.linear => straight(&situation, &target, args)
+            .map_err(|error| Failure::Refused(format!("no plan: {error}")))
+            .map(Ok)?,
         Goal::Tip(target) => to_tip(&situation, &target, (args, &options)),
         Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options))?,
     };
@@ -113,6 +127,20 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
 struct Planned {
     plan: Plan,
     tip: Option<(TipTarget, TipError)>,
+    /// Length of the tip's straight line, and how far it is off.
+    line: Option<[f64; 2]>,
+}
+
+fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, LineError> {
+    let started = Instant::now();
+    let Line { imported, length_m, off_m, .. } = plan_line(situation, target, &args.tip_speed())?;
+    let (trajectory, proof) = (imported.trajectory, imported.proof);
+    let tip = Some((*target, target.error(situation.robot, &trajectory.end_rad())));
+    let score = proof.duration_s;
+    let how = "straight line of the tip".to_owned();
+    let planning_s = started.elapsed().as_secs_f64();
+    let plan = Plan { trajectory, how, proof, score, energy_j: None, planning_s, checks: 0 };
+    Ok(Planned { plan, tip, line: Some([length_m, off_m]) })
 }
 
 fn to_tip(
@@ -122,7 +150,7 @@ fn to_tip(
 ) -> Result<Planned, GoalError> {
     let finder = args.reach_with.map_or(Finder::Inverse, Finder::Swarm);
     let reached = plan_to_tip(situation, (target, finder), options, None)?;
-    Ok(Planned { plan: reached.plan, tip: Some((*target, reached.error)) })
+    Ok(Planned { plan: reached.plan, tip: Some((*target, reached.error)), line: None })
 }
 
 /// To the best of several poses, or through way points to the only one.
@@ -142,7 +170,7 @@ fn to_poses(
     } else {
         return Err(Failure::Usage("--via needs one goal; several were given".to_owned()));
     };
-    Ok(plan.map(|plan| Planned { plan, tip: None }))
+    Ok(plan.map(|plan| Planned { plan, tip: None, line: None }))
 }
 
 /// A second sentence for positions that look like millimetres.
@@ -169,7 +197,7 @@ fn explain(error: &GoalError, args: &PlanArgs, robot: &Robot) -> Failure {
     })
 }
 
-fn summarise(robot: &Robot, Planned { plan: found, tip }: Planned, args: &PlanArgs) -> Summary {
+fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &PlanArgs) -> Summary {
     let goal_rad = found.trajectory.end_rad().iter().take(robot.joints.len()).copied().collect();
     let (a, b) = found.proof.clearance_between;
     Summary {
@@ -195,6 +223,8 @@ fn summarise(robot: &Robot, Planned { plan: found, tip }: Planned, args: &PlanAr
         target_quaternion_xyzw: tip
             .and_then(|(target, _)| target.orientation)
             .map(|o| o.rotation.coords.into()),
+        line_m: line.map(|[length_m, _]| length_m),
+        line_off_m: line.map(|[_, off_m]| off_m),
         orientation_error_rad: tip.and_then(|(target, error)| error.angle_rad(&target)),
     }
 }

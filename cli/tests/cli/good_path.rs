@@ -114,6 +114,21 @@ fn plan_to_a_pose_of_the_tip_says_both_errors_and_writes_a_file_that_verifies() 
 }
 
 #[test]
+fn plan_leads_the_tip_along_a_straight_line_at_its_speed_and_writes_a_file_that_verifies() {
+    let scratch = Scratch::new();
+    let start = "0,-1.57,1.57,-1.57,-1.57,0";
+    let words = ["plan", "--robot", "ur5", "--scene", "open", "--start", start, "--linear"];
+    let to = ["--to-position", "0.45,-0.3,0.35", "--tip-speed-m-s", "0.1", "-o", "move.json", "--json"];
+    let summary = scratch.run(&[&words[..], &to].concat()).json();
+    let number = |key: &str| summary[key].as_f64().unwrap_or(f64::NAN);
+    assert!(number("line_off_m") <= 1e-3 && number("line_m") > 0.1, "{summary}");
+    assert!(number("duration_s") >= number("line_m") / 0.1, "no faster than asked: {summary}");
+    assert!(number("position_error_m") < 1e-5, "{summary}");
+    let verify = ["verify", "--robot", "ur5", "--scene", "open", "--trajectory", "move.json", "--json"];
+    assert_eq!(scratch.run(&verify).json()["verified"], true);
+}
+
+#[test]
 fn plan_takes_named_relative_and_several_goals_and_the_nearest_turn() {
     let scratch = Scratch::new();
     let shipped = fs::read_to_string(config().join("robots/ur5.toml")).unwrap();
