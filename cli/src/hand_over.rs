@@ -193,6 +193,8 @@ fn is_for_services(action: &Action) -> bool {
     match action {
         Action::Replan(_)
         | Action::Cancel(_)
+        | Action::Follow(_)
+        | Action::Jog(_)
         | Action::Recover(_)
         | Action::Run(_)
         | Action::Enable(_)

@@ -18,6 +18,7 @@ pub mod receipt;
 pub mod reference_state;
 pub mod report;
 pub mod service;
+pub mod target;
 pub mod text;
 pub mod trajectory;
 
@@ -30,6 +31,7 @@ pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
 pub use reference_state::ReferenceState;
 pub use report::Report;
+pub use target::{CheckedTargets, TargetReply, TargetRequest};
 pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 

@@ -5,7 +5,10 @@
 //! to one uid only.
 use crate::files::{ArmFiles, Footprint, NODE_COUNTER, ROOT, SEGMENTS, UsersLock};
 use crate::operator::abstract_name;
-use crate::{CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TrajectoryMessage};
+use crate::{
+    CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TargetReply, TargetRequest,
+    TrajectoryMessage,
+};
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{client::Client, publisher::Publisher, server::Server, subscriber::Subscriber};
@@ -38,6 +41,10 @@ pub type CommandClient = Client<ipc::Service, CommandRequest, (), CommandReply, 
 pub type CommandServer = Server<ipc::Service, CommandRequest, (), CommandReply, ()>;
 /// Asks the planner.
 pub type PlanClient = Client<ipc::Service, PlanRequest, (), PlanReply, ()>;
+/// Sends targets to the planner.
+pub type TargetClient = Client<ipc::Service, TargetRequest, (), TargetReply, ()>;
+/// Takes targets.
+pub type TargetServer = Server<ipc::Service, TargetRequest, (), TargetReply, ()>;
 /// Answers replan requests.
 pub type PlanServer = Server<ipc::Service, PlanRequest, (), PlanReply, ()>;
 
@@ -432,3 +439,4 @@ macro_rules! request_response {
 
 request_response!(command_service, command_client, command_server, CommandRequest, CommandReply, "command");
 request_response!(plan_service, plan_client, plan_server, PlanRequest, PlanReply, "plan");
+request_response!(target_service, target_client, target_server, TargetRequest, TargetReply, "target");

@@ -4,10 +4,13 @@
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::target::{
+    CheckedTargets, DUE_S_MAX, TARGETS_MAX, Target, TargetError, TargetOutcome,
+};
 use taustream_messages::trajectory::{Corrupted, MessageError};
 use taustream_messages::{
     CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome, Phase, PlanReply,
-    PlanRequest, Receipt, Rejection, Replaces, Report, Text, TrajectoryMessage,
+    PlanRequest, Receipt, Rejection, Replaces, Report, TargetReply, TargetRequest, Text, TrajectoryMessage,
 };
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
@@ -55,6 +58,26 @@ proptest! {
             prop_assert!((1..=MAX_JOINTS).contains(&checked.trajectory.joints()));
             prop_assert!(checked.trajectory.duration_s().is_finite());
             prop_assert!(checked.trajectory.end_rad().iter().all(|q| q.is_finite()));
+        }
+    }
+
+    #[test]
+    fn targets_of_any_bytes_are_checked_or_refused(
+        request in bytes_of(size_of::<TargetRequest>()),
+        reply in bytes_of(size_of::<TargetReply>()),
+    ) {
+        if let Ok(checked) = CheckedTargets::try_from(&*from_bytes::<TargetRequest>(&request)) {
+            prop_assert!((1..=MAX_JOINTS).contains(&checked.joints));
+            prop_assert!((1..=TARGETS_MAX).contains(&checked.targets.len()));
+            prop_assert!(checked.targets.is_sorted_by(|a, b| a.due_s <= b.due_s));
+            for target in &checked.targets {
+                prop_assert!((0.0..=DUE_S_MAX).contains(&target.due_s));
+                prop_assert!(target.position_rad.iter().all(|q| q.is_finite()));
+                prop_assert!(target.velocity_rad_s.iter().flatten().all(|v| v.is_finite()));
+            }
+        }
+        if let TargetOutcome::Refused { reason } = from_bytes::<TargetReply>(&reply).outcome() {
+            prop_assert!(reason.chars().all(|c| !c.is_control()));
         }
     }
 
@@ -218,4 +241,64 @@ fn text_too_long_is_cut_at_a_character() {
     let text = Text::new(&long).read();
     assert_eq!(text, "\u{e9}".repeat(120));
     assert_eq!(Text::new("a\nb").read(), "a b");
+}
+
+fn targets(due_s: &[f64]) -> CheckedTargets {
+    let each = due_s.iter().map(|&due_s| Target {
+        due_s,
+        position_rad: [0.1, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        velocity_rad_s: None,
+    });
+    CheckedTargets { joints: 2, sequence: 5, sent_ns: 9, valid_s: 0.2, targets: each.collect() }
+}
+
+#[test]
+fn targets_arrive_as_they_were_sent() {
+    let mut sent = targets(&[0.0, 0.1, 0.1, 2.5]);
+    sent.targets[1].velocity_rad_s = Some([0.5; MAX_JOINTS].map(|v| v * 0.0));
+    assert_eq!(CheckedTargets::try_from(&TargetRequest::new(&sent)), Ok(sent));
+}
+
+#[test]
+fn targets_that_make_no_sense_are_refused_with_their_place() {
+    let read = |sent: &CheckedTargets| CheckedTargets::try_from(&TargetRequest::new(sent));
+    let due = |due_s: &[f64]| read(&targets(due_s)).expect_err("must be refused");
+    assert_eq!(due(&[]), TargetError::Count { got: 0 });
+    assert_eq!(due(&[0.0; TARGETS_MAX + 1]), TargetError::Count { got: 65 });
+    assert_eq!(due(&[0.2, 0.1]), TargetError::Due { target: 1, due_s: 0.1 });
+    assert_eq!(due(&[-0.1]), TargetError::Due { target: 0, due_s: -0.1 });
+    assert_eq!(due(&[DUE_S_MAX * 1.01]), TargetError::Due { target: 0, due_s: DUE_S_MAX * 1.01 });
+    assert!(matches!(due(&[f64::NAN]), TargetError::Due { target: 0, .. }));
+    let mut wrong = targets(&[0.0, 0.1]);
+    wrong.targets[1].position_rad[1] = f64::INFINITY;
+    assert_eq!(read(&wrong), Err(TargetError::Value { target: 1, joint: 1, value: f64::INFINITY }));
+    let mut stranger = targets(&[0.0]);
+    stranger.targets[0].position_rad[2] = 0.5;
+    assert_eq!(read(&stranger), Err(TargetError::Value { target: 0, joint: 2, value: 0.5 }));
+    for valid_s in [0.0, -1.0, f64::NAN, DUE_S_MAX * 1.01] {
+        let wrong = CheckedTargets { valid_s, ..targets(&[0.0]) };
+        assert!(matches!(read(&wrong), Err(TargetError::Valid { .. })), "{valid_s}");
+    }
+    let mut partly = targets(&[0.0]);
+    partly.targets[0].velocity_rad_s = Some([0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert!(matches!(read(&partly), Err(TargetError::Value { target: 0, joint: 1, .. })));
+}
+
+#[test]
+fn replies_to_targets_arrive_as_they_were_sent() {
+    let outcomes = [
+        TargetOutcome::Taken {
+            trajectory_id: 7,
+            cut_s: 1.25,
+            rest_in_s: 0.5,
+            planning_s: 0.001,
+            note: "joint 2 kept inside its limit".to_owned(),
+        },
+        TargetOutcome::Superseded,
+        TargetOutcome::Refused { reason: "link3 would touch box".to_owned() },
+    ];
+    for outcome in outcomes {
+        let reply = TargetReply::new(11, &outcome);
+        assert_eq!((reply.sequence(), reply.outcome()), (11, outcome));
+    }
 }

@@ -37,11 +37,16 @@ impl CutPoint {
     /// The trajectory that is cut, with the strokes folded that have ended when the replacement takes over.
     fn folded(&self) -> Result<Trajectory, NoReplacement> {
         let trajectory = self.trajectory.as_ref().ok_or(NoReplacement::Unknown)?;
-        let kept = kept(trajectory, self.at_s, self.from_s);
-        let pending = trajectory.strokes().iter().filter(|stroke| stroke.start_s >= self.at_s);
-        let strokes: Vec<Stroke> = kept.strokes.iter().chain(pending).copied().collect();
-        Ok(Trajectory::new(trajectory.joints(), kept.base_rad, &strokes)?)
+        Ok(folded(trajectory, self.at_s, self.from_s)?)
     }
+}
+
+/// A trajectory that is cut at `at_s`, with the strokes folded that have ended at `from_s`.
+pub(crate) fn folded(trajectory: &Trajectory, at_s: f64, from_s: f64) -> Result<Trajectory, TrajectoryError> {
+    let kept = kept(trajectory, at_s, from_s);
+    let pending = trajectory.strokes().iter().filter(|stroke| stroke.start_s >= at_s);
+    let strokes: Vec<Stroke> = kept.strokes.iter().chain(pending).copied().collect();
+    Trajectory::new(trajectory.joints(), kept.base_rad, &strokes)
 }
 
 /// A verified replacement.

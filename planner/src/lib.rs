@@ -25,6 +25,8 @@ pub mod search;
 pub mod send;
 pub mod service;
 pub mod shortcut;
+pub mod stream;
+pub mod stream_cut;
 pub mod timing;
 pub mod tree;
 pub mod verify;

@@ -24,7 +24,7 @@ pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
 /// A report that is not older is the streamer's state of now, ns: a reporting period and a half at the default rate.
 const CURRENT_NS: u64 = 15_000_000;
 /// Of a wait for a receipt, how much is left to the receipt's own way.
-const RECEIPT_TAKES: Duration = Duration::from_millis(300);
+pub(crate) const RECEIPT_TAKES: Duration = Duration::from_millis(300);
 /// Trajectories that are remembered: one runs, one waits, others were replaced or are unanswered.
 const SENT_MAX: usize = 8;
 /// Ids stay below 2^53, so that JSON readers with f64 numbers keep them exact.

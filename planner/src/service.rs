@@ -5,6 +5,7 @@
 //! until its cut, so that nothing of it hangs on this process. A motion whose requester has gone in the meantime is not sent:
 //! no client waits for the arm to move.
 mod moving;
+mod streaming;
 
 use crate::kind::PlannerKind;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
@@ -16,11 +17,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
+use streaming::Stream;
 use taustream_arm::daemon::{Manager, Promise};
 use taustream_arm::{Robot, Scene};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
-use taustream_messages::service::{PlanServer, ServiceError, Wire};
+use taustream_messages::service::{PlanServer, ServiceError, TargetServer, Wire};
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces};
 use taustream_motion::JointArray;
 use tracing::{info, warn};
@@ -95,6 +97,8 @@ pub struct Service<'a> {
     stop: &'a AtomicBool,
     seen: Seen,
     latency: Latency,
+    targets: TargetServer,
+    stream: Stream<'a>,
     promise: Promise,
     footprint: Footprint,
 }
@@ -129,6 +133,8 @@ impl<'a> Service<'a> {
             stop,
             seen: Seen::default(),
             latency: Latency::default(),
+            targets: wire.target_server()?,
+            stream: Stream::new(robot),
             promise,
             footprint: wire.footprint(),
         })
@@ -167,6 +173,7 @@ impl<'a> Service<'a> {
             Ok(None) => {}
             Err(e) => warn!("cannot take a request: {e:?}"),
         }
+        self.follow();
     }
 
     fn take(&mut self, request: &Request) {

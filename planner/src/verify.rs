@@ -166,17 +166,9 @@ pub fn verify_stretches(
     budget: &Budget,
 ) -> Result<Proof, Violation> {
     let Some(first) = stretches.first() else { return Err(Violation::Unresolved { checks: 0, at_s: 0.0 }) };
-    let robot = first.world.robot();
-    let (got, expected) = (trajectory.joints(), robot.joints.len());
-    if got != expected {
-        return Err(Violation::Joints { got, expected });
-    }
     // Limits first: beyond them angles may be so large that geometry means nothing.
     let [begin_s, _] = first.span_s;
-    let peaks = check_motion_from(trajectory, &robot.limits(), begin_s).map_err(|violation| {
-        let name = robot.joints.get(violation.joint).map(|j| j.name.clone()).unwrap_or_default();
-        Violation::Limit { name, violation }
-    })?;
+    let peaks = check_limits(first.world, trajectory, begin_s)?;
     // Once a motion, with bodies inside of meshes: nothing gets in later without crossing a surface.
     if let Some(contact) = first.world.contact(&trajectory.sample(begin_s).position_rad) {
         return Err(Violation::Collision { from_s: begin_s, at_s: begin_s, contact });
@@ -200,6 +192,41 @@ pub fn verify_stretches(
         }
     }
     Ok(proof)
+}
+
+/// The same proof for a motion that is soon replaced, without its least distance: a small part of the work.
+///
+/// # Errors
+/// The first violation that was met, not the deepest; `Unresolved` when the clock cut in.
+pub fn verify_free(stretch: &Stretch, trajectory: &Trajectory, budget: &Budget) -> Result<(), Violation> {
+    let (world, [begin_s, _]) = (stretch.world, stretch.span_s);
+    check_limits(world, trajectory, begin_s)?;
+    if let Some(contact) = world.contact(&trajectory.sample(begin_s).position_rad) {
+        return Err(Violation::Collision { from_s: begin_s, at_s: begin_s, contact });
+    }
+    sweep(world, trajectory, stretch.span_s, &SweepRules::MARGIN_EXIT, budget).map_err(|blocked| {
+        let (checks, at_s) = (blocked.checks, blocked.at);
+        match blocked.pair {
+            None => Violation::Unresolved { checks, at_s },
+            Some((pair, distance_m)) => {
+                Violation::Collision { from_s: at_s, at_s, contact: world.contact_of(&pair, distance_m) }
+            }
+        }
+    })?;
+    Ok(())
+}
+
+/// Joints and limits, from an instant on.
+fn check_limits(world: &World, trajectory: &Trajectory, begin_s: f64) -> Result<Peaks, Violation> {
+    let robot = world.robot();
+    let (got, expected) = (trajectory.joints(), robot.joints.len());
+    if got != expected {
+        return Err(Violation::Joints { got, expected });
+    }
+    check_motion_from(trajectory, &robot.limits(), begin_s).map_err(|violation| {
+        let name = robot.joints.get(violation.joint).map(|j| j.name.clone()).unwrap_or_default();
+        Violation::Limit { name, violation }
+    })
 }
 
 /// States the contact where it is deepest, which tells more than the instant at which it begins.

@@ -6,10 +6,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 use taustream_arm::{Robot, Scene, runtime};
+use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::Wire;
+use taustream_messages::target::{CheckedTargets, Target, TargetOutcome};
 use taustream_messages::{
     CheckedTrajectory, LAYOUT_VERSION, Outcome, Phase, PlanRequest, Receipt, Rejection, Replaces, Report,
+    TargetRequest,
 };
 use taustream_motion::JointArray;
 use taustream_planner::send::{SendError, send_trajectory};
@@ -435,4 +438,72 @@ fn service_planning_ends_when_its_requester_goes_and_others_are_answered_meanwhi
             thread::sleep(Duration::from_millis(20));
         }
     });
+}
+
+/// One target, sent just now.
+fn targets(position_rad: JointArray) -> CheckedTargets {
+    let target = Target { due_s: 0.0, position_rad, velocity_rad_s: None };
+    CheckedTargets { joints: 6, sequence: 1, sent_ns: now_ns(), valid_s: 20.0, targets: vec![target] }
+}
+
+/// Sends targets and waits for the answer.
+fn stream(arm: &str, sent: &CheckedTargets) -> TargetOutcome {
+    let wire = join(arm, "client");
+    let client = wire.target_client().expect("port");
+    let pending = client.send_copy(TargetRequest::new(sent)).expect("sent");
+    let since = Instant::now();
+    loop {
+        if let Some(reply) = pending.receive().expect("received") {
+            assert_eq!(reply.payload().sequence(), sent.sequence);
+            return reply.payload().outcome();
+        }
+        assert!(since.elapsed() < Duration::from_secs(20), "no answer");
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn service_target_is_followed_as_far_as_it_is_proven_and_the_answer_says_so() {
+    let played = Played::new(Phase::Holding);
+    with_service("stream", &played, |arm, _| {
+        let note = |outcome: TargetOutcome| match outcome {
+            TargetOutcome::Taken { cut_s, rest_in_s, note, .. } => {
+                assert!(cut_s <= 0.0 && rest_in_s > 0.0, "{cut_s} {rest_in_s}");
+                note
+            }
+            TargetOutcome::Superseded | TargetOutcome::Refused { .. } => panic!("{outcome:?}"),
+        };
+        assert_eq!(note(stream(arm, &targets(pose(THERE)))), "");
+        let far = note(stream(arm, &targets(pose([9.0, -1.4, 1.4, -1.57, -1.57, 0.0]))));
+        assert!(far.contains("shoulder_pan is kept inside its limits") && far.contains("9 rad"), "{far}");
+        let blocked = note(stream(arm, &targets(pose([0.0, 0.6, 0.0, 0.0, 0.0, 0.0]))));
+        assert!(blocked.contains("% of the way") && blocked.contains("table"), "{blocked}");
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 3);
+}
+
+#[test]
+fn service_targets_that_cannot_be_kept_are_refused_in_words_and_nothing_is_sent() {
+    let played = Played::new(Phase::Holding);
+    with_service("bad-stream", &played, |arm, _| {
+        let reason = |sent: &CheckedTargets| match stream(arm, sent) {
+            TargetOutcome::Refused { reason } => reason,
+            outcome @ (TargetOutcome::Taken { .. } | TargetOutcome::Superseded) => panic!("{outcome:?}"),
+        };
+        let good = targets(pose(THERE));
+        let seven = CheckedTargets { joints: 7, ..good.clone() };
+        let old = CheckedTargets { sent_ns: now_ns() - 300_000_000, valid_s: 0.2, ..good.clone() };
+        let none = CheckedTargets { targets: Vec::new(), ..good.clone() };
+        assert!(reason(&seven).contains("7 joint values, ur5 has 6 joints"));
+        assert!(reason(&old).contains("valid for 0.200 s"), "{}", reason(&old));
+        assert!(reason(&none).contains("0 targets"));
+        for phase in Phase::ALL.into_iter().filter(|phase| *phase != Phase::Holding) {
+            played.show(phase);
+            let runs = matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused);
+            let word = if runs { "this planner has not sent" } else { phase.word() };
+            let said = reason(&good);
+            assert!(said.contains(word), "{phase:?}: {said}");
+        }
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 0);
 }

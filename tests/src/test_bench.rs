@@ -345,6 +345,16 @@ impl TestBench {
         Ok(answer)
     }
 
+    /// Starts `taustream ARGS` with this stage's settings, and leaves its standard input open.
+    ///
+    /// # Errors
+    /// When it cannot be started.
+    pub fn start_cli(&self, args: &[&str], name: &str) -> Result<Process> {
+        let settings = self.settings_file.to_str().context("path is not UTF-8")?;
+        let args = [args, &["--settings", settings]].concat();
+        Process::start(&self.programs.join("taustream"), &args, &self.dir, name)
+    }
+
     /// Runs a command that must be done.
     ///
     /// # Errors

@@ -114,6 +114,50 @@ fn dual_bus_with_replacements() {
     replaced_seeds_of("dual-bus");
 }
 
+/// Goal: no stream of targets, with everything that goes wrong between, breaks a rule. Method: the same seeds again; targets
+/// come 1 to 500 times a second, with gaps and jumps, also while the arm pauses, is slowed down, or holds after a stop.
+fn streamed_seeds_of(name: &str) {
+    let arm = SimulatedArm::by_name(name).expect("an arm");
+    let settings = arm.settings().expect("settings");
+    let mut accepted = 0;
+    for seed in 0..number("TAUSTREAM_SEEDS").unwrap_or(SEEDS) {
+        let plan = Plan::random(seed, &settings, PLAN_MS);
+        let outcome = run_replacing(&arm, seed, (&plan, &shipped), Replacing::Stream).expect("an arm");
+        assert!(outcome.violations.is_empty(), "with a stream of targets, {outcome}");
+        accepted += outcome.replacements.0;
+    }
+    println!("{name}: {accepted} pieces of streams");
+    assert!(accepted > 200, "{accepted} pieces of streams");
+}
+
+#[test]
+fn vcan6_with_a_stream() {
+    streamed_seeds_of("vcan6");
+}
+
+#[test]
+fn damiao6_with_a_stream() {
+    streamed_seeds_of("damiao6");
+}
+
+#[test]
+fn dual_bus_with_a_stream() {
+    streamed_seeds_of("dual-bus");
+}
+
+/// Goal: a follower that does not continue its reference is found by the rate rule.
+#[test]
+fn stream_without_its_reference_is_found_by_the_rate_rule() {
+    let arm = SimulatedArm::by_name("vcan6").expect("an arm");
+    let found = (0..10).any(|seed| {
+        let plan = Plan::calm();
+        let replaces = Replacing::StreamWithoutReference;
+        let outcome = run_replacing(&arm, seed, (&plan, &shipped), replaces).expect("an arm");
+        outcome.violations.iter().any(|violation| violation.rule == Rule::Rate)
+    });
+    assert!(found, "no seed has shown it");
+}
+
 /// Goal: a motion whose pending strokes are dropped, without strokes that bring it down, is found to be beyond the motion limits
 /// that every accepted motion keeps. So the check at the intake is what keeps an arm from it.
 #[test]

@@ -255,7 +255,7 @@ fn waiting_s(text: &str) -> Result<f64, String> {
 }
 
 /// Pictures or lines a second.
-fn rate_hz(text: &str) -> Result<f64, String> {
+pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(hz) if (0.001..=1_000.0).contains(&hz) => Ok(hz),
         _ => Err("expected Hz from 0.001 to 1000".to_owned()),

@@ -5,6 +5,7 @@ mod live;
 mod offline;
 mod papers;
 mod planners;
+mod stream;
 mod timing;
 
 pub(crate) use goal::Goal;
@@ -20,6 +21,7 @@ pub(crate) use offline::{
 
 pub(crate) use papers::PapersArgs;
 pub(crate) use planners::PlannersArgs;
+pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};
 pub(crate) use timing::TimingArgs;
 
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -159,6 +161,10 @@ pub(crate) enum Action {
     Check(CheckArgs),
     /// Request a motion to a new goal from the running planner, and print the receipt.
     Replan(ReplanArgs),
+    /// Follow a stream of targets from standard input, 5 to 500 a second.
+    Follow(FollowArgs),
+    /// Move one joint, or the tip along an axis, while a key is held.
+    Jog(JogArgs),
     /// Bring the running motion to rest, and drop the motions that wait.
     Cancel(CancelArgs),
     /// Lead joints that are outside their position limits back inside.

@@ -323,6 +323,8 @@ pub(crate) enum BenchName {
     Papers(super::PapersArgs),
     /// Compare the planners by name: problems solved, planning time, quality of the motions.
     Planners(super::PlannersArgs),
+    /// Measure lag and error behind a stream of targets, beside Ruckig and interpolation.
+    Follow(super::FollowBenchArgs),
     /// Compare the durations of straight moves and rounded paths with jerk-limited optima.
     Timing(super::TimingArgs),
     /// Measure how long stops take and how far they go, by speed, by phase and by move, against the optimum along the path.

@@ -146,7 +146,7 @@ impl Client {
         Ok(())
     }
 
-    fn refused(&self, what: &'static str, why: &dyn std::fmt::Debug) -> Failure {
+    pub(crate) fn refused(&self, what: &'static str, why: &dyn std::fmt::Debug) -> Failure {
         ServiceError::Refused { arm: self.wire.arm().to_owned(), what, why: format!("{why:?}") }.into()
     }
 }

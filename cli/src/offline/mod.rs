@@ -6,6 +6,7 @@ mod checked_robot;
 mod compare;
 pub(crate) mod cost;
 mod cost_bench;
+mod follow_bench;
 pub(crate) mod import;
 mod papers;
 pub(crate) mod plan;

@@ -79,6 +79,12 @@ fn words_that_are_wrong_are_refused_by_name() {
             ),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --deadline-ms 0", 2, &["--deadline-ms"]),
             ("plan --robot ur5 --scene open --start HOME --goal HOME --seed -1", 2, &["--seed"]),
+            ("jog", 2, &["--joint", "--axis"]),
+            ("jog --joint 1 --axis x", 2, &["--joint", "--axis"]),
+            ("jog --joint 1 --dead-man-ms 201", 2, &["--dead-man-ms", "201"]),
+            ("jog --joint 1 --speed-rad-s nan", 2, &["--speed-rad-s"]),
+            ("jog --joint nine --settings vcan6", 2, &["nine", "elbow"]),
+            ("follow --rate-hz 0", 2, &["--rate-hz"]),
             ("replan --goal HOME --at-once --after-current", 2, &["--at-once", "--after-current"]),
             ("speed 101", 2, &["101", "0 to 100"]),
             ("speed -1", 2, &["-1", "0 to 100"]),
@@ -350,6 +356,7 @@ fn commands_without_a_streamer_say_so() {
         "speed 50",
         "status",
         "replan --goal HOME",
+        "jog --joint 1",
     ] {
         let words = format!("{command} --settings settings.toml");
         let case: Case<'_> = (&words, 1, &["taustream-streamer", &arm, "is not running", "start"]);

@@ -289,7 +289,7 @@ fn completions_and_help_are_there_for_every_command() {
     assert!(help.done().contains("Exit codes"), "{}", help.out);
     for command in [
         "plan", "import", "sample", "plot", "cost", "verify", "check", "replan", "run", "enable", "speed",
-        "stop", "status", "watch", "doctor", "bench", "man", "demo",
+        "stop", "status", "watch", "doctor", "bench", "man", "demo", "follow", "jog",
     ] {
         assert!(scratch.run(&[command, "--help"]).done().contains("--json"), "{command}");
     }

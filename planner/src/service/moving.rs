@@ -8,6 +8,7 @@ use crate::in_motion::{CutPoint, NoReplacement, Replacement, Surroundings};
 use crate::kind::PlannerKind;
 use crate::plan::PlanOptions;
 use crate::send::SentTrajectory;
+use crate::stream_cut::{age_s, rate};
 use std::time::{Duration, Instant};
 use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
@@ -22,7 +23,7 @@ const END_TRIES: u32 = 4;
 /// What planning and sending are taken to last before they were measured, s.
 const LATENCY_S: f64 = 0.03;
 /// Added to what was measured: a few cycles, s.
-const LATENCY_MARGIN_S: f64 = 0.005;
+pub(super) const LATENCY_MARGIN_S: f64 = 0.005;
 /// Most that a search for a way round obstacles may take while the arm moves on, s.
 const SEARCH_S_MAX: f64 = 0.2;
 /// Measurements that are kept, and the place of the one that counts among them, from the largest.
@@ -38,7 +39,7 @@ pub(super) struct Latency {
 }
 
 impl Latency {
-    fn note(&mut self, seconds: f64) {
+    pub(super) fn note(&mut self, seconds: f64) {
         if self.seconds.len() == MEASURED {
             self.seconds.remove(0);
         }
@@ -46,7 +47,7 @@ impl Latency {
     }
 
     /// What nearly all of them have kept, s.
-    fn quantile_s(&self) -> f64 {
+    pub(super) fn quantile_s(&self) -> f64 {
         let mut sorted = self.seconds.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         sorted.iter().rev().nth(QUANTILE).or(sorted.last()).copied().unwrap_or(LATENCY_S)
@@ -170,7 +171,7 @@ impl Service<'_> {
         // What came too late counts as well: the next one is aimed further ahead.
         self.latency.note((begun.elapsed().as_secs_f64() - search_s).max(0.0));
         if let Some(Outcome::Rejected(rejection)) = sent.receipt.and_then(|receipt| receipt.outcome())
-            && is_too_late(&rejection, &cut)
+            && is_too_late(&rejection, cut.from_s < cut.at_s)
         {
             return Ok(Tried::TooLate(rejection));
         }
@@ -203,17 +204,9 @@ fn is_free_choice(planner: PlannerKind) -> bool {
     matches!(planner, PlannerKind::Auto | PlannerKind::Straight)
 }
 
-/// How fast trajectory time may advance, s a second.
-fn rate(report: &Report) -> f64 {
-    match Phase::from_code(report.phase) {
-        Some(Phase::Paused) => 0.0,
-        _ => report.sigma.max(report.speed_percent / 100.0).clamp(0.0, 1.0),
-    }
-}
-
 /// Age of a report, s.
 fn since_s(report: &Report) -> f64 {
-    Duration::from_nanos(now_ns().saturating_sub(report.time_ns)).as_secs_f64().min(1.0)
+    age_s(report, now_ns())
 }
 
 fn replacement(
@@ -230,11 +223,12 @@ fn replacement(
     }
 }
 
-/// Refusals that another try, from the state of then, may not meet.
-fn is_too_late(rejection: &Rejection, cut: &CutPoint) -> bool {
+/// Refusals that another try, from the state of then, may not meet; `folded_early`: strokes were folded at another instant than
+/// the cut.
+pub(super) fn is_too_late(rejection: &Rejection, folded_early: bool) -> bool {
     match rejection {
         // What was to run by now still waits: strokes were folded that have not ended when it takes over.
-        Rejection::KeptStrokesDiffer { .. } => cut.from_s < cut.at_s,
+        Rejection::KeptStrokesDiffer { .. } => folded_early,
         Rejection::CutPassed { .. }
         | Rejection::CutOutside { .. }
         | Rejection::OtherTrajectory { .. }

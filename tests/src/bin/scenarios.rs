@@ -10,7 +10,9 @@ use taustream_tests::scenarios::{self, CheckMode, Goals, Scenario};
 use taustream_tests::setpoints::{BusFrame, CheckResult, Encoding, Losses, check_setpoints_with};
 use taustream_tests::test_bench::{Place, TestBench};
 use taustream_tests::traffic::as_plain;
-use taustream_tests::{bus_scenarios, candump, cut_scenarios, cycle_log, restart_scenarios};
+use taustream_tests::{
+    bus_scenarios, candump, cut_scenarios, cycle_log, restart_scenarios, stream_scenarios,
+};
 
 /// Runs the scenarios over the real processes on a real vcan0.
 #[derive(Parser, Debug)]
@@ -50,7 +52,11 @@ fn run(arguments: &Arguments) -> Result<usize> {
         let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
         ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
     }
-    let all = scenarios::ALL.iter().chain(cut_scenarios::ALL).chain(bus_scenarios::ALL);
+    let all = scenarios::ALL
+        .iter()
+        .chain(cut_scenarios::ALL)
+        .chain(stream_scenarios::ALL)
+        .chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
     // Written for one bus; where the settings have more, the other settings' run has them.
     let restarts = if settings.buses.len() == 1 { restart_scenarios::ALL } else { &[] };

@@ -147,8 +147,8 @@ impl Checker {
     }
 
     /// A trajectory was offered under this id: from rest, or as the successor of what runs from its cut on.
-    pub fn offered(&mut self, id: u64, trajectory: &Trajectory, cut_s: Option<f64>) {
-        self.path.offer(id, trajectory.clone(), cut_s);
+    pub fn offered(&mut self, id: u64, trajectory: &Trajectory, from_s: Option<[f64; 2]>) {
+        self.path.offer(id, trajectory.clone(), from_s);
     }
 
     /// A command was accepted.

@@ -19,4 +19,5 @@ pub mod random;
 mod rates;
 pub mod run;
 pub mod setpoint_reader;
+pub mod streaming;
 pub mod world;

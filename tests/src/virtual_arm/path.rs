@@ -11,8 +11,9 @@ const FORMULA_RAD: f64 = 1e-9;
 struct Offered {
     id: u64,
     trajectory: Trajectory,
-    /// From when it makes the setpoints, for one that goes on from the trajectory before it.
-    from_s: Option<f64>,
+    /// From when it makes the setpoints, for one that goes on from the trajectory before it: its cut; where it cuts one that may
+    /// still wait, also the cut of that one.
+    from_s: Option<[f64; 2]>,
 }
 
 /// The trajectory that runs, and how far it has come.
@@ -29,7 +30,7 @@ pub(crate) struct Path {
 
 impl Path {
     /// A trajectory was offered under this id.
-    pub(crate) fn offer(&mut self, id: u64, trajectory: Trajectory, from_s: Option<f64>) {
+    pub(crate) fn offer(&mut self, id: u64, trajectory: Trajectory, from_s: Option<[f64; 2]>) {
         self.offered.push(Offered { id, trajectory, from_s });
     }
 
@@ -99,9 +100,9 @@ impl Path {
     }
 
     /// A successor makes every setpoint from its cut on, and none before.
-    fn late_or_early(&self, from_s: f64, s: f64) -> Option<String> {
+    fn late_or_early(&self, from_s: [f64; 2], s: f64) -> Option<String> {
         let before = self.last.map_or(f64::NEG_INFINITY, |(_, s)| s);
-        let in_time = before <= from_s && from_s <= s;
-        (!in_time).then(|| format!("takes over between {before} s and {s} s, its cut is at {from_s} s"))
+        let in_time = from_s.iter().any(|from_s| before <= *from_s && *from_s <= s);
+        (!in_time).then(|| format!("takes over between {before} s and {s} s, not at one of {from_s:?} s"))
     }
 }

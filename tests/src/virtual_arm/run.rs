@@ -5,11 +5,12 @@ use super::motion::{cruising_train, random_replacement, random_train};
 use super::operator::{Deed, Operator};
 use super::plan::Plan;
 use super::random::SeededRng;
+use super::streaming::Streaming;
 use super::world::{World, Wrap};
 use anyhow::Result;
 use std::fmt;
 use taustream_arm::Settings;
-use taustream_messages::Phase;
+use taustream_messages::{Phase, Replaces};
 use taustream_motion::cut::kept;
 use taustream_motion::{JointArray, Stroke, Trajectory};
 
@@ -70,6 +71,8 @@ struct Run {
     /// Moments and shapes of replacements: of their own, so that runs without them stay as they are.
     replacer: SeededRng,
     next_replacement_ms: u64,
+    /// The planner that follows a stream, if one is followed.
+    streaming: Option<Streaming>,
     /// The operator is at work.
     operated: bool,
 }
@@ -83,6 +86,10 @@ pub enum Replacing {
     Sound,
     /// A planted fault: pending strokes are dropped, and nothing brings the motion down.
     DropAlone,
+    /// Targets at random moments, each led on to by the planner's follower.
+    Stream,
+    /// A planted fault: the same, without the part of the reference that leads on from the cut.
+    StreamWithoutReference,
 }
 
 /// Runs a plan on an arm and checks everything.
@@ -108,9 +115,22 @@ pub fn run_replacing(
     let home_rad = world.position_rad();
     let (operator, rng) = (Operator::new(seed), SeededRng::new(seed, 4));
     let (replacer, next_replacement_ms, offered) = (SeededRng::new(seed, 5), 0, None);
-    let operated = true;
-    let mut run =
-        Run { world, operator, rng, home_rad, offered, replaces, replacer, next_replacement_ms, operated };
+    let streaming = matches!(replaces, Replacing::Stream | Replacing::StreamWithoutReference).then(|| {
+        let skips_reference = replaces == Replacing::StreamWithoutReference;
+        Streaming::new(&world.settings.robot, &home_rad, skips_reference)
+    });
+    let mut run = Run {
+        world,
+        operator,
+        rng,
+        home_rad,
+        offered,
+        replaces,
+        replacer,
+        next_replacement_ms,
+        streaming,
+        operated: true,
+    };
     run.steps(PLAN_MS, |_| false);
     run.world.make_whole();
     run.prove_recovery();
@@ -147,10 +167,14 @@ impl Run {
             Some(Deed::Command(command)) => {
                 self.world.ask(command);
             }
-            Some(Deed::Trajectory) => self.offer(),
-            None => {}
+            Some(Deed::Trajectory) if self.streaming.is_none() => self.offer(),
+            Some(Deed::Trajectory) | None => {}
         }
-        if self.replaces != Replacing::Nothing && self.operated && now_ms >= self.next_replacement_ms {
+        if self.streaming.is_some() {
+            if self.operated && now_ms >= self.next_replacement_ms {
+                self.follow(now_ms);
+            }
+        } else if self.replaces != Replacing::Nothing && self.operated && now_ms >= self.next_replacement_ms {
             self.next_replacement_ms = now_ms + self.replacer.whole(2, 250);
             self.replace(phase);
         }
@@ -169,6 +193,26 @@ impl Run {
         }
     }
 
+    /// Leads on to the next target of a stream.
+    fn follow(&mut self, now_ms: u64) {
+        let Some(streaming) = &mut self.streaming else { return };
+        self.next_replacement_ms = now_ms + streaming.next_ms(&mut self.replacer);
+        let Some(report) = self.world.report() else { return };
+        let surroundings = (&self.world.settings.robot, &self.home_rad);
+        let made = streaming.next_piece(&mut self.replacer, surroundings, (&report, self.world.now_ns()));
+        let Some((trajectory, replaces, reference)) = made else { return };
+        let id = match replaces {
+            Replaces::Rest => self.world.offer(&trajectory),
+            Replaces::Cut { trajectory_id, at_s } => {
+                let waits_until_s = (report.successor_id != 0).then_some(report.successor_from_s);
+                self.world.offer_cut(&trajectory, (trajectory_id, at_s), waits_until_s)
+            }
+        };
+        if let Some(id) = id {
+            streaming.offered(id, trajectory, reference);
+        }
+    }
+
     /// Replaces what runs, from a moment on that is a little ahead, or already over.
     fn replace(&mut self, phase: Phase) {
         if !matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused) {
@@ -183,7 +227,7 @@ impl Run {
                 let made = Trajectory::new(running.joints(), kept.base_rad, kept.strokes).ok();
                 made.filter(|_| ends_s >= cut_s)
             }
-            Replacing::Sound | Replacing::Nothing => {
+            Replacing::Sound | Replacing::Nothing | Replacing::Stream | Replacing::StreamWithoutReference => {
                 let robot = &self.world.settings.robot;
                 random_replacement(&mut self.replacer, robot, &self.home_rad, (running, cut_s))
             }
@@ -191,7 +235,7 @@ impl Run {
         let Some(made) = made else { return };
         let changed = self.replaces == Replacing::Sound && self.replacer.chance(0.1);
         let offered = if changed { with_a_changed_bit(&made) } else { made };
-        self.world.offer_cut(&offered, (id, cut_s));
+        self.world.offer_cut(&offered, (id, cut_s), None);
     }
 
     /// After everything is whole the arm can be brought back, moved, and reaches its goal.

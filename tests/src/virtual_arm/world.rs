@@ -237,14 +237,32 @@ impl World {
         true
     }
 
-    /// Offers a trajectory from rest as the service thread does after its check.
-    pub fn offer(&mut self, trajectory: &Trajectory) -> bool {
-        self.offer_message(trajectory, Replaces::Rest)
+    /// Offers a trajectory from rest as the service thread does after its check; its id, unless too many are on their way.
+    pub fn offer(&mut self, trajectory: &Trajectory) -> Option<u64> {
+        self.offer_message(trajectory, Replaces::Rest, None)
     }
 
-    /// Offers a replacement of what runs, cut at its trajectory time.
-    pub fn offer_cut(&mut self, trajectory: &Trajectory, (trajectory_id, at_s): (u64, f64)) -> bool {
-        self.offer_message(trajectory, Replaces::Cut { trajectory_id, at_s })
+    /// Offers a replacement, cut at its trajectory time, of what runs, or of what may still wait for `waits_until_s`.
+    pub fn offer_cut(
+        &mut self,
+        trajectory: &Trajectory,
+        (trajectory_id, at_s): (u64, f64),
+        waits_until_s: Option<f64>,
+    ) -> Option<u64> {
+        let replaces = Replaces::Cut { trajectory_id, at_s };
+        self.offer_message(trajectory, replaces, Some([at_s, waits_until_s.unwrap_or(at_s)]))
+    }
+
+    /// The newest report.
+    #[must_use]
+    pub fn report(&self) -> Option<Report> {
+        self.newest
+    }
+
+    /// The clock of reports, ns.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now.0
     }
 
     /// The trajectory that runs, with its strokes, and its trajectory time, as the newest report says.
@@ -261,8 +279,13 @@ impl World {
         self.replacements
     }
 
-    fn offer_message(&mut self, trajectory: &Trajectory, replaces: Replaces) -> bool {
-        let Some(mut filled) = self.queue.trajectories.empty_box() else { return false };
+    fn offer_message(
+        &mut self,
+        trajectory: &Trajectory,
+        replaces: Replaces,
+        from_s: Option<[f64; 2]>,
+    ) -> Option<u64> {
+        let mut filled = self.queue.trajectories.empty_box()?;
         self.generation += 1;
         let trajectory_id = 1_000 + self.generation;
         let checked = CheckedTrajectory {
@@ -274,16 +297,12 @@ impl World {
         };
         *filled = PreparedTrajectory::new(checked, &self.settings.robot.limits());
         self.queue.trajectories.offer(filled);
-        let cut_s = match replaces {
-            Replaces::Rest => None,
-            Replaces::Cut { at_s, .. } => Some(at_s),
-        };
-        self.checker.offered(trajectory_id, trajectory, cut_s);
+        self.checker.offered(trajectory_id, trajectory, from_s);
         if self.sent.len() == SENT_MAX {
             self.sent.pop_front();
         }
         self.sent.push_back((trajectory_id, trajectory.clone()));
-        true
+        Some(trajectory_id)
     }
 
     /// One cycle, when its time has come; the answers that it gave.
