@@ -21,6 +21,8 @@ mod papers;
 mod planners;
 #[path = "cli/plot.rs"]
 mod plot;
+#[path = "cli/streams.rs"]
+mod streams;
 #[path = "cli/urdf.rs"]
 mod urdf;
 #[path = "cli/watch.rs"]

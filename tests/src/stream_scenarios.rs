@@ -16,6 +16,10 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// Swing of every joint around its first pose, rad.
 const SWING_RAD: f64 = 0.12;
 
+/// Speed of the jog, rad/s, and the joint that it moves.
+const JOG_RAD_S: f64 = 0.2;
+const WRIST_3: usize = 5;
+
 /// Every scenario, in the order in which they run.
 pub const ALL: &[Scenario] = &[
     Scenario {
@@ -27,6 +31,12 @@ pub const ALL: &[Scenario] = &[
     Scenario {
         name: "client_and_planner_killed_in_a_stream_leave_the_arm_at_rest",
         run: killed,
+        check_mode: CheckMode::Exactly,
+        settings: None,
+    },
+    Scenario {
+        name: "jog_in_a_stream_of_refreshes_moves_and_stops_without_them",
+        run: jog,
         check_mode: CheckMode::Exactly,
         settings: None,
     },
@@ -117,6 +127,46 @@ fn killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.restart_planner()?;
     bench.replan(&goals.text(1)?)?;
     end_at(bench, goals.rad(1)?)
+}
+
+/// Goal: a jog moves one joint while it is refreshed, and stops when refreshes stay away, or its process is killed.
+fn jog(bench: &mut TestBench, _: &Goals) -> Result<()> {
+    enable(bench)?;
+    let (before, _) = bench.report()?;
+    let speed_rad_s = JOG_RAD_S.to_string();
+    let words = ["jog", "--joint", "wrist_3", "--speed-rad-s", &speed_rad_s];
+    for (name, kills) in [("jog", false), ("jog-killed", true)] {
+        let mut client = bench.start_cli(&words, name)?;
+        let from = bench.report()?.0.command_rad[WRIST_3];
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(2) {
+            client.show("+")?;
+            sleep(PERIOD);
+        }
+        let (last, _) = bench.report()?;
+        if kills {
+            client.signal(Signal::KILL)?;
+        }
+        let rest = at_rest(bench)?;
+        let moved_rad = rest.command_rad[WRIST_3] - from;
+        let further_rad = rest.command_rad[WRIST_3] - last.command_rad[WRIST_3];
+        ensure!(
+            moved_rad > 0.2 * JOG_RAD_S,
+            "the joint has moved by {moved_rad} rad only: {}",
+            client.said()
+        );
+        // What was committed, and what was on its way.
+        ensure!(
+            further_rad < JOG_RAD_S,
+            "the joint has moved on by {further_rad} rad after the last refresh"
+        );
+        let others = before.command_rad.iter().zip(&rest.command_rad).enumerate();
+        let moves = others.filter(|(joint, _)| *joint != WRIST_3).any(|(_, (a, b))| (a - b).abs() > 1e-12);
+        ensure!(!moves, "a jog of one joint has moved another: {:?}", rest.command_rad);
+        ensure!(rest.guard_trips == 0, "the guard tripped {} times", rest.guard_trips);
+        println!("       jogged by {moved_rad:.4} rad, {further_rad:.4} rad after the last refresh");
+    }
+    Ok(())
 }
 
 /// The arm holds, and goes on holding.
