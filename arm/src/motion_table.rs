@@ -217,6 +217,11 @@ fn next_line<'l>(
             return None;
         }
     }
+    if number == 1 && (line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff")) {
+        let expected = format!("{WANTED} in UTF-8; save it in that encoding");
+        fault_list.add(None, "", "UTF-16 text by its byte order mark", &expected);
+        return None;
+    }
     let text =
         std::str::from_utf8(line).map_err(|_| fault_list.add(at, "", "not UTF-8 text", WANTED)).ok()?;
     Some(Some(text.trim_end_matches(['\n', '\r'])))

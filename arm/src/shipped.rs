@@ -2,6 +2,7 @@
 //!
 //! They go by paths that no file system has: `builtin:/robots/ur5.toml`. What such a file names beside itself is found the
 //! same way.
+use crate::{Faults, document};
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
@@ -42,15 +43,12 @@ pub fn is_file(path: &Path) -> bool {
     bytes(path).is_some() || path.is_file()
 }
 
-/// The text of a file, shipped or not, whose contents somebody else checks.
+/// The text of a file, shipped or not, whose contents somebody else checks. A byte order mark is dropped.
 ///
 /// # Errors
-/// When it cannot be read.
-pub fn read_to_string(path: &Path) -> std::io::Result<String> {
-    match bytes(path) {
-        Some(bytes) => Ok(String::from_utf8_lossy(bytes).into_owned()),
-        None => std::fs::read_to_string(path),
-    }
+/// When it cannot be read, is too long for a configuration, or is no UTF-8 text.
+pub fn read_text(path: &Path) -> Result<String, Faults> {
+    document::read_text(path, "a text file")
 }
 
 #[cfg(test)]

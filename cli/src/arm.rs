@@ -74,7 +74,7 @@ impl ArmName {
 
 /// The `name` of a settings file whatever else stands in it.
 fn name_alone(path: &Path) -> Option<String> {
-    let table: toml::Table = shipped::read_to_string(path).ok()?.parse().ok()?;
+    let table: toml::Table = shipped::read_text(path).ok()?.parse().ok()?;
     let name = table.get("name")?.as_str()?;
     is_arm_name(name).then(|| name.to_owned())
 }
@@ -271,7 +271,7 @@ fn kind_of(path: &Path) -> AnyFile {
     if path.extension().is_some_and(|e| e == "urdf" || e == "srdf" || e == "xacro") {
         return AnyFile::Robot(owned);
     }
-    let table = shipped::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    let table = shipped::read_text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     match table {
         Some(t) if t.contains_key("joint") || t.contains_key("urdf") => AnyFile::Robot(owned),
         Some(t) if ["robot", "bus", "servo", "cycle"].iter().any(|k| t.contains_key(*k)) => {

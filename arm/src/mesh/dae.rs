@@ -88,7 +88,8 @@ fn unit_m(root: Element<'_, '_>) -> Result<f64, Refusal> {
 fn up_axis(root: Element<'_, '_>) -> Option<String> {
     let up = child(root, "asset").and_then(|asset| child(asset, "up_axis"));
     // Y is the format's default.
-    let up = up.and_then(|up| up.text()).map_or("Y_UP", str::trim);
+    let up = up.map_or_else(|| "Y_UP".to_owned(), text_of);
+    let up = up.trim();
     (up != "Z_UP").then(|| up.chars().take(16).collect())
 }
 
@@ -103,10 +104,15 @@ fn exactly<const N: usize>(of: Element<'_, '_>) -> Result<[f64; N], Refusal> {
     }
 }
 
+/// The whole text of an element: a comment or a processing instruction cuts it into several pieces.
+fn text_of(of: Element<'_, '_>) -> String {
+    of.children().filter(Node::is_text).filter_map(|piece| piece.text()).collect()
+}
+
 /// All numbers of an element's text.
 fn numbers<T: std::str::FromStr>(of: Element<'_, '_>) -> Result<Vec<T>, Refusal> {
     let mut all = Vec::new();
-    for word in of.text().unwrap_or("").split_ascii_whitespace() {
+    for word in text_of(of).split_ascii_whitespace() {
         match word.parse() {
             Ok(number) => all.push(number),
             Err(_) => return refuse(of, &format!("has {}", shown(word)), "numbers apart by blanks"),

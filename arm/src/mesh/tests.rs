@@ -124,6 +124,21 @@ fn dae_is_read_with_its_nodes_and_unit() {
     }
 }
 
+/// Goal: triangles behind a comment count. Method: the tile's list of triangles with a comment, and with an instruction, in it.
+#[test]
+fn dae_with_comments_among_its_numbers_loses_none() {
+    let triangles = DAE.replace("<vcount>4</vcount>", "").replace("polylist", "triangles");
+    for between in ["<!-- second -->", "<?part two?>", "<![CDATA[ ]]>"] {
+        let list = format!("<p>0 1 2 {between} 0 2 3</p>");
+        let text =
+            triangles.replace("<p>0 1 2 3</p>", &list).replace("0 0 50<", &format!("0 {between} 0 50<"));
+        let text = text.replace("Z_UP<", &format!("{between}Z_UP<"));
+        let mesh = read_bytes("dae", text.as_bytes(), 1.0).unwrap();
+        assert_eq!(mesh.triangles.len(), 4, "{between}");
+        assert!((area_m2(&mesh) - 2.5).abs() < 1e-12, "{between}");
+    }
+}
+
 #[test]
 fn bad_mesh_is_refused_with_words_that_help() {
     let binary = binary_stl();

@@ -34,7 +34,7 @@ impl DemoFile {
         let fault = |key: &str, value: &str, expected: &str| {
             Failure::File(Faults(vec![Fault::new(path, key, value, expected)]))
         };
-        let text = shipped::read_to_string(path).map_err(|e| fault("", &e.to_string(), "a demo file"))?;
+        let text = shipped::read_text(path).map_err(Failure::File)?;
         let raw: Raw = toml::from_str(&text).map_err(|e| {
             fault("", e.message(), "settings = \"..\", start_rad = [..] and goals_rad = [[..], ..]")
         })?;
