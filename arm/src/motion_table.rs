@@ -142,7 +142,7 @@ impl MotionTable {
     }
 }
 
-const WANTED: &str = "a table (CSV) whose first line names t_s and q1_rad, q2_rad, .. (or the joints' names)";
+const WANTED: &str = "a table (CSV; commas, semicolons or tabs) whose first line names t_s and q1_rad, q2_rad, .. (or the joints' names)";
 
 fn read_table(fault_list: &FaultList, source: &mut impl BufRead, joints: &[String]) -> Option<MotionTable> {
     let mut line = Vec::new();

@@ -171,6 +171,7 @@ fn run_real_time(
     )?;
     std::io::stdout().flush()?;
     go.send(()).context("the real-time thread has ended")?;
+    #[expect(clippy::disallowed_methods, reason = "the process lives as long as the cycle runs, which waits for no disk")]
     let next = thread.join().map_err(|_| {
         anyhow!("the real-time thread has panicked; the drives react by their own watchdogs, and the arm is in their hands")
     })?;
