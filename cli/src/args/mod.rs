@@ -61,21 +61,29 @@ fn after_help() -> String {
 }
 
 /// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
-const WITHOUT_SETTINGS: [&str; 10] =
-    ["plan", "import", "sample", "plot", "cost", "verify", "check", "demo", "completions", "man"];
+const WITHOUT_SETTINGS: [&[&str]; 16] = [
+    &["plan"],
+    &["import"],
+    &["sample"],
+    &["plot"],
+    &["cost"],
+    &["verify"],
+    &["check"],
+    &["demo"],
+    &["completions"],
+    &["man"],
+    &["bench", "compare"],
+    &["bench", "cost"],
+    &["bench", "papers"],
+    &["bench", "planners"],
+    &["bench", "stops"],
+    &["bench", "timing"],
+];
 
 impl Cli {
     /// The definition with help that the terminal wraps, and without options that a command does not use.
     pub(crate) fn definition() -> Command {
-        let mut definition = flowing(Self::command());
-        for name in WITHOUT_SETTINGS {
-            definition = definition.mut_subcommand(name, |command| {
-                // It stands in the place of the global one, which clap then leaves out here.
-                let settings = Arg::new("settings").long("settings").value_name("FILE").hide(true);
-                command.arg(settings.value_parser(clap::value_parser!(PathBuf)))
-            });
-        }
-        definition
+        WITHOUT_SETTINGS.into_iter().fold(flowing(Self::command()), without_settings)
     }
 
     /// Reads the words of a command line.
@@ -89,6 +97,16 @@ impl Cli {
         let mut matches = definition.try_get_matches_from_mut(words)?;
         Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut definition))
     }
+}
+
+/// The command with one of those below it, named by its words, that does not show `--settings`.
+fn without_settings(command: Command, words: &[&str]) -> Command {
+    let Some((first, rest)) = words.split_first() else {
+        // It stands in the place of the global one, which clap then leaves out here.
+        let settings = Arg::new("settings").long("settings").value_name("FILE").hide(true);
+        return command.arg(settings.value_parser(clap::value_parser!(PathBuf)));
+    };
+    command.mut_subcommand(first, |below| without_settings(below, rest))
 }
 
 /// The command and those below it with help texts whose paragraphs are one line each: clap wraps them to the terminal.
@@ -229,12 +247,18 @@ mod tests {
 
     #[test]
     fn help_shows_settings_only_where_they_mean_something() {
-        for name in WITHOUT_SETTINGS {
-            assert!(!help_of(&[name]).contains("--settings"), "{name}");
+        for words in WITHOUT_SETTINGS {
+            assert!(!help_of(words).contains("--settings"), "{words:?}");
         }
+        let benches = Cli::command().find_subcommand("bench").unwrap().get_subcommands().count();
+        assert_eq!(benches, 1 + WITHOUT_SETTINGS.iter().filter(|words| words[0] == "bench").count());
         for name in ["status", "enable", "doctor", "replan", "cancel", "run", "watch", "reference"] {
             assert!(help_of(&[name]).contains("--settings"), "{name}");
         }
+        assert!(help_of(&["bench", "cycle"]).contains("--settings"));
+        let cycle = Cli::from_words(["taustream", "bench", "cycle", "--settings", "a"]).unwrap();
+        assert_eq!(cycle.settings, Some(PathBuf::from("a")));
+        assert!(Cli::from_words(["taustream", "bench", "timing", "--settings", "a"]).is_ok());
         // A habit of scripts that name the arm everywhere stays without effect.
         for words in
             [["taustream", "--settings", "a", "check", "b"], ["taustream", "check", "b", "--settings", "a"]]
