@@ -4,7 +4,6 @@
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -28,9 +27,8 @@ pub(crate) struct Arguments {
 /// Builds the command line and lets it write.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode> {
     let root = workspace::root()?;
-    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut build = Command::new(cargo);
-    build.args(["build", "--release", "--locked", "--package", "taustream-cli"]).current_dir(&root);
+    let mut build = workspace::cargo(&root);
+    build.args(["build", "--release", "--locked", "--package", "taustream-cli"]);
     if !build.status().context("cargo cannot be started")?.success() {
         bail!("the build has failed; its messages are above");
     }

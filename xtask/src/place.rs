@@ -1,7 +1,6 @@
 //! Where a test run finds things, and the ways in which it starts programs.
 use crate::workspace;
 use anyhow::{Context, Result, bail};
-use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -29,8 +28,8 @@ impl Place {
 
     /// Cargo, in the workspace.
     pub(crate) fn cargo(&self) -> Command {
-        let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        command.current_dir(&self.root).env("RUSTDOCFLAGS", "-D warnings");
+        let mut command = workspace::cargo(&self.root);
+        command.env("RUSTDOCFLAGS", "-D warnings");
         command
     }
 
