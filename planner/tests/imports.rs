@@ -195,6 +195,27 @@ fn coarse_table_of_a_verified_motion_is_imported_nearly_at_its_own_speed() {
     }
 }
 
+/// Goal: columns of velocity and acceleration make a Hermite spline. Method: a cubic, which the rows alone do not give back.
+#[test]
+fn cubic_is_given_back_by_its_velocities_and_accelerations_alone() {
+    let cubic = |t: f64| [0.1 * t * t * t, 0.3 * t * t, 0.6 * t];
+    let column = |order: usize, t: f64| {
+        let mut column = JointArray::default();
+        column[0] = cubic(t)[order];
+        column
+    };
+    for order in 0..3 {
+        let mut rows = table(1.0, 3, |t| column(0, t));
+        let columns = |order| Some([0.0, 1.0, 2.0].map(|t| column(order, t)).to_vec());
+        rows.velocity_rad_s = columns(1).filter(|_| order >= 1);
+        rows.acceleration_rad_s2 = columns(2).filter(|_| order >= 2);
+        let reference = Reference::of_table(rows, &ur5().limits()).expect("a table");
+        let off_rad = [0.25, 0.5, 1.25, 1.75].map(|t: f64| (reference.at(t)[0] - cubic(t)[0]).abs());
+        let off_rad = off_rad.into_iter().fold(0.0, f64::max);
+        assert_eq!(off_rad < 1e-12, order >= 1, "order {order}: {off_rad} rad off");
+    }
+}
+
 /// Velocities of another unit or joint are found out by the rows themselves, and left out with a message.
 #[test]
 fn velocities_that_do_not_fit_their_rows_are_not_used() {

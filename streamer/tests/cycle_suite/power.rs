@@ -1,7 +1,7 @@
 //! Enabling and disabling drives, torque off, and the streamer's end.
 use crate::harness::{CycleHarness, HOME_RAD};
 use crate::{assert_on_path, assert_within_stop_limits};
-use taustream_drivers::{DriveState, DriveTarget};
+use taustream_drivers::{DriveState, DriveTarget, Nanos};
 use taustream_messages::{Command, FaultReason, Phase};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle::Next;
@@ -246,5 +246,38 @@ fn acknowledged_risk_is_named_by_each_enable_which_begins_slowly() {
         assert!((rig.core.supervisor().speed() - 0.2).abs() < 1e-12);
         rig.accept(Command::Speed { percent: 100.0 });
         rig.accept(Command::Disable);
+    }
+}
+
+/// Goal: what its sender has given up is not carried out, in any phase and whatever it is, unless it stops the arm.
+#[test]
+fn command_that_was_given_up_is_not_carried_out_unless_it_stops_the_arm() {
+    const GIVEN_UP: Nanos = Nanos(0);
+    let refused = [
+        Command::Enable,
+        Command::Disable,
+        Command::Resume,
+        Command::TorqueOff,
+        Command::Speed { percent: 50.0 },
+        Command::ClearFault,
+        Command::Reference { joint: 0, at_rad: 0.0 },
+    ];
+    for stop in [Command::Pause, Command::Stop, Command::FastStop] {
+        let mut harness = CycleHarness::new();
+        harness.run_until(Phase::Disabled, 60);
+        assert!(matches!(harness.ask_until(Command::Enable, GIVEN_UP).why, AnswerReason::TooLate { .. }));
+        harness.move_it();
+        harness.run(300);
+        assert!(harness.ask_until(stop, GIVEN_UP).accepted, "{stop:?}");
+        let rest = [(Command::Pause, Phase::Paused), (Command::Stop, Phase::Holding)];
+        let rest = rest.into_iter().find(|(command, _)| *command == stop).map_or(Phase::Fault, |(_, at)| at);
+        harness.run_until(rest, 1_500);
+        for command in refused {
+            let answer = harness.ask_until(command, GIVEN_UP);
+            assert!(matches!(answer.why, AnswerReason::TooLate { .. }), "{command:?}: {answer:?}");
+            assert!(!answer.accepted);
+            harness.run(20);
+            assert_eq!(harness.phase(), rest, "{command:?}");
+        }
     }
 }
