@@ -119,6 +119,14 @@ fn start_outside_goes_to_the_nearest_pose_inside_and_nowhere_else() {
     assert!(plan.how.contains("shoulder_pan by 0.1584 rad, wrist_3 by 0.1100 rad"), "{}", plan.how);
     let still = plan.trajectory.strokes().iter().flat_map(|s| &s.delta_rad[1..5]);
     assert!(still.copied().all(|delta| delta.abs() < 1e-300), "other joints moved");
+    for joint in [0, 5] {
+        let (from, to) = (start[joint], plan.trajectory.end_rad()[joint]);
+        for i in 0..=2_000 {
+            let at = plan.trajectory.duration_s() * f64::from(i) / 2_000.0;
+            let q = plan.trajectory.sample(at).position_rad[joint];
+            assert!(q >= from.min(to) - 1e-9 && q <= from.max(to) + 1e-9, "joint {joint} goes by {q}");
+        }
+    }
 }
 
 /// An arm outside its limits that stands inside the margin of an obstacle as well.

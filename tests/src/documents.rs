@@ -11,8 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Commands of the source tree, and the step of `cargo xtask test` that covers each of them.
-const CHECKOUT_LINES: [(&str, &str); 9] = [
+const CHECKOUT_LINES: [(&str, &str); 11] = [
     ("cargo test --workspace --test virtual_arm", "tests"),
+    ("cargo xtask planted --check", "planted faults"),
+    ("cargo xtask planted", "nothing: it takes hours"),
     ("cargo xtask demo", "the demo as an ordinary user"),
     ("cargo xtask test", "this run"),
     ("cargo build --release && export PATH=\"$PWD/target/release:$PATH\"", "programs"),
