@@ -61,7 +61,7 @@ fn after_help() -> String {
 }
 
 /// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
-const WITHOUT_SETTINGS: [&[&str]; 16] = [
+const WITHOUT_SETTINGS: [&[&str]; 17] = [
     &["plan"],
     &["import"],
     &["sample"],
@@ -74,6 +74,7 @@ const WITHOUT_SETTINGS: [&[&str]; 16] = [
     &["man"],
     &["bench", "compare"],
     &["bench", "cost"],
+    &["bench", "follow"],
     &["bench", "papers"],
     &["bench", "planners"],
     &["bench", "stops"],
