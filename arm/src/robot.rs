@@ -1,6 +1,6 @@
 //! A robot: its chain, limits and collision shapes.
 use crate::capsule::{Capsule, segment_shape};
-use crate::contact::ContactRule;
+use crate::contact::{ContactRule, Ruled};
 use crate::description::{Description, Geometry};
 use crate::link_margin::LinkMargins;
 use crate::mass::LinkMass;
@@ -82,6 +82,9 @@ pub struct Robot {
     pub digest: [u8; 32],
 }
 
+/// What finds out which links may touch; an error is the index of a shape that cannot be built.
+type Touching = fn(&ContactRule<'_>, &Chain, &[LinkShape], &[JointLimits]) -> Result<Ruled, usize>;
+
 impl Robot {
     /// Reads and checks a robot file (TOML, with DH or modified DH rows, or the name of a URDF).
     ///
@@ -90,11 +93,23 @@ impl Robot {
     pub fn load(file: &Path) -> Result<Self, Faults> {
         Self::from_toml(file, &document::read_text(file, "a robot file in TOML")?)
     }
+    /// As [`Self::load`], but without trying which links touch in every pose, which takes longer than everything else: for a
+    /// process that plans and proves nothing. Only neighbours are in [`Self::allowed_by_rule`] then.
+    ///
+    /// # Errors
+    /// Every other fault at once.
+    pub fn load_untried(file: &Path) -> Result<Self, Faults> {
+        let text = document::read_text(file, "a robot file in TOML")?;
+        Self::read(file, &text, untried)
+    }
     /// Checks the text of a robot file; `file` is what faults call it.
     ///
     /// # Errors
     /// Every fault at once.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::read(file, text, tried)
+    }
+    fn read(file: &Path, text: &str, touching: Touching) -> Result<Self, Faults> {
         let fault_list = FaultList::new(file);
         if text.trim_start().starts_with('<') {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -106,11 +121,11 @@ impl Robot {
             return fault_list.close(None);
         }
         let description = Description::read(&fault_list, document::parse_toml(file, text)?);
-        let robot = description.and_then(|description| Self::build(&fault_list, &description));
+        let robot = description.and_then(|description| Self::build(&fault_list, &description, touching));
         fault_list.close(robot)
     }
     /// Makes the robot of a description without faults.
-    fn build(fault_list: &FaultList, description: &Description) -> Option<Self> {
+    fn build(fault_list: &FaultList, description: &Description, touching: Touching) -> Option<Self> {
         let parts = Parts::of(description);
         let Some(chain) = Chain::new(&parts.chain) else {
             fault_list.add(None, "joint", &format!("{} tables", parts.chain.len()), "1 to 8 joints");
@@ -120,7 +135,7 @@ impl Robot {
         let known = [description.allowed_contacts.as_slice(), &parts.allowed].concat();
         let mut margins = description.margins.clone();
         let rule = ContactRule { neighbours: &parts.neighbours, allowed: &known, margins: &margins };
-        let ruled = rule.apply(&chain, &parts.shapes, &limits);
+        let ruled = touching(&rule, &chain, &parts.shapes, &limits);
         let ruled = ruled.map_err(|shape| {
             let link = parts.shapes.get(shape).and_then(|shape| parts.links.get(shape.link));
             fault_list.add(None, "", &format!("the shape of link {link:?}"), "a shape that can be built");
@@ -191,6 +206,20 @@ impl Robot {
         }
         hex
     }
+}
+
+fn tried(
+    rule: &ContactRule<'_>,
+    chain: &Chain,
+    shapes: &[LinkShape],
+    limits: &[JointLimits],
+) -> Result<Ruled, usize> {
+    rule.apply(chain, shapes, limits)
+}
+
+/// Without a look at any pose: only what meets at a joint may touch.
+fn untried(rule: &ContactRule<'_>, _: &Chain, _: &[LinkShape], _: &[JointLimits]) -> Result<Ruled, usize> {
+    Ok(Ruled { allowed: rule.neighbours.to_vec(), close: Vec::new() })
 }
 
 /// Name of a link by index: "base", "link1", ...

@@ -214,6 +214,9 @@ const PERCENT: Bounds = Bounds::above(0.0, 100.0, "percent");
 /// The arm's name stands in file names of shared memory, beside a prefix and a service's name.
 const ARM_NAME_BYTES_MAX: usize = 32;
 
+/// What reads the robot file.
+type ReadRobot = fn(&Path) -> Result<Robot, Faults>;
+
 impl Settings {
     /// Reads and checks a settings file and the robot and scene files that it names.
     ///
@@ -240,9 +243,23 @@ impl Settings {
     pub fn load_overloaded(file: &Path) -> Result<Self, Faults> {
         Self::from_toml_overloaded(file, &document::read_text(file, "a settings file in TOML")?)
     }
-    fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
+    /// As [`Self::load`], with [`Robot::load_untried`]: for a process that talks to the services of the arm and plans nothing.
+    ///
+    /// # Errors
+    /// Every other fault at once.
+    pub fn load_untried(file: &Path) -> Result<Self, Faults> {
+        let text = document::read_text(file, "a settings file in TOML")?;
+        let settings = Self::read_with(file, &text, Robot::load_untried)?;
         let fault_list = FaultList::new(file);
-        let settings = Self::read(&fault_list, document::parse_toml(file, text)?, text);
+        consistency::check_loads(&fault_list, &settings);
+        fault_list.close(Some(settings))
+    }
+    fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::read_with(file, text, Robot::load)
+    }
+    fn read_with(file: &Path, text: &str, robot: ReadRobot) -> Result<Self, Faults> {
+        let fault_list = FaultList::new(file);
+        let settings = Self::read(&fault_list, document::parse_toml(file, text)?, (text, robot));
         fault_list.close(settings)
     }
     /// Cycles in a row that a bus may lose. Where the others continue, the drives of the lost one must not be commanded to catch
@@ -252,10 +269,10 @@ impl Settings {
         let stated = self.supervision.lost_cycles_max;
         if self.buses.len() > 1 { stated.min(self.cycle.tolerated_gap_periods) } else { stated }
     }
-    fn read(fault_list: &FaultList, node: Node, text: &str) -> Option<Self> {
+    fn read(fault_list: &FaultList, node: Node, (text, robot): (&str, ReadRobot)) -> Option<Self> {
         let mut top = Table::top(fault_list, node)?;
         let name = read_name(&mut top);
-        let robot = named_file(&mut top, "robot", Robot::load);
+        let robot = named_file(&mut top, "robot", robot);
         let scene = named_file(&mut top, "scene", Scene::load);
         let buses = binding::read_buses(&mut top);
         let servos = binding::read_servos(&mut top, robot.as_ref(), &buses);

@@ -58,7 +58,7 @@ impl ArmName {
     /// is all that counts then, and the fault is only mentioned.
     pub(crate) fn read(given: Option<&Path>) -> Result<Self, Failure> {
         let path = settings_path(given)?;
-        match Settings::load(&path) {
+        match Settings::load_untried(&path) {
             Ok(settings) => Ok(Self::of(&settings)),
             Err(faults) => {
                 let Some(name) = name_alone(&path) else { return Err(faults.into()) };
@@ -124,6 +124,11 @@ pub(crate) fn name_at_a_glance(given: Option<&Path>) -> Option<String> {
 /// Settings as a whole, for commands that need robot and scene too.
 pub(crate) fn settings(given: Option<&Path>) -> Result<Settings, Failure> {
     Ok(Settings::load(&settings_path(given)?)?)
+}
+
+/// The same for a command that leaves planning to the planner.
+pub(crate) fn settings_to_talk(given: Option<&Path>) -> Result<Settings, Failure> {
+    Ok(Settings::load_untried(&settings_path(given)?)?)
 }
 
 /// A robot by path or shipped name.

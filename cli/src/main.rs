@@ -24,10 +24,21 @@ use output::{Form, note};
 use std::env;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 use taustream_arm::printable::printable_json;
 use taustream_messages::Command;
+use taustream_messages::clock::now_ns;
+
+/// When this process began, by `CLOCK_MONOTONIC`, ns.
+static STARTED_NS: OnceLock<u64> = OnceLock::new();
+
+/// When this process began, by `CLOCK_MONOTONIC`, ns.
+fn started_ns() -> u64 {
+    *STARTED_NS.get_or_init(now_ns)
+}
 
 fn main() -> ExitCode {
+    started_ns();
     let cli = match Cli::from_words(env::args_os()) {
         Ok(cli) => cli,
         Err(error) => return usage(&error),

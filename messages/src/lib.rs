@@ -8,6 +8,7 @@
 pub mod bus;
 pub mod clock;
 pub mod command;
+pub mod event;
 pub mod fault;
 pub mod files;
 pub mod operator;
@@ -36,4 +37,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 4;
+pub const LAYOUT_VERSION: u32 = 5;

@@ -142,6 +142,22 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
     }
 }
 
+/// When the planner did what, by `CLOCK_MONOTONIC`, ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+pub struct PlanStages {
+    /// It took the request.
+    pub received_ns: u64,
+    /// It had a motion.
+    pub planned_ns: u64,
+    /// The motion was proven. A motion from rest is proven while it is planned.
+    pub proven_ns: u64,
+    /// The trajectory was sent.
+    pub sent_ns: u64,
+    /// The streamer's receipt had come.
+    pub receipt_ns: u64,
+}
+
 /// The planner's answer on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
@@ -154,6 +170,7 @@ pub struct PlanReply {
     clearance_m: f64,
     stroke_count: u32,
     received: u32,
+    stages: PlanStages,
     receipt: Receipt,
     text: Text,
 }
@@ -182,6 +199,8 @@ pub enum PlanOutcome {
         how: String,
         /// The streamer's receipt; `None` when it did not answer in time.
         receipt: Option<Box<Receipt>>,
+        /// When it did what.
+        stages: PlanStages,
     },
 }
 
@@ -199,6 +218,7 @@ impl PlanReply {
             clearance_m: 0.0,
             stroke_count: 0,
             received: 0,
+            stages: PlanStages::default(),
             receipt: nothing,
             text: Text::default(),
         };
@@ -212,8 +232,9 @@ impl PlanReply {
                 strokes,
                 how,
                 receipt,
+                stages,
             } => {
-                reply.planned = 1;
+                (reply.planned, reply.stages) = (1, *stages);
                 reply.trajectory_id = *trajectory_id;
                 (reply.planning_s, reply.duration_s) = (*planning_s, *duration_s);
                 (reply.clearance_m, reply.stroke_count) = (*clearance_m, *strokes);
@@ -245,9 +266,10 @@ impl PlanReply {
             strokes: self.stroke_count,
             how: self.text.read(),
             receipt: (self.received == 1).then(|| Box::new(self.receipt)),
+            stages: self.stages,
         }
     }
 }
 
 const _: () = assert!(size_of::<PlanRequest>() == 344);
-const _: () = assert!(size_of::<PlanReply>() == 48 + 320 + 248);
+const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248);

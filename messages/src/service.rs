@@ -49,7 +49,7 @@ pub type TargetServer = Server<ipc::Service, TargetRequest, (), TargetReply, ()>
 pub type PlanServer = Server<ipc::Service, PlanRequest, (), PlanReply, ()>;
 
 /// Most processes that may use one service: planner, streamer and command lines.
-const NODES_MAX: usize = 32;
+pub(crate) const NODES_MAX: usize = 32;
 /// Most subscribers of reports and receipts.
 const SUBSCRIBERS_MAX: usize = 24;
 /// Most processes that may send trajectories at one time.
@@ -64,6 +64,10 @@ const TRAJECTORY_BUFFER: usize = 8;
 const CLIENTS_MAX: usize = 24;
 /// How long a service that another process creates may take.
 const CREATION_WITHIN: Duration = Duration::from_millis(400);
+/// Longest path that iceoryx2 can make; a longer one would be a panic in the middle of it.
+const PATH_BYTES_MAX: usize = 255;
+/// Below the root stand `/nodes/`, up to 39 digits, `/`, the prefix, 40 digits and at most `.service_tag`.
+const NAME_BELOW_ROOT_BYTES: usize = 7 + 39 + 1 + 40 + 12;
 /// Longest arm name.
 const NAME_MAX: usize = 32;
 
@@ -255,6 +259,10 @@ impl Wire {
         Footprint::of(&self.files, &self.node.id().value().to_string())
     }
 
+    pub(crate) fn node(&self) -> &Node<ipc::Service> {
+        &self.node
+    }
+
     /// The arm's name.
     #[must_use]
     pub fn arm(&self) -> &str {
@@ -296,6 +304,13 @@ fn config(arm: &str, uid: u32, root: &Path) -> Result<Config, String> {
     let prefix = FileName::new(prefix(arm, uid).as_bytes()).map_err(|e| format!("prefix: {e:?}"))?;
     let root = root.join(ROOT);
     let root = root.to_str().ok_or("the runtime directory is not UTF-8")?;
+    let longest = root.len() + NAME_BELOW_ROOT_BYTES + prefix.len();
+    if longest > PATH_BYTES_MAX {
+        return Err(format!(
+            "{root}: with the names below it its paths have {longest} bytes, at most {PATH_BYTES_MAX} are possible; set \
+             TAUSTREAM_RUNTIME_DIR to a directory with a shorter path"
+        ));
+    }
     let root = IceoryxPath::new(root.as_bytes()).map_err(|e| format!("root: {e:?}"))?;
     config.global.prefix = prefix;
     config.global.set_root_path(&root);

@@ -3,7 +3,7 @@
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::target::{
     CheckedTargets, DUE_S_MAX, TARGETS_MAX, Target, TargetError, TargetOutcome,
 };
@@ -118,7 +118,7 @@ fn trajectory_written_and_read_is_the_same() {
 #[test]
 fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
     let cases: [(Corrupted, &str); 10] = [
-        (Corrupted::Layout(LAYOUT_VERSION + 1), "layout version 5"),
+        (Corrupted::Layout(LAYOUT_VERSION + 70), "layout version 7"),
         (Corrupted::Joints(0), "0 joints"),
         (Corrupted::Joints(9), "joint_count is 9"),
         (Corrupted::StrokeCount(600), "stroke_count is 600; at most 512"),
@@ -228,6 +228,7 @@ fn plan_request_and_answer_survive_the_wire() {
             strokes: 4,
             how: "RRT-Connect".into(),
             receipt: None,
+            stages: PlanStages { received_ns: 1, planned_ns: 2, proven_ns: 3, sent_ns: 4, receipt_ns: 5 },
         },
     ];
     for outcome in outcomes {

@@ -2,6 +2,8 @@
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+use taustream_messages::event::Topic;
 use taustream_messages::files::ArmFiles;
 use taustream_messages::service::{ServiceError, Wire};
 use taustream_messages::{LAYOUT_VERSION, Phase, Report};
@@ -17,8 +19,18 @@ struct Arm {
 
 impl Arm {
     fn new(stem: &str) -> Self {
-        let name = format!("{stem}-{}-{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("{stem}-{}-{number}", std::process::id());
         let runtime = std::env::temp_dir().join(format!("taustream-services-{name}"));
+        Self::of(name, runtime)
+    }
+
+    /// In a directory whose path leaves room for the names of sockets.
+    fn in_directory(stem: &str, runtime: PathBuf) -> Self {
+        Self::of(format!("{stem}-{}", std::process::id()), runtime)
+    }
+
+    fn of(name: String, runtime: PathBuf) -> Self {
         let _said_by_join = std::fs::create_dir_all(&runtime);
         Self { name, runtime }
     }
@@ -104,6 +116,60 @@ fn readers_of_reports_beyond_the_maximum_are_refused_with_the_number_and_the_rem
     assert!(error.contains("24") && error.contains("end one"), "{error}");
     publisher.send_copy(report(5)).expect("send");
     assert!(readers.iter().all(|r| r.receive().expect("receive").is_some()));
+}
+
+/// Goal: whoever waits wakes up at once, of its topic only; where the path of a socket would be too long, waits are short sleeps.
+#[test]
+fn events_wake_who_waits_and_no_other_topic() {
+    const LONG: Duration = Duration::from_secs(60);
+    const WAIT: Duration = Duration::from_millis(100);
+    let arm = Arm::in_directory("e", std::env::temp_dir().join(format!("e{}", std::process::id())));
+    let (planner, client) = (arm.join("planner"), arm.join("client"));
+    let (mut waits, asks) = (planner.events(Topic::Plan), client.events(Topic::Plan));
+    let mut other = planner.events(Topic::Command);
+    assert!(waits.are_there() && asks.are_there());
+    for _ in 0..1_000 {
+        asks.notify();
+    }
+    let since = Instant::now();
+    waits.wait(LONG);
+    assert!(since.elapsed() < LONG, "an event before the wait ends it");
+    // Those of before are one.
+    let since = Instant::now();
+    waits.wait(WAIT);
+    assert!(since.elapsed() >= WAIT / 2, "woken by nothing after {:?}", since.elapsed());
+    let since = Instant::now();
+    other.wait(WAIT);
+    assert!(since.elapsed() >= WAIT / 2, "woken by another topic");
+    drop(waits);
+    // Nobody waits any more; nothing fails.
+    asks.notify();
+}
+
+#[test]
+fn without_events_waits_are_short_sleeps() {
+    let mut arm = Arm::new("far");
+    let deep = arm.runtime.join("x".repeat(60));
+    std::fs::create_dir_all(&deep).expect("a directory");
+    let top = std::mem::replace(&mut arm.runtime, deep);
+    let wire = arm.join("client");
+    let mut events = wire.events(Topic::Trajectory);
+    assert!(!events.are_there());
+    events.notify();
+    let since = Instant::now();
+    events.wait(Duration::from_secs(60));
+    assert!(since.elapsed() < Duration::from_secs(60));
+    drop((events, wire));
+    arm.runtime = top;
+}
+
+#[test]
+fn runtime_directory_with_too_long_a_path_is_refused_with_the_numbers() {
+    let deep = std::env::temp_dir().join("x".repeat(150));
+    std::fs::create_dir_all(&deep).expect("a directory");
+    let error = Wire::join("deep", "test", &deep).expect_err("too long a path").to_string();
+    assert!(error.contains("at most 255") && error.contains("TAUSTREAM_RUNTIME_DIR"), "{error}");
+    let _left = std::fs::remove_dir_all(&deep);
 }
 
 /// Everything of an arm in shared memory and below the runtime directory.

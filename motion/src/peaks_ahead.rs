@@ -2,6 +2,9 @@
 //!
 //! The motion is cut into cells of equal duration. Each cell holds proven bounds of velocity, acceleration and jerk with
 //! their signs, joint by joint. A stop that is being chosen looks the cells up that it passes.
+//!
+//! A table begins with the first stroke: before it the sum rests. The strokes of a replacement that have ended before its cut are
+//! folded, so its cells are as fine after minutes of replacements as at first.
 use crate::limits::TOLERANCE;
 use crate::proof::Proof;
 use crate::{JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
@@ -44,33 +47,42 @@ impl Stretch {
     }
 }
 
+/// When the first stroke of a motion begins and the last one ends, s: what its table covers.
+#[must_use]
+pub fn span_s(trajectory: &Trajectory) -> [f64; 2] {
+    let end_s = trajectory.duration_s();
+    let starts_s = trajectory.strokes().iter().map(|stroke| stroke.start_s);
+    [starts_s.fold(end_s, f64::min), end_s]
+}
+
 /// How many cells the table of a motion has.
 #[must_use]
 pub fn cell_count(trajectory: &Trajectory) -> usize {
-    let wanted = libm::ceil(trajectory.duration_s() / CELL_S_MIN);
+    let [begin_s, end_s] = span_s(trajectory);
+    let wanted = libm::ceil((end_s - begin_s) / CELL_S_MIN);
     (1..CELLS_MAX).find(|count| to_f64(*count) >= wanted).unwrap_or(CELLS_MAX)
 }
 
 /// Fills `cells`, as many as [`cell_count`] says, with the bounds of a motion that keeps the motion limits.
 pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimits; MAX_JOINTS]) {
-    let duration_s = trajectory.duration_s();
-    let width_s = cell_s(cells.len(), duration_s);
+    let [begin_s, end_s] = span_s(trajectory);
+    let width_s = (end_s - begin_s) / to_f64(cells.len().max(1));
     let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
     for (pair, stroke) in edges.chunks_exact_mut(2).zip(trajectory.strokes()) {
         pair.copy_from_slice(&[stroke.start_s, stroke.end_s()]);
     }
     edges.sort_unstable_by(f64::total_cmp);
     // Between two of these the motion is one polynomial.
-    let mut edges = edges.iter().copied().filter(|edge_s| *edge_s > 0.0 && *edge_s < duration_s);
+    let mut edges = edges.iter().copied().filter(|edge_s| *edge_s > begin_s && *edge_s < end_s);
     let mut proof = Proof::new(trajectory, limits, 0.0);
-    let (mut from_s, mut piece_ends_s) = (0.0, 0.0);
+    let (mut from_s, mut piece_ends_s) = (begin_s, begin_s);
     for (index, cell) in cells.iter_mut().enumerate() {
         let mut whole: Option<Stretch> = None;
-        let cell_ends_s = to_f64(index + 1) * width_s;
+        let cell_ends_s = begin_s + to_f64(index + 1) * width_s;
         while from_s < cell_ends_s {
             if from_s >= piece_ends_s {
                 piece_ends_s = edges.find(|edge_s| *edge_s > from_s).unwrap_or(f64::INFINITY);
-                proof.enter(from_s, piece_ends_s.min(duration_s));
+                proof.enter(from_s, piece_ends_s.min(end_s));
             }
             let to_s = cell_ends_s.min(piece_ends_s);
             let found = bounds(&mut proof, limits, [from_s, to_s]);
@@ -99,10 +111,6 @@ fn bounds(proof: &mut Proof<'_>, limits: &[JointLimits; MAX_JOINTS], [from_s, to
     stretch
 }
 
-fn cell_s(count: usize, duration_s: f64) -> f64 {
-    duration_s / to_f64(count.max(1))
-}
-
 #[expect(clippy::cast_precision_loss, reason = "at most some thousand cells")]
 fn to_f64(count: usize) -> f64 {
     count as f64
@@ -111,22 +119,29 @@ fn to_f64(count: usize) -> f64 {
 /// A motion's table, and after its cut that of the motion that follows.
 #[derive(Clone, Copy, Debug)]
 pub struct PeaksAhead<'a> {
+    table: Table<'a>,
+    then: Option<(f64, Table<'a>)>,
+}
+
+/// The cells of a motion.
+#[derive(Clone, Copy, Debug)]
+struct Table<'a> {
     cells: &'a [Stretch],
+    begin_s: f64,
     cells_a_second: f64,
-    then: Option<(f64, &'a [Stretch], f64)>,
 }
 
 impl<'a> PeaksAhead<'a> {
-    /// The table of a motion of `duration_s`.
+    /// The table of a motion that runs during [`span_s`].
     #[must_use]
-    pub fn new(cells: &'a [Stretch], duration_s: f64) -> Self {
-        Self { cells, cells_a_second: cells_a_second(cells.len(), duration_s), then: None }
+    pub fn new(cells: &'a [Stretch], span_s: [f64; 2]) -> Self {
+        Self { table: Table::new(cells, span_s), then: None }
     }
 
-    /// The same up to `from_s`, and the table of another motion of `duration_s`, on the same time axis, from there on.
+    /// The same up to `from_s`, and the table of another motion, on the same time axis, from there on.
     #[must_use]
-    pub fn then(self, from_s: f64, cells: &'a [Stretch], duration_s: f64) -> Self {
-        Self { then: Some((from_s, cells, cells_a_second(cells.len(), duration_s))), ..self }
+    pub fn then(self, from_s: f64, cells: &'a [Stretch], span_s: [f64; 2]) -> Self {
+        Self { then: Some((from_s, Table::new(cells, span_s))), ..self }
     }
 
     /// What the motion does between two of its instants, the earlier first; rest after its end.
@@ -137,31 +152,34 @@ impl<'a> PeaksAhead<'a> {
         let cut_s = self.then.map_or(f64::INFINITY, |(cut_s, ..)| cut_s);
         let mut stretch: Option<Stretch> = None;
         if from_s < cut_s || self.then.is_none() {
-            join(&mut stretch, self.cells, [from_s, to_s.min(cut_s)], self.cells_a_second);
+            self.table.join([from_s, to_s.min(cut_s)], &mut stretch);
         }
-        if let Some((cut_s, cells, cells_a_second)) = self.then
+        if let Some((cut_s, table)) = self.then
             && to_s >= cut_s
         {
-            join(&mut stretch, cells, [from_s.max(cut_s), to_s], cells_a_second);
+            table.join([from_s.max(cut_s), to_s], &mut stretch);
         }
         stretch.unwrap_or_default()
     }
 }
 
-fn cells_a_second(count: usize, duration_s: f64) -> f64 {
-    if duration_s > 0.0 { to_f64(count) / duration_s } else { 0.0 }
-}
+impl<'a> Table<'a> {
+    fn new(cells: &'a [Stretch], [begin_s, end_s]: [f64; 2]) -> Self {
+        let cells_a_second = if end_s > begin_s { to_f64(cells.len()) / (end_s - begin_s) } else { 0.0 };
+        Self { cells, begin_s, cells_a_second }
+    }
 
-/// Joins the cells between two instants. Beyond the last cell the motion rests.
-fn join(stretch: &mut Option<Stretch>, cells: &[Stretch], [from_s, to_s]: [f64; 2], cells_a_second: f64) {
-    // The cell in which an instant lies. A negative or NaN time is in the first.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at both ends")]
-    let index = |s: f64| ((s * cells_a_second) as usize).min(cells.len());
-    let (first, last) = (index(from_s), index(to_s));
-    for cell in cells.get(first..).unwrap_or(&[]).iter().take((last + 1).saturating_sub(first)) {
-        match stretch {
-            Some(stretch) => stretch.join(cell),
-            None => *stretch = Some(*cell),
+    /// Joins the cells between two instants. Beyond the last cell the motion rests.
+    fn join(&self, [from_s, to_s]: [f64; 2], stretch: &mut Option<Stretch>) {
+        // The cell in which an instant lies. A time before the first cell, or NaN, counts as in it.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at both ends")]
+        let index = |s: f64| (((s - self.begin_s) * self.cells_a_second) as usize).min(self.cells.len());
+        let (first, last) = (index(from_s), index(to_s));
+        for cell in self.cells.get(first..).unwrap_or(&[]).iter().take((last + 1).saturating_sub(first)) {
+            match stretch {
+                Some(stretch) => stretch.join(cell),
+                None => *stretch = Some(*cell),
+            }
         }
     }
 }

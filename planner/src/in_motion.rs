@@ -3,16 +3,20 @@
 //! A replacement repeats the strokes that have begun before its cut and is verified from the cut on, for limits and for
 //! distances: the sum of kept and new strokes is new geometry. Three ways, from the quickest: strokes that carry the arm from
 //! its state at the cut to the goal; a taper to rest, and an ordinary plan from there; or the end of the motion, and an
-//! ordinary plan from there. The last one always exists.
+//! ordinary plan from there. The last one always exists. Of those that are proven the shortest is taken.
 use crate::budget::Budget;
 use crate::plan::{
     Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_until,
 };
 use crate::replacement::{replacement, to_rest};
+use crate::timing::Path;
 use crate::verify::{Proof, Stretch, Violation, verify_stretches};
 use crate::world::World;
 use std::sync::atomic::AtomicBool;
+use std::thread;
 use taustream_arm::{Robot, Scene};
+use taustream_messages::Replaces;
+use taustream_messages::clock::now_ns;
 use taustream_motion::cut::kept;
 use taustream_motion::{JointArray, Stroke, Trajectory, TrajectoryError};
 
@@ -34,6 +38,10 @@ pub struct CutPoint {
 }
 
 impl CutPoint {
+    pub(crate) fn replaces(&self) -> Replaces {
+        Replaces::Cut { trajectory_id: self.trajectory_id, at_s: self.at_s }
+    }
+
     /// The trajectory that is cut, with the strokes folded that have ended when the replacement takes over.
     fn folded(&self) -> Result<Trajectory, NoReplacement> {
         let trajectory = self.trajectory.as_ref().ok_or(NoReplacement::Unknown)?;
@@ -58,6 +66,10 @@ pub struct Replacement {
     pub clearance_m: f64,
     /// What it is, in a few words.
     pub how: String,
+    /// When its strokes were there and its proof began, by `CLOCK_MONOTONIC`, ns.
+    pub planned_ns: u64,
+    /// Which cut it is made for.
+    pub replaces: Replaces,
 }
 
 /// Why there is no replacement.
@@ -81,6 +93,9 @@ pub enum NoReplacement {
     /// It is not proven.
     #[error("the replacement is not proven: {0}")]
     Unproven(#[from] Violation),
+    /// A fault of the planner itself.
+    #[error("the planner has a fault and gave up on this way; see its log")]
+    Panicked,
     /// A shape of the robot or the scene cannot be built.
     #[error("{name}: its mesh has no usable triangles; correct the file")]
     Shape {
@@ -107,9 +122,11 @@ impl Surroundings<'_> {
     /// When no taper is found, or it is not proven.
     pub fn taper(&self, cut: &CutPoint, options: &PlanOptions) -> Result<Replacement, NoReplacement> {
         let tapered = self.taper_strokes(cut)?;
+        let planned_ns = now_ns();
         let proof = self.prove(&tapered, cut, options)?;
         let how = "taper to rest".to_owned();
-        Ok(Replacement { trajectory: tapered, clearance_m: proof.clearance_m, how })
+        let (trajectory, clearance_m, replaces) = (tapered, proof.clearance_m, cut.replaces());
+        Ok(Replacement { trajectory, clearance_m, how, planned_ns, replaces })
     }
 
     /// A taper to rest, and an ordinary plan from there to the goal.
@@ -131,6 +148,8 @@ impl Surroundings<'_> {
             trajectory,
             clearance_m,
             how: format!("to rest at {rest_s:.3} s, then {}", plan.how),
+            planned_ns: now_ns(),
+            replaces: cut.replaces(),
         })
     }
 
@@ -158,6 +177,8 @@ impl Surroundings<'_> {
             trajectory,
             clearance_m: proof.clearance_m,
             how: format!("after {:.3} s: {how}", cut.end_s),
+            planned_ns: now_ns(),
+            replaces: cut.replaces(),
         })
     }
 
@@ -174,12 +195,56 @@ impl Surroundings<'_> {
         let goal_rad = nearest_inside(self.robot, goal_rad);
         let made = replacement(&cut.folded()?, cut.at_s, &goal_rad, &self.robot.limits());
         let trajectory = made.ok_or(NoReplacement::NoStrokes { at_s: cut.at_s })?;
+        let planned_ns = now_ns();
         let proof = self.prove(&trajectory, cut, options)?;
         Ok(Replacement {
             trajectory,
             clearance_m: proof.clearance_m,
             how: "straight on from the motion".to_owned(),
+            planned_ns,
+            replaces: cut.replaces(),
         })
+    }
+
+    /// The shortest proven way to the goal that needs no search: straight on from the cut, or, where even a straight line from
+    /// there would be over earlier, on from the end of the motion.
+    ///
+    /// # Errors
+    /// When there are no strokes straight on, or they are not proven.
+    pub fn direct_or_after_end(
+        &self,
+        [cut, end]: [&CutPoint; 2],
+        goal_rad: &JointArray,
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let direct = self.direct((cut, goal_rad), options)?;
+        let limits = self.robot.limits();
+        let goal_rad = &nearest_inside(self.robot, goal_rad);
+        let path =
+            Path { corners_rad: &[end.end_rad, *goal_rad], joints: self.robot.joints.len(), limits: &limits };
+        let straight_s = path.stopping().map_or(f64::INFINITY, |timed| timed.trajectory.duration_s());
+        if end.end_s + straight_s >= direct.trajectory.duration_s() {
+            return Ok(direct);
+        }
+        shorter(Ok(direct), self.after_end((end, goal_rad), options))
+    }
+
+    /// The shorter one of two ways round what is in the way: to rest and on, or on from the end of the motion.
+    ///
+    /// # Errors
+    /// Why there is no way from rest, when there is none from the end either.
+    pub fn rest_first_or_after_end(
+        &self,
+        [cut, end]: [&CutPoint; 2],
+        goal_rad: &JointArray,
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let (from_rest, from_end) = thread::scope(|scope| {
+            let from_end = scope.spawn(|| self.after_end((end, goal_rad), options));
+            let from_rest = self.rest_first((cut, goal_rad), options);
+            (from_rest, from_end.join().unwrap_or(Err(NoReplacement::Panicked)))
+        });
+        shorter(from_rest, from_end)
     }
 
     fn taper_strokes(&self, cut: &CutPoint) -> Result<Trajectory, NoReplacement> {
@@ -209,6 +274,18 @@ impl Surroundings<'_> {
         let budget = Budget::until(options.deadline, Some(self.cancel));
         let span_s = [cut.at_s, trajectory.duration_s().max(cut.at_s)];
         Ok(verify_stretches(&[Stretch { world: &world, span_s }], trajectory, &budget)?)
+    }
+}
+
+/// Of two replacements the one that ends earlier; of two refusals the first.
+fn shorter(
+    a: Result<Replacement, NoReplacement>,
+    b: Result<Replacement, NoReplacement>,
+) -> Result<Replacement, NoReplacement> {
+    match (a, b) {
+        (Ok(a), Ok(b)) => Ok(if b.trajectory.duration_s() < a.trajectory.duration_s() { b } else { a }),
+        (Ok(only), Err(_)) | (Err(_), Ok(only)) => Ok(only),
+        (Err(why), Err(_)) => Err(why),
     }
 }
 

@@ -11,14 +11,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 use taustream_arm::Robot;
 use taustream_messages::clock::now_ns;
+use taustream_messages::event::{Events, Topic};
 use taustream_messages::service::{
     ReceiptSubscriber, ReportSubscriber, ServiceError, TrajectoryPublisher, Wire,
 };
 use taustream_messages::{CheckedTrajectory, Outcome, Phase, Receipt, Replaces, Report, TrajectoryMessage};
 use taustream_motion::Trajectory;
 
-/// How often a wait looks for what it waits for.
-const POLL: Duration = Duration::from_millis(2);
+/// How often a wait for a report looks for it: reports come at their own rate, without events.
+const POLL: Duration = Duration::from_millis(1);
+/// How long a wait for a receipt relies on its event.
+const LOOK_AGAIN: Duration = Duration::from_millis(5);
 /// A streamer that sends no report for this long is not running.
 pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
 /// A report that is not older is the streamer's state of now, ns: a reporting period and a half at the default rate.
@@ -39,6 +42,8 @@ pub struct SentTrajectory {
     pub generation: u64,
     /// The streamer's answer; `None` when none came in time.
     pub receipt: Option<Receipt>,
+    /// When it was sent, by `CLOCK_MONOTONIC`, ns.
+    pub sent_ns: u64,
 }
 
 /// Why a trajectory was not sent.
@@ -85,6 +90,7 @@ pub struct Outbox<'a> {
     trajectories: TrajectoryPublisher,
     receipts: ReceiptSubscriber,
     reports: ReportSubscriber,
+    events: RefCell<Events>,
     /// The newest report that made sense.
     newest: Cell<Option<(Report, Phase)>>,
     /// What was sent, newest last: what runs may be cut only by whoever knows its strokes.
@@ -100,7 +106,9 @@ impl<'a> Outbox<'a> {
         // The receipt's port first: it must be there before anything that is answered.
         let (receipts, reports) = (wire.receipt_subscriber()?, wire.report_subscriber()?);
         let (newest, sent) = (Cell::new(None), RefCell::default());
-        Ok(Self { wire, trajectories: wire.trajectory_publisher()?, receipts, reports, newest, sent })
+        let (trajectories, events) =
+            (wire.trajectory_publisher()?, RefCell::new(wire.events(Topic::Trajectory)));
+        Ok(Self { wire, trajectories, receipts, reports, events, newest, sent })
     }
 
     /// The newest report that has arrived since the last call, if there is one that makes sense.
@@ -192,10 +200,12 @@ impl<'a> Outbox<'a> {
         });
         // What the receipt would come too late for is not to move the arm either.
         let message = message.valid_for(timeout.saturating_sub(RECEIPT_TAKES));
+        let sent_ns = now_ns();
         let received = self.trajectories.send_copy(*message).map_err(|e| transport("publish it", &e))?;
         if received == 0 {
             return Err(self.wire.not_running("taustream-streamer").into());
         }
+        self.events.borrow().notify();
         let receipt = self.receipt(trajectory_id, timeout)?;
         // Without a receipt it may have been accepted all the same.
         if !matches!(receipt.and_then(|receipt| receipt.outcome()), Some(Outcome::Rejected(_))) {
@@ -205,7 +215,7 @@ impl<'a> Outbox<'a> {
             }
             sent.push_back((trajectory_id, trajectory.clone()));
         }
-        Ok(SentTrajectory { trajectory_id, generation, receipt })
+        Ok(SentTrajectory { trajectory_id, generation, receipt, sent_ns })
     }
 
     /// The strokes of a trajectory that was sent from here.
@@ -227,7 +237,7 @@ impl<'a> Outbox<'a> {
             if since.elapsed() > timeout {
                 return Ok(None);
             }
-            thread::sleep(POLL);
+            self.events.borrow_mut().wait(LOOK_AGAIN);
         }
     }
 }

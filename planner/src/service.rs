@@ -9,7 +9,7 @@ mod streaming;
 
 use crate::kind::PlannerKind;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
-use crate::send::{Outbox, REPORT_WITHIN, SendError, check_robot};
+use crate::send::{Outbox, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
@@ -20,15 +20,17 @@ use std::time::{Duration, Instant};
 use streaming::Stream;
 use taustream_arm::daemon::{Manager, Promise};
 use taustream_arm::{Robot, Scene};
+use taustream_messages::clock::now_ns;
+use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::service::{PlanServer, ServiceError, TargetServer, Wire};
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces};
 use taustream_motion::JointArray;
 use tracing::{info, warn};
 
-/// How often the service looks for requests: what a user may feel of it is below the planning time.
-const POLL: Duration = Duration::from_millis(2);
+/// How long the service waits for a request before it looks at targets, reports and files again: targets come without events.
+const WAIT_AT_MOST: Duration = Duration::from_millis(2);
 /// How often it looks at requests and requesters while it plans.
 const ATTEND_EVERY: Duration = Duration::from_millis(5);
 /// How often it looks for the files behind its services.
@@ -95,6 +97,9 @@ pub struct Service<'a> {
     outbox: Outbox<'a>,
     server: PlanServer,
     stop: &'a AtomicBool,
+    events: Events,
+    /// When the request was taken that is being answered, by `CLOCK_MONOTONIC`, ns.
+    received_ns: u64,
     seen: Seen,
     latency: Latency,
     targets: TargetServer,
@@ -123,6 +128,13 @@ impl<'a> Service<'a> {
     ) -> Result<Self, OpenError> {
         let server = take_server(wire)?;
         let outbox = Outbox::open(wire)?;
+        let events = wire.events(Topic::Plan);
+        if !events.are_there() {
+            info!(
+                "no events in shared memory: requests are looked for every 2 ms; as a rule, the runtime directory has too long a path for \
+                 sockets (107 bytes with the arm's name and 45 more)"
+            );
+        }
         let promise = Promise::start(Manager::from_environment(), TURN_WITHIN)
             .map_err(|e| OpenError::Thread(e.to_string()))?;
         Ok(Self {
@@ -131,6 +143,8 @@ impl<'a> Service<'a> {
             outbox,
             server,
             stop,
+            events,
+            received_ns: 0,
             seen: Seen::default(),
             latency: Latency::default(),
             targets: wire.target_server()?,
@@ -146,7 +160,7 @@ impl<'a> Service<'a> {
         while !self.stop.load(Ordering::Relaxed) {
             self.promise.back_within(TURN_WITHIN);
             self.turn();
-            thread::sleep(POLL);
+            self.events.wait(WAIT_AT_MOST);
             if looked.elapsed() >= LOOK_EVERY {
                 looked = Instant::now();
                 if let Some(missing) = self.footprint.missing() {
@@ -177,13 +191,14 @@ impl<'a> Service<'a> {
     }
 
     fn take(&mut self, request: &Request) {
+        self.received_ns = now_ns();
         // Copied out before it is checked.
         let copy = *request.payload();
         let outcome = match CheckedPlanRequest::try_from(&copy) {
             Ok(checked) => self.answer(request, &checked).unwrap_or_else(|reason| failed(&reason)),
             Err(e) => failed(&e.to_string()),
         };
-        reply(request, &outcome);
+        self.reply(request, &outcome);
     }
 
     fn answer(&mut self, request: &Request, requested: &CheckedPlanRequest) -> Result<PlanOutcome, String> {
@@ -268,7 +283,7 @@ impl<'a> Service<'a> {
                 cancel.store(true, Ordering::Relaxed);
             }
             while let Ok(Some(other)) = self.server.receive() {
-                reply(
+                self.reply(
                     &other,
                     &failed(&format!(
                         "the planner plans for another request, for {:.1} s of at most {:.1} s; ask again after it",
@@ -284,6 +299,7 @@ impl<'a> Service<'a> {
         if !request.is_connected() {
             return failed("the client has disconnected; motion not sent");
         }
+        let proven_ns = now_ns();
         match self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN) {
             Ok(sent) => PlanOutcome::Planned {
                 trajectory_id: sent.trajectory_id,
@@ -293,8 +309,35 @@ impl<'a> Service<'a> {
                 strokes: u32::try_from(plan.trajectory.strokes().len()).unwrap_or(u32::MAX),
                 how: plan.how.clone(),
                 receipt: sent.receipt.map(Box::new),
+                stages: self.stages(&sent, proven_ns),
             },
             Err(e) => failed(&e.to_string()),
+        }
+    }
+}
+
+impl Service<'_> {
+    /// When what was done for the request that is being answered; the receipt has just come.
+    fn stages(&self, sent: &SentTrajectory, proven_ns: u64) -> PlanStages {
+        let (received_ns, planned_ns) = (self.received_ns, proven_ns);
+        PlanStages { received_ns, planned_ns, proven_ns, sent_ns: sent.sent_ns, receipt_ns: now_ns() }
+    }
+
+    fn reply(&self, request: &Request, outcome: &PlanOutcome) {
+        // A requester that has gone needs no answer.
+        if let Err(e) = request.send_copy(PlanReply::new(outcome)) {
+            info!("the answer was not taken: {e:?}");
+        }
+        self.events.notify();
+        match outcome {
+            PlanOutcome::Failed { reason } => info!("answered: {reason}"),
+            PlanOutcome::Planned { trajectory_id, planning_s, duration_s, how, receipt, .. } => info!(
+                trajectory_id,
+                planning_s,
+                duration_s,
+                outcome = ?receipt.as_ref().map(|r| r.outcome()),
+                "answered: {how}"
+            ),
         }
     }
 }
@@ -385,23 +428,6 @@ fn not_ready(phase: Phase) -> String {
 
 fn failed(reason: &str) -> PlanOutcome {
     PlanOutcome::Failed { reason: reason.to_owned() }
-}
-
-fn reply(request: &Request, outcome: &PlanOutcome) {
-    match outcome {
-        PlanOutcome::Failed { reason } => info!("answered: {reason}"),
-        PlanOutcome::Planned { trajectory_id, planning_s, duration_s, how, receipt, .. } => info!(
-            trajectory_id,
-            planning_s,
-            duration_s,
-            outcome = ?receipt.as_ref().map(|r| r.outcome()),
-            "answered: {how}"
-        ),
-    }
-    // A requester that has gone needs no answer.
-    if let Err(e) = request.send_copy(PlanReply::new(outcome)) {
-        info!("the answer was not taken: {e:?}");
-    }
 }
 
 /// The one place of a planner. That of a killed planner is free again once shared memory has been cleaned up.

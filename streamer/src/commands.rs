@@ -19,11 +19,14 @@ use std::sync::mpsc::Receiver;
 use std::thread;
 use std::time::Duration;
 use taustream_drivers::Nanos;
+use taustream_messages::event::{Events, Topic};
 use taustream_messages::service::{CommandServer, ServiceError, Wire};
 use taustream_messages::{Command, CommandReply, CommandRequest, Phase};
 
-/// How often the port and the queues are looked at: the latency of a command, and no burden for a small machine.
+/// How often the port and the queues are looked at without an event.
 const INTERVAL: Duration = Duration::from_millis(2);
+/// How often answers are looked for: the cycle notifies nobody.
+const INTERVAL_UNANSWERED: Duration = Duration::from_micros(200);
 /// How long the cycle may take to carry a command out; it answers in one period unless it is dead.
 pub(crate) const CARRIED_OUT_WITHIN: Duration = Duration::from_millis(1_000);
 /// How long its answer is waited for: longer, so that nothing is carried out that was answered as lost.
@@ -67,13 +70,14 @@ pub struct CommandThread {
 /// The open port. Dropped as a whole, the server before its node.
 struct Port {
     server: CommandServer,
+    events: Events,
     wire: Wire,
 }
 
 /// Opens the port of commands: the one that can be had only once.
 fn open(arm: &str, runtime: &std::path::Path) -> Result<Port, ServiceError> {
     let wire = Wire::join(arm, "taustream-streamer", runtime)?;
-    Ok(Port { server: wire.command_server()?, wire })
+    Ok(Port { server: wire.command_server()?, events: wire.events(Topic::Command), wire })
 }
 
 impl CommandThread {
@@ -99,12 +103,25 @@ impl CommandThread {
             if let Some(port) = &port {
                 self.take_commands(&port.server, &mut pending);
             }
+            let waited_for = pending.len();
             self.return_answers(&mut pending);
             self.rounds.fetch_add(1, Ordering::Relaxed);
             if last {
                 return;
             }
-            thread::sleep(INTERVAL);
+            match &mut port {
+                None => thread::sleep(INTERVAL),
+                Some(port) => {
+                    if pending.len() < waited_for {
+                        port.events.notify();
+                    }
+                    if pending.is_empty() {
+                        port.events.wait(INTERVAL);
+                    } else {
+                        thread::sleep(INTERVAL_UNANSWERED);
+                    }
+                }
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 //! A stop is chosen from this table in the cycle that asks for it (`taustream_motion::stopping`).
 use std::ops::Deref;
 use taustream_messages::CheckedTrajectory;
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill};
+use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
 /// A trajectory that the cycle can run and stop.
@@ -32,7 +32,7 @@ impl PreparedTrajectory {
     /// Real time: no allocation.
     #[must_use]
     pub fn ahead(&self) -> PeaksAhead<'_> {
-        PeaksAhead::new(&self.cells, self.checked.trajectory.duration_s())
+        PeaksAhead::new(&self.cells, span_s(&self.checked.trajectory))
     }
 
     /// The same up to `from_s`, and what its successor does from there on.
@@ -40,7 +40,7 @@ impl PreparedTrajectory {
     /// Real time: no allocation.
     #[must_use]
     pub fn ahead_into<'a>(&'a self, from_s: f64, successor: &'a Self) -> PeaksAhead<'a> {
-        self.ahead().then(from_s, &successor.cells, successor.trajectory.duration_s())
+        self.ahead().then(from_s, &successor.cells, span_s(&successor.checked.trajectory))
     }
 }
 

@@ -22,6 +22,7 @@ use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
 use taustream_arm::{Settings, TrajectoryFile};
+use taustream_messages::event::{Events, Topic};
 use taustream_messages::service::{
     ReceiptPublisher, ReportPublisher, ServiceError, TrajectorySubscriber, Wire,
 };
@@ -31,6 +32,8 @@ use tracing::{error, info, warn};
 
 /// How often ports and queues are looked at.
 const INTERVAL: Duration = Duration::from_millis(2);
+/// The same while a trajectory is being checked, or the cycle has it: the cycle notifies nobody.
+const INTERVAL_UNANSWERED: Duration = Duration::from_micros(200);
 /// Trajectories that are taken in one round.
 const TRAJECTORIES_MAX: usize = 8;
 /// Longest time that the histograms tell apart, ns.
@@ -41,6 +44,7 @@ const LONGEST_NS: u64 = 10_000_000_000;
 struct Ports {
     trajectories: TrajectorySubscriber,
     receipts: ReceiptPublisher,
+    events: Events,
     reports: ReportPublisher,
     wire: Wire,
 }
@@ -52,6 +56,7 @@ impl Ports {
             trajectories: wire.trajectory_subscriber()?,
             receipts: wire.receipt_publisher()?,
             reports: wire.report_publisher()?,
+            events: wire.events(Topic::Trajectory),
             wire,
         })
     }
@@ -77,6 +82,8 @@ pub struct Publisher {
     accepted: u64,
     rejected: u64,
     rejections: SameLines,
+    /// Trajectories without receipt.
+    unanswered: u32,
 }
 
 /// The queues and threads that the publishing thread stands between.
@@ -125,6 +132,7 @@ impl Publisher {
             accepted: 0,
             rejected: 0,
             rejections: SameLines::default(),
+            unanswered: 0,
         })
     }
 
@@ -142,6 +150,7 @@ impl Publisher {
                 }
                 None => {}
             }
+            let answered_before = self.accepted + self.rejected;
             let to = open.as_ref();
             self.take_trajectories(to);
             self.restore_buses();
@@ -156,7 +165,21 @@ impl Publisher {
             if last {
                 return;
             }
-            thread::sleep(INTERVAL);
+            let answered = self.accepted + self.rejected > answered_before;
+            self.wait(open.as_mut(), answered);
+        }
+    }
+
+    /// Waits for trajectories, and for the time to look at the other queues.
+    fn wait(&self, open: Option<&mut Ports>, answered: bool) {
+        let Some(ports) = open else { return thread::sleep(INTERVAL) };
+        if answered {
+            ports.events.notify();
+        }
+        if self.unanswered > 0 {
+            thread::sleep(INTERVAL_UNANSWERED);
+        } else {
+            ports.events.wait(INTERVAL);
         }
     }
 
@@ -192,6 +215,7 @@ impl Publisher {
             let copy = Box::new(*sample.payload());
             drop(sample);
             let (id, generation) = (copy.claimed_id(), copy.claimed_generation());
+            self.unanswered += 1;
             if !self.checker.check(copy) {
                 self.receipt(to, id, generation, &Outcome::Rejected(Rejection::Busy));
             }
@@ -263,6 +287,7 @@ impl Publisher {
     }
 
     fn receipt(&mut self, to: Option<&Ports>, id: u64, generation: u64, outcome: &Outcome) {
+        self.unanswered = self.unanswered.saturating_sub(1);
         match outcome {
             Outcome::Accepted { tick: 0, from_s } => {
                 self.accepted += 1;

@@ -1,4 +1,5 @@
 //! The command line. Every name has its unit; the help states every default.
+mod cuts;
 mod goal;
 mod import;
 mod live;
@@ -19,6 +20,7 @@ pub(crate) use offline::{
     PlanArgs, PlotArgs, SampleArgs, StopsBenchArgs,
 };
 
+pub(crate) use cuts::CutsBenchArgs;
 pub(crate) use papers::PapersArgs;
 pub(crate) use planners::PlannersArgs;
 pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};

@@ -15,7 +15,7 @@ const DEADLINE_MS: u32 = 1_000;
 
 /// Asks the planner for the taper, and prints the receipt.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &CancelArgs) -> Result<(), Failure> {
-    let settings = arm::settings(settings)?;
+    let settings = arm::settings_to_talk(settings)?;
     let client = Client::join(&settings.name)?;
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),

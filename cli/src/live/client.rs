@@ -3,6 +3,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use std::thread;
 use std::time::{Duration, Instant};
+use taustream_messages::event::{Events, Topic};
 use taustream_messages::service::{ReportSubscriber, ServiceError, Wire};
 use taustream_messages::{Command, CommandReply, CommandRequest, Phase, PlanReply, PlanRequest, Report};
 
@@ -11,8 +12,10 @@ pub(crate) const STREAMER: &str = "taustream-streamer";
 /// The process that plans.
 pub(crate) const PLANNER: &str = "taustream-planner";
 
-/// How often a wait looks for an answer. An answer takes the streamer a few cycles, so this is what users feel.
-const POLL: Duration = Duration::from_millis(2);
+/// How often a wait for a report looks for it: reports come at their own rate, without events.
+const POLL: Duration = Duration::from_millis(1);
+/// How long a wait for an answer relies on its event, before it looks at the clock and at Ctrl-C.
+const LOOK_AGAIN: Duration = Duration::from_millis(5);
 /// Longest wait for an answer to a command; the streamer answers within a few cycles.
 const COMMAND_S_MAX: f64 = 2.0;
 /// How long the streamer may carry a command out: shorter, so that nothing happens after we have given up.
@@ -52,11 +55,14 @@ impl Client {
         if pending.number_of_server_connections() == 0 {
             return Err(self.wire.not_running(STREAMER).into());
         }
+        // After the command: opening them takes a moment, and the streamer looks at its port meanwhile.
+        let mut events = self.wire.events(Topic::Command);
+        events.notify();
         let limit = Limit::after_s(COMMAND_S_MAX);
         loop {
             match pending.receive() {
                 Ok(Some(reply)) => return Ok(*reply.payload()),
-                Ok(None) => self.pause(&limit, STREAMER)?,
+                Ok(None) => self.wait(&mut events, &limit, STREAMER)?,
                 Err(e) => return Err(self.refused("receive the answer", &e)),
             }
         }
@@ -69,14 +75,18 @@ impl Client {
         limit_s: f64,
         meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
     ) -> Result<PlanReply, Failure> {
+        let mut events = self.wire.events(Topic::Plan);
         // A streamer that has just started clears the arm's names, and a running planner opens its own again soon.
         let back = Limit::after_s(PLANNER_BACK_S);
         let (_client, pending) = loop {
             let client = self.wire.plan_client()?;
             let pending = client.send_copy(request).map_err(|e| self.refused("send the request", &e))?;
             if pending.number_of_server_connections() > 0 {
+                events.notify();
                 break (client, pending);
             }
+            // A planner without a streamer is of no use: that one is named first.
+            self.report()?;
             if back.is_over() {
                 return Err(self.wire.not_running(PLANNER).into());
             }
@@ -88,7 +98,7 @@ impl Client {
         loop {
             match pending.receive() {
                 Ok(Some(reply)) => return Ok(*reply.payload()),
-                Ok(None) => self.pause(&limit, PLANNER)?,
+                Ok(None) => self.wait(&mut events, &limit, PLANNER)?,
                 Err(e) => return Err(self.refused("receive the answer", &e)),
             }
             meanwhile()?;
@@ -137,12 +147,12 @@ impl Client {
         }
     }
 
-    fn pause(&self, limit: &Limit, who: &'static str) -> Result<(), Failure> {
+    fn wait(&self, events: &mut Events, limit: &Limit, who: &'static str) -> Result<(), Failure> {
         interrupt::check()?;
         if limit.is_over() {
             return Err(Failure::NoAnswer { who, arm: self.wire.arm().to_owned(), waited_s: limit.length_s });
         }
-        thread::sleep(POLL);
+        events.wait(LOOK_AGAIN);
         Ok(())
     }
 

@@ -27,7 +27,7 @@ impl fmt::Display for Inside {
 
 /// Plans from the commanded pose to the nearest one inside, and prints the receipt.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Result<(), Failure> {
-    let settings = arm::settings(settings)?;
+    let settings = arm::settings_to_talk(settings)?;
     let arm = ArmName::of(&settings);
     let client = Client::join(&arm.name)?;
     let (report, _) = client.report()?;

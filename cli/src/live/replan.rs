@@ -6,13 +6,16 @@ use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::offline::verify::Unmodelled;
 use crate::output::Form;
+use crate::started_ns;
 use crate::words::receipt_sentence;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
+use std::time::Duration;
 use taustream_arm::Settings;
 use taustream_arm::text::counted;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::clock::now_ns;
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::{Outcome, PlanRequest, Receipt, Report};
 use taustream_planner::PlannerKind;
 
@@ -32,6 +35,42 @@ pub(crate) struct Planned {
     pub(crate) accepted: bool,
     pub(crate) from_s: f64,
     pub(crate) tick: u64,
+    #[serde(skip)]
+    asked_ns: u64,
+    #[serde(skip)]
+    planner_stages: PlanStages,
+}
+
+/// When what was done, s after the request was sent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct Stages {
+    /// From the start of this process to the request.
+    command_s: f64,
+    received_s: f64,
+    planned_s: f64,
+    proven_s: f64,
+    sent_s: f64,
+    accepted_s: f64,
+    answered_s: f64,
+    /// The first cycle that sampled the new motion; null without `--wait`.
+    first_setpoint_s: Option<f64>,
+}
+
+impl Stages {
+    fn of(planned: &Planned, answered_ns: u64, first_setpoint_ns: Option<u64>) -> Self {
+        let PlanStages { received_ns, planned_ns, proven_ns, sent_ns, receipt_ns } = planned.planner_stages;
+        let after_s = |ns: u64| Duration::from_nanos(ns.saturating_sub(planned.asked_ns)).as_secs_f64();
+        Self {
+            command_s: Duration::from_nanos(planned.asked_ns.saturating_sub(started_ns())).as_secs_f64(),
+            received_s: after_s(received_ns),
+            planned_s: after_s(planned_ns),
+            proven_s: after_s(proven_ns),
+            sent_s: after_s(sent_ns),
+            accepted_s: after_s(receipt_ns),
+            answered_s: after_s(answered_ns),
+            first_setpoint_s: first_setpoint_ns.map(after_s),
+        }
+    }
 }
 
 /// The whole answer.
@@ -41,6 +80,7 @@ struct Answer {
     #[serde(flatten)]
     planned: Planned,
     unmodelled_links: Vec<String>,
+    stages: Stages,
     #[serde(flatten)]
     executed: Option<Executed>,
 }
@@ -93,7 +133,7 @@ pub(crate) struct Wanted {
 
 /// Asks, prints the receipt, and waits for the end of the motion if requested.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
-    let settings = arm::settings(settings)?;
+    let settings = arm::settings_to_talk(settings)?;
     let arm = ArmName::of(&settings);
     let (goal, option) = args.goal();
     let goal_rad = goal.pose_of(&settings.robot, option)?;
@@ -128,14 +168,24 @@ pub(crate) fn go(
     form.progress(format_args!("planning, {:.1} s at most ..", f64::from(request.deadline_ms) * 1e-3));
     let arm = ArmName::of(settings);
     let planned = ask_while(client, &arm, request, &mut || Ok(()))?;
+    let answered_ns = now_ns();
+    let mut first_setpoint_ns = None;
     let executed = if wait {
         form.progress(format_args!("accepted; moving, {:.1} s at full speed ..", planned.duration_s));
-        Some(follow(client, &arm, planned.trajectory_id, say_pauses(form))?)
+        let (id, mut say) = (planned.trajectory_id, say_pauses(form));
+        Some(follow(client, &arm, id, |report, phase| {
+            // The cycle in which a motion begins or takes over reports at once.
+            if report.trajectory_id == id {
+                first_setpoint_ns.get_or_insert(report.time_ns);
+            }
+            say(report, phase)
+        })?)
     } else {
         None
     };
     let unmodelled_links = settings.robot.unmodelled_links.clone();
-    form.print(&Answer { arm: arm.name, planned, unmodelled_links, executed })
+    let stages = Stages::of(&planned, answered_ns, first_setpoint_ns);
+    form.print(&Answer { arm: arm.name, planned, unmodelled_links, stages, executed })
 }
 
 /// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
@@ -146,12 +196,20 @@ pub(crate) fn ask_while(
     request: &CheckedPlanRequest,
     meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
 ) -> Result<Planned, Failure> {
-    // A planner without a streamer has no pose to start from; saying so here is clearer than a time-out.
-    let (report, _) = client.report()?;
-    let limit_s = f64::from(request.deadline_ms) * 1e-3 + ANSWER_S + remaining_s(&report, request.when);
+    let remaining_s = match request.when {
+        // The planner looks at the streamer by itself, and at once.
+        When::AtOnce | When::Cancel => 0.0,
+        When::AfterCurrent | When::Queue => remaining_s(&client.report()?.0),
+    };
+    let limit_s = f64::from(request.deadline_ms) * 1e-3 + ANSWER_S + remaining_s;
+    let asked_ns = now_ns();
     let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
     match reply.outcome() {
-        PlanOutcome::Failed { reason } => Err(Failure::Refused(format!("no plan: {reason}"))),
+        PlanOutcome::Failed { reason } => {
+            // A planner without a streamer has no pose to start from.
+            client.report()?;
+            Err(Failure::Refused(format!("no plan: {reason}")))
+        }
         PlanOutcome::Planned { receipt: None, trajectory_id, .. } => Err(Failure::Failed(format!(
             "{PLANNER} sent trajectory {trajectory_id}, but the streamer gave no receipt; `taustream status` shows whether it runs"
         ))),
@@ -163,6 +221,7 @@ pub(crate) fn ask_while(
             strokes,
             how,
             receipt: Some(receipt),
+            stages,
         } => {
             let (from_s, tick) = accepted(&receipt, arm)?;
             Ok(Planned {
@@ -176,6 +235,8 @@ pub(crate) fn ask_while(
                 accepted: true,
                 from_s,
                 tick,
+                asked_ns,
+                planner_stages: stages,
             })
         }
     }
@@ -195,12 +256,7 @@ pub(crate) fn accepted(receipt: &Receipt, arm: &ArmName) -> Result<(f64, u64), F
 }
 
 /// How long a motion that must end first may still take.
-fn remaining_s(report: &Report, when: When) -> f64 {
-    match when {
-        When::AtOnce | When::Cancel => 0.0,
-        When::AfterCurrent | When::Queue => {
-            let left_s = (report.trajectory_duration_s - report.trajectory_s).max(0.0);
-            left_s * 100.0 / report.speed_percent.clamp(1.0, 100.0)
-        }
-    }
+fn remaining_s(report: &Report) -> f64 {
+    let left_s = (report.trajectory_duration_s - report.trajectory_s).max(0.0);
+    left_s * 100.0 / report.speed_percent.clamp(1.0, 100.0)
 }

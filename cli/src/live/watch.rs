@@ -40,7 +40,7 @@ enum Sink {
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &WatchArgs) -> Result<(), Failure> {
     interrupt::watch()?;
     // Limits make the bars; an arm whose settings have faults can be watched without.
-    let (arm, scale) = match arm::settings(settings) {
+    let (arm, scale) = match arm::settings_to_talk(settings) {
         Ok(settings) => (ArmName::of(&settings), Some(Scale::of(&settings))),
         Err(_) => (ArmName::read(settings)?, None),
     };

@@ -4,16 +4,15 @@
 //! be after the time that planning and sending have taken lately, and a later one is tried when the arm was faster. What
 //! takes too long is planned from where the motion ends: that pose does not move.
 use super::{Request, Service, failed, not_ready};
-use crate::in_motion::{CutPoint, NoReplacement, Replacement, Surroundings};
+use crate::in_motion::{CutPoint, Replacement, Surroundings};
 use crate::kind::PlannerKind;
 use crate::plan::PlanOptions;
 use crate::send::SentTrajectory;
 use crate::stream_cut::{age_s, rate};
 use std::time::{Duration, Instant};
 use taustream_messages::clock::now_ns;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::{Outcome, Phase, Rejection, Replaces, Report};
-use taustream_motion::JointArray;
 use tracing::info;
 
 /// How often a cut is tried before the end of the motion is taken instead.
@@ -59,9 +58,9 @@ impl Latency {
 enum Way {
     /// To rest as soon as possible.
     Taper,
-    /// From the state at the cut to the goal.
+    /// From the state at the cut to the goal; from the end of the motion where that is shorter.
     Direct,
-    /// To rest, and on to the goal.
+    /// To rest, and on to the goal; from the end of the motion where that is shorter.
     RestFirst,
     /// On to the goal from where the motion ends.
     End,
@@ -141,6 +140,7 @@ impl Service<'_> {
             if way == Way::RestFirst { SEARCH_S_MAX.min(options.deadline.as_secs_f64()) } else { 0.0 };
         let latency_s = (self.latency.quantile_s() + LATENCY_MARGIN_S + search_s) * f64::from(1 << number);
         let cut = self.cut(report, (requested.when, way), latency_s);
+        let end = self.cut(report, (requested.when, Way::End), latency_s);
         if way != Way::End && cut.at_s > cut.end_s - NEAR_END_S {
             return Ok(Tried::NoWay(format!(
                 "the motion ends at {:.3} s, before a cut could be kept",
@@ -153,29 +153,35 @@ impl Service<'_> {
         };
         let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
         let made = self.work(request, limited.deadline, |cancel| {
-            replacement(&Surroundings { robot, scene, cancel }, way, (&cut, &goal_rad), &limited)
+            let surroundings = Surroundings { robot, scene, cancel };
+            match way {
+                Way::Taper => surroundings.taper(&cut, &limited),
+                Way::Direct => surroundings.direct_or_after_end([&cut, &end], &goal_rad, &limited),
+                Way::RestFirst => surroundings.rest_first_or_after_end([&cut, &end], &goal_rad, &limited),
+                Way::End => surroundings.after_end((&end, &goal_rad), &limited),
+            }
         })?;
         let made = match made {
             Ok(made) => made,
             Err(e) => return Ok(Tried::NoWay(e.to_string())),
         };
-        let planning_s = begun.elapsed().as_secs_f64();
+        let (planning_s, proven_ns) = (begun.elapsed().as_secs_f64(), now_ns());
         if !request.is_connected() {
             return Ok(Tried::Done(failed("the client has disconnected; motion not sent")));
         }
-        let replaces = Replaces::Cut { trajectory_id: cut.trajectory_id, at_s: cut.at_s };
         let sent = self
             .outbox
-            .send_after(self.robot, report, (&made.trajectory, replaces), super::RECEIPT_WITHIN)
+            .send_after(self.robot, report, (&made.trajectory, made.replaces), super::RECEIPT_WITHIN)
             .map_err(|e| e.to_string())?;
         // What came too late counts as well: the next one is aimed further ahead.
         self.latency.note((begun.elapsed().as_secs_f64() - search_s).max(0.0));
         if let Some(Outcome::Rejected(rejection)) = sent.receipt.and_then(|receipt| receipt.outcome())
-            && is_too_late(&rejection, cut.from_s < cut.at_s)
+            && is_too_late(&rejection, made.replaces != end.replaces() && cut.from_s < cut.at_s)
         {
             return Ok(Tried::TooLate(rejection));
         }
-        Ok(Tried::Done(outcome(&sent, made, (cut.at_s, planning_s))))
+        let stages = PlanStages { planned_ns: made.planned_ns, ..self.stages(&sent, proven_ns) };
+        Ok(Tried::Done(outcome(&sent, made, (planning_s, stages))))
     }
 
     /// What is cut, and when, for a replacement that reaches the streamer within `latency_s`.
@@ -209,20 +215,6 @@ fn since_s(report: &Report) -> f64 {
     age_s(report, now_ns())
 }
 
-fn replacement(
-    surroundings: &Surroundings,
-    way: Way,
-    (cut, goal_rad): (&CutPoint, &JointArray),
-    options: &PlanOptions,
-) -> Result<Replacement, NoReplacement> {
-    match way {
-        Way::Taper => surroundings.taper(cut, options),
-        Way::Direct => surroundings.direct((cut, goal_rad), options),
-        Way::RestFirst => surroundings.rest_first((cut, goal_rad), options),
-        Way::End => surroundings.after_end((cut, goal_rad), options),
-    }
-}
-
 /// Refusals that another try, from the state of then, may not meet; `folded_early`: strokes were folded at another instant than
 /// the cut.
 pub(super) fn is_too_late(rejection: &Rejection, folded_early: bool) -> bool {
@@ -247,7 +239,11 @@ pub(super) fn is_too_late(rejection: &Rejection, folded_early: bool) -> bool {
     }
 }
 
-fn outcome(sent: &SentTrajectory, made: Replacement, (at_s, planning_s): (f64, f64)) -> PlanOutcome {
+fn outcome(sent: &SentTrajectory, made: Replacement, (planning_s, stages): (f64, PlanStages)) -> PlanOutcome {
+    let at_s = match made.replaces {
+        Replaces::Cut { at_s, .. } => at_s,
+        Replaces::Rest => 0.0,
+    };
     PlanOutcome::Planned {
         trajectory_id: sent.trajectory_id,
         planning_s,
@@ -256,6 +252,7 @@ fn outcome(sent: &SentTrajectory, made: Replacement, (at_s, planning_s): (f64, f
         strokes: u32::try_from(made.trajectory.strokes().len()).unwrap_or(u32::MAX),
         how: made.how,
         receipt: sent.receipt.map(Box::new),
+        stages,
     }
 }
 

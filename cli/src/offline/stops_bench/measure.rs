@@ -7,7 +7,7 @@ use rsruckig::prelude::{
 use std::path::Path;
 use std::time::Instant;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill};
+use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
 use taustream_motion::time_scale::TimeScale;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
@@ -101,7 +101,7 @@ impl Motion {
     fn stop(&self, request: SpeedRequest, (from_s, speed): (f64, f64)) -> (Stopped, f64) {
         let end_s = self.trajectory.duration_s();
         let mut scale = TimeScale::settled(speed);
-        let ahead = PeaksAhead::new(&self.cells, end_s);
+        let ahead = PeaksAhead::new(&self.cells, span_s(&self.trajectory));
         let situation = Situation { now_s: 0.0, s: from_s, ahead, approaching: false, waits_s: 0.0 };
         let begun = Instant::now();
         self.rules.apply(request, &mut scale, &situation);

@@ -2,22 +2,14 @@
 mod paths;
 mod straight;
 
+use super::limit_sets::{LimitedArm, limit_sets};
 use crate::args::TimingArgs;
-use crate::arm;
 use crate::failure::Failure;
 use crate::output::{Form, write_whole};
 use paths::{PathRow, Sampled};
 use serde::Serialize;
 use std::fmt;
 use straight::StraightRow;
-use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
-
-/// Limits under a name.
-struct Arm {
-    name: String,
-    joints: usize,
-    limits: [JointLimits; MAX_JOINTS],
-}
 
 /// The measurement, for people and programs.
 #[derive(Serialize)]
@@ -42,14 +34,7 @@ impl Spread {
 
 /// Measures and prints.
 pub(super) fn run(form: Form, args: &TimingArgs) -> Result<(), Failure> {
-    let mut arms = Vec::new();
-    for given in &args.robot {
-        let robot = arm::robot(given)?;
-        arms.push(Arm { name: robot.name.clone(), joints: robot.joints.len(), limits: robot.limits() });
-    }
-    arms.push(even("like a Panda: 2.175, 15, 7500", [2.175, 15.0, 7500.0]));
-    arms.push(even("gentle: 3, 2, 10", [3.0, 2.0, 10.0]));
-    arms.push(even("slow: 0.5, 15, 150", [0.5, 15.0, 150.0]));
+    let arms = limit_sets(&args.robot)?;
     form.progress(format_args!("timing straight moves and paths under {} sets of limits ..", arms.len()));
     let straight = arms.iter().flat_map(|arm| straight::rows(arm, args)).collect();
     let (mut paths, mut sampled) = (Vec::new(), Vec::new());
@@ -63,13 +48,6 @@ pub(super) fn run(form: Form, args: &TimingArgs) -> Result<(), Failure> {
         write_whole(path, &lines.join(""))?;
     }
     form.print(&Answer { straight, paths })
-}
-
-/// Six joints of the same limits.
-fn even(name: &str, [velocity_rad_s, acceleration_rad_s2, jerk_rad_s3]: [f64; 3]) -> Arm {
-    let motion = LimitSet { velocity_rad_s, acceleration_rad_s2, jerk_rad_s3 };
-    let joint = JointLimits { motion, stop: motion, ..JointLimits::default() };
-    Arm { name: name.to_owned(), joints: 6, limits: [joint; MAX_JOINTS] }
 }
 
 impl fmt::Display for Answer {

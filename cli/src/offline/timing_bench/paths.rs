@@ -1,5 +1,5 @@
 //! Rounded paths of five random points against stops at every point.
-use super::{Arm, Spread};
+use super::{LimitedArm, Spread};
 use crate::args::TimingArgs;
 use serde::Serialize;
 use std::fmt;
@@ -51,7 +51,7 @@ impl Sampled {
         serde_json::to_string(self).map_or_else(|_| String::new(), |line| line + "\n")
     }
 
-    fn of(arm: &Arm, motion: &Trajectory, [blend_rad, length_rad, stops_s]: [f64; 3]) -> Self {
+    fn of(arm: &LimitedArm, motion: &Trajectory, [blend_rad, length_rad, stops_s]: [f64; 3]) -> Self {
         let limits = || arm.limits.iter().take(arm.joints).map(|l| l.motion);
         let duration_s = motion.duration_s();
         let at = |i: u32| motion.sample(duration_s * f64::from(i) / f64::from(SAMPLES)).position_rad;
@@ -69,7 +69,7 @@ impl Sampled {
     }
 }
 
-pub(super) fn rows(arm: &Arm, args: &TimingArgs) -> (Vec<PathRow>, Vec<Sampled>) {
+pub(super) fn rows(arm: &LimitedArm, args: &TimingArgs) -> (Vec<PathRow>, Vec<Sampled>) {
     let (mut rows, mut motions) = (Vec::new(), Vec::new());
     for blend_rad in BLENDS_RAD {
         rows.extend(row(arm, args, blend_rad, &mut motions));
@@ -77,7 +77,7 @@ pub(super) fn rows(arm: &Arm, args: &TimingArgs) -> (Vec<PathRow>, Vec<Sampled>)
     (rows, motions)
 }
 
-fn row(arm: &Arm, args: &TimingArgs, blend_rad: f64, motions: &mut Vec<Sampled>) -> Option<PathRow> {
+fn row(arm: &LimitedArm, args: &TimingArgs, blend_rad: f64, motions: &mut Vec<Sampled>) -> Option<PathRow> {
     let (mut ratios, mut times_us, mut rounded) = (Vec::new(), Vec::new(), 0);
     for number in 0..args.paths {
         let share = f64::from(number) / f64::from((args.paths - 1).max(1));

@@ -1,5 +1,5 @@
 //! Straight moves of all lengths against the jerk-limited optimum.
-use super::{Arm, Spread};
+use super::{LimitedArm, Spread};
 use crate::args::TimingArgs;
 use serde::Serialize;
 use std::fmt;
@@ -25,11 +25,11 @@ pub(super) struct StraightRow {
     shortest_strokes: bool,
 }
 
-pub(super) fn rows(arm: &Arm, args: &TimingArgs) -> Vec<StraightRow> {
+pub(super) fn rows(arm: &LimitedArm, args: &TimingArgs) -> Vec<StraightRow> {
     LENGTHS_RAD.iter().filter_map(|length_rad| row(arm, args, *length_rad)).collect()
 }
 
-fn row(arm: &Arm, args: &TimingArgs, length_rad: f64) -> Option<StraightRow> {
+fn row(arm: &LimitedArm, args: &TimingArgs, length_rad: f64) -> Option<StraightRow> {
     let mut rng = SeededRng::new(args.seed, length_rad.to_bits());
     let (mut ratios, mut times_us) = (Vec::new(), Vec::new());
     let (mut strokes, mut shortest_strokes) = (0, false);
