@@ -64,6 +64,8 @@ impl ArmFiles {
         let root = self.runtime.join(ROOT);
         let nodes = root.join("nodes");
         let mut found = self.segments();
+        // Sockets of events.
+        found.extend(self.in_directory(&root));
         found.extend(self.in_directory(&root.join("services")));
         found.extend(self.in_directory(&nodes));
         let directories = fs::read_dir(&nodes).into_iter().flatten().flatten().map(|entry| entry.path());

@@ -1,7 +1,7 @@
 //! Motions that are replaced while they run, over the real processes. The recording is checked to the bit, as for every scenario:
 //! each trajectory makes the setpoints from its cut on, and gives the same bits there as the one that it cuts.
 use crate::scenarios::{CheckMode, Goals, Scenario, arrive_within, enable, end_at};
-use crate::test_bench::TestBench;
+use crate::test_bench::{Stages, TestBench};
 use crate::virtual_arm::random::SeededRng;
 use anyhow::{Context, Result, ensure};
 use std::thread::sleep;
@@ -37,12 +37,14 @@ fn replans(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     };
     let mut rng = SeededRng::new(count, 1);
     let (mut in_motion, mut goal) = (0, 0);
+    let mut stages = Vec::new();
     for number in 0..count {
         let before = bench.report()?;
         goal = (goal + 1 + usize::try_from(number % 2)?) % goals.0.len();
-        bench
+        let motion = bench
             .replan(&goals.text(goal)?)
             .with_context(|| format!("replan {number}, the arm was {:?}", before.1))?;
+        stages.push(motion.stages);
         in_motion += u32::from(before.1 == Phase::Moving);
         sleep(Duration::from_millis(rng.whole(20, 900)));
         if number % 5 == 3 && bench.report()?.1 == Phase::Moving {
@@ -56,11 +58,34 @@ fn replans(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let report = arrive_within(bench, last, goals.rad(goal)?, AT_GOAL_RAD)?;
     ensure!(report.guard_trips == 0, "the guard tripped {} times", report.guard_trips);
     ensure!(in_motion >= 3, "only {in_motion} of {count} replans met an arm in motion");
+    print_stages(&stages);
     println!(
         "       {in_motion} of {count} replans met an arm in motion; {} trajectories accepted",
         report.accepted
     );
     Ok(())
+}
+
+/// Medians of what lies between the stages, ms, and what is not planning over what is. Nothing is asserted: the machine is slow.
+fn print_stages(stages: &[Stages]) {
+    let median_ms = |of: fn(&Stages) -> f64| {
+        let mut all: Vec<f64> = stages.iter().map(of).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(f64::NAN) * 1e3
+    };
+    let planning_ms = median_ms(|s| s.proven_s - s.received_s);
+    let total_ms = median_ms(|s| s.accepted_s - s.received_s);
+    println!(
+        "       medians (ms): command to request {:.2}, to the planner {:.2}, strokes {:.2}, proof {:.2}, to the receipt {:.2}, \
+         answer {:.2}; from request received to receipt over planning alone: {:.2}",
+        median_ms(|s| s.command_s),
+        median_ms(|s| s.received_s),
+        median_ms(|s| s.planned_s - s.received_s),
+        median_ms(|s| s.proven_s - s.planned_s),
+        median_ms(|s| s.accepted_s - s.proven_s),
+        median_ms(|s| s.answered_s - s.accepted_s),
+        total_ms / planning_ms
+    );
 }
 
 /// Goal: goals that are queued are reached one after the other.

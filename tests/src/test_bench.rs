@@ -125,6 +125,21 @@ pub struct Answer {
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct Motion {
     trajectory_id: u64,
+    /// When what was done.
+    pub stages: Stages,
+}
+
+/// When what was done for a request, s after it was sent.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[expect(missing_docs, reason = "docs/json.md has them")]
+pub struct Stages {
+    pub command_s: f64,
+    pub received_s: f64,
+    pub planned_s: f64,
+    pub proven_s: f64,
+    pub sent_s: f64,
+    pub accepted_s: f64,
+    pub answered_s: f64,
 }
 
 impl Motion {

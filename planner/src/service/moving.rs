@@ -21,8 +21,10 @@ const TRIES: u32 = 3;
 const END_TRIES: u32 = 4;
 /// What planning and sending are taken to last before they were measured, s.
 const LATENCY_S: f64 = 0.03;
-/// Added to what was measured: a few cycles, s.
+/// Added for a stream of targets: a few cycles, s.
 pub(super) const LATENCY_MARGIN_S: f64 = 0.005;
+/// Added for a request: what was measured includes the cycle that takes the replacement, s.
+const REQUEST_MARGIN_S: f64 = 0.0015;
 /// Most that a search for a way round obstacles may take while the arm moves on, s.
 const SEARCH_S_MAX: f64 = 0.2;
 /// Measurements that are kept, and the place of the one that counts among them, from the largest.
@@ -138,7 +140,7 @@ impl Service<'_> {
         let begun = Instant::now();
         let search_s =
             if way == Way::RestFirst { SEARCH_S_MAX.min(options.deadline.as_secs_f64()) } else { 0.0 };
-        let latency_s = (self.latency.quantile_s() + LATENCY_MARGIN_S + search_s) * f64::from(1 << number);
+        let latency_s = (self.latency.quantile_s() + REQUEST_MARGIN_S + search_s) * f64::from(1 << number);
         let cut = self.cut(report, (requested.when, way), latency_s);
         let end = self.cut(report, (requested.when, Way::End), latency_s);
         if way != Way::End && cut.at_s > cut.end_s - NEAR_END_S {

@@ -11,7 +11,8 @@ use taustream_tests::setpoints::{BusFrame, CheckResult, Encoding, Losses, check_
 use taustream_tests::test_bench::{Place, TestBench};
 use taustream_tests::traffic::as_plain;
 use taustream_tests::{
-    bus_scenarios, candump, cut_scenarios, cycle_log, restart_scenarios, stream_scenarios,
+    bus_scenarios, candump, cut_scenarios, cycle_log, disturbed_scenarios, restart_scenarios,
+    stream_scenarios,
 };
 
 /// Runs the scenarios over the real processes on a real vcan0.
@@ -55,6 +56,7 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let all = scenarios::ALL
         .iter()
         .chain(cut_scenarios::ALL)
+        .chain(disturbed_scenarios::ALL)
         .chain(stream_scenarios::ALL)
         .chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
