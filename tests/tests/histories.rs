@@ -14,8 +14,8 @@
 )]
 #[path = "histories/checks.rs"]
 mod checks;
-#[path = "histories/doctored.rs"]
-mod doctored;
+#[path = "histories/corrupted.rs"]
+mod corrupted;
 #[path = "../../streamer/tests/harness/mod.rs"]
 #[expect(dead_code, reason = "shared with the tests of the streamer, which use more of it")]
 mod harness;
@@ -65,8 +65,8 @@ impl Totals {
 fn history(seed: u64) -> Result<Log, String> {
     let again =
         format!("again: TAUSTREAM_HISTORY={seed} cargo test --workspace --test histories one_history");
-    let told = catch_unwind(AssertUnwindSafe(|| story::tell(seed)));
-    let log = told.map_err(|_| format!("seed {seed}: a panic; {again}"))?;
+    let ended = catch_unwind(AssertUnwindSafe(|| story::tell(seed)));
+    let log = ended.map_err(|_| format!("seed {seed}: a panic; {again}"))?;
     match violations(&log).first() {
         None => Ok(log),
         Some(first) => Err(format!("seed {seed}: {first}; {again}\n{}", log.story.join("\n"))),

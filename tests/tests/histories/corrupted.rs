@@ -4,11 +4,11 @@ use crate::log::Log;
 use crate::story;
 use taustream_messages::Phase;
 
-/// Seeds whose histories are doctored.
+/// Seeds whose histories are corrupted.
 const SEEDS: u64 = 60;
 
 /// Changes a log so that a rule is broken; false when there is nothing in it to change.
-type Doctor = fn(&mut Log) -> bool;
+type Corruption = fn(&mut Log) -> bool;
 
 /// The index of a cycle in the middle of those that fit, and that of its setpoint at the first drive.
 fn middle(log: &Log, fits: impl Fn(&crate::log::Cycle) -> bool) -> Option<(usize, usize)> {
@@ -29,7 +29,7 @@ fn shift(log: &mut Log, (at, drive): (usize, usize), by_rad: f64) -> bool {
     true
 }
 
-const DOCTORS: [(Rule, Doctor); 13] = [
+const CORRUPTIONS: [(Rule, Corruption); 13] = [
     (Rule::Continuity, |log| middle(log, moving).is_some_and(|at| shift(log, at, 0.2))),
     (Rule::StopRate, |log| {
         // A thousandth of a degree beside the others.
@@ -99,24 +99,24 @@ const DOCTORS: [(Rule, Doctor); 13] = [
     }),
 ];
 
-/// Goal: the checks find what they are there for. Method: sound histories whose logs are doctored, one rule after the other.
+/// Goal: the checks find what they are there for. Method: sound histories whose logs are corrupted, one rule after the other.
 #[test]
 fn every_rule_finds_the_fault_that_is_planted_for_it() {
     let logs: Vec<Log> = (0..SEEDS).map(story::tell).collect();
-    for (number, (rule, doctor)) in DOCTORS.into_iter().enumerate() {
+    for (number, (rule, corrupt)) in CORRUPTIONS.into_iter().enumerate() {
         let mut tried = 0;
         for (seed, log) in logs.iter().enumerate() {
-            let mut doctored = log.clone();
-            if doctor(&mut doctored) {
-                let found = violations(&doctored);
+            let mut corrupted = log.clone();
+            if corrupt(&mut corrupted) {
+                let found = violations(&corrupted);
                 tried += u32::from(found.iter().any(|violation| violation.rule == rule));
                 assert!(
                     rule == Rule::StopRate || rule == Rule::Stop || !found.is_empty(),
-                    "seed {seed}, doctor {number}: {rule:?} is not found"
+                    "seed {seed}, corruption {number}: {rule:?} is not found"
                 );
             }
         }
         println!("{rule:?}: found in {tried} of {SEEDS} histories");
-        assert!(tried > 3, "doctor {number}: {rule:?} is found in {tried} histories only");
+        assert!(tried > 3, "corruption {number}: {rule:?} is found in {tried} histories only");
     }
 }
