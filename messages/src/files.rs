@@ -64,14 +64,14 @@ impl ArmFiles {
         let root = self.runtime.join(ROOT);
         let nodes = root.join("nodes");
         let mut found = self.segments();
-        // Sockets of events.
-        found.extend(self.in_directory(&root));
         found.extend(self.in_directory(&root.join("services")));
         found.extend(self.in_directory(&nodes));
         let directories = fs::read_dir(&nodes).into_iter().flatten().flatten().map(|entry| entry.path());
         // The directory of a node bears the node's number only; what is in it bears the arm's name.
         let directories: Vec<PathBuf> = directories.filter(|path| path.is_dir()).collect();
         found.extend(directories.iter().flat_map(|node| self.in_directory(node)));
+        // Sockets of events.
+        found.extend(self.in_directory(&root));
         for path in found {
             let _gone_or_not_ours =
                 if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
