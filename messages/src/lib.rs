@@ -21,6 +21,7 @@ pub mod report;
 pub mod service;
 pub mod target;
 pub mod text;
+pub mod tip_goal;
 pub mod trajectory;
 
 pub use bus::{BUSES_MAX, BusReport};

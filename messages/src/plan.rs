@@ -1,4 +1,5 @@
 //! Replan requests to the planner and its answers (request-response).
+use crate::tip_goal::{TipGoal, TipGoalWire};
 use crate::{LAYOUT_VERSION, Receipt, Text};
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -29,6 +30,7 @@ pub struct PlanRequest {
     planner: Text,
     sender_pid: u32,
     reserved: u32,
+    tip: TipGoalWire,
 }
 
 impl PlanRequest {
@@ -44,8 +46,10 @@ impl PlanRequest {
 pub struct CheckedPlanRequest {
     /// How many joints the goal has.
     pub joints: usize,
-    /// Where to go.
+    /// Where to go, unless the tip has a goal.
     pub goal_rad: JointArray,
+    /// Where the tip shall end, instead.
+    pub tip: Option<TipGoal>,
     /// When to replace it.
     pub when: When,
     /// How long planning may take.
@@ -79,6 +83,20 @@ pub enum PlanRequestError {
         /// The value in the message.
         value_rad: f64,
     },
+    /// A number of the tip's goal.
+    #[error("the tip's {what} is {value}, which makes no sense")]
+    Tip {
+        /// Which one.
+        what: &'static str,
+        /// The value in the message.
+        value: f64,
+    },
+    /// No kind of goal.
+    #[error("unknown kind of goal {got}; the sender is of another release, or no sender of this project")]
+    GoalKind {
+        /// The bits in the message.
+        got: u32,
+    },
     /// None of those that exist.
     #[error("unknown start code {got}; 0 (at once), 1 (after current), 2 (queue) or 3 (cancel)")]
     When {
@@ -104,6 +122,7 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             planner: Text::new(&r.planner),
             sender_pid: std::process::id(),
             reserved: 0,
+            tip: TipGoalWire::from(r.tip.as_ref()),
         }
     }
 }
@@ -134,6 +153,7 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
         Ok(Self {
             joints,
             goal_rad: r.goal_rad,
+            tip: r.tip.read()?,
             when,
             deadline_ms: r.deadline_ms,
             seed: r.seed,
@@ -271,5 +291,5 @@ impl PlanReply {
     }
 }
 
-const _: () = assert!(size_of::<PlanRequest>() == 344);
+const _: () = assert!(size_of::<PlanRequest>() == 464);
 const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248);

@@ -3,10 +3,11 @@
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanRequestError, PlanStages, When};
 use taustream_messages::target::{
     CheckedTargets, DUE_S_MAX, TARGETS_MAX, Target, TargetError, TargetOutcome,
 };
+use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::trajectory::{Corrupted, MessageError};
 use taustream_messages::{
     CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome, Phase, PlanReply,
@@ -28,7 +29,7 @@ fn bytes_of(size: usize) -> impl Strategy<Value = Vec<u8>> {
     // Mostly zero bytes reach deeper than noise, which fails at the layout version.
     let sparse = proptest::collection::vec((0..size, any::<u8>()), 0..40).prop_map(move |writes| {
         let mut bytes = vec![0; size];
-        bytes[0] = 1;
+        bytes[..4].copy_from_slice(&LAYOUT_VERSION.to_ne_bytes());
         for (at, byte) in writes {
             bytes[at] = byte;
         }
@@ -206,12 +207,68 @@ fn command_survives_the_wire_and_bad_ones_are_named() {
 }
 
 #[test]
+fn goals_of_the_tip_survive_the_wire_and_numbers_that_make_no_sense_are_refused() {
+    let tip = TipGoal {
+        position_m: [0.4, -0.3, 0.35],
+        tolerance_m: 1e-3,
+        orientation: Some(TipOrientation {
+            quaternion_xyzw: [0.0, 0.6, 0.0, 0.8],
+            tolerance_rad: [0.01, 0.02, f64::INFINITY],
+        }),
+        line: Some(TipLine { linear_m_s: 0.1, angular_rad_s: 1.0, off_m_max: 1e-3 }),
+    };
+    let request = |tip: TipGoal| CheckedPlanRequest {
+        joints: 6,
+        goal_rad: [0.0; MAX_JOINTS],
+        tip: Some(tip),
+        when: When::AtOnce,
+        deadline_ms: 100,
+        seed: 1,
+        planner: String::new(),
+    };
+    let sent = |tip: TipGoal| CheckedPlanRequest::try_from(&PlanRequest::from(&request(tip)));
+    for tip in [
+        tip,
+        TipGoal { orientation: None, ..tip },
+        TipGoal { line: None, ..tip },
+        TipGoal { orientation: None, line: None, ..tip },
+    ] {
+        assert_eq!(sent(tip), Ok(request(tip)));
+    }
+    let turned = |quaternion_xyzw: [f64; 4], tolerance_rad: [f64; 3]| TipGoal {
+        orientation: Some(TipOrientation { quaternion_xyzw, tolerance_rad }),
+        ..tip
+    };
+    let straight = |linear_m_s: f64| TipGoal {
+        line: Some(TipLine { linear_m_s, angular_rad_s: 1.0, off_m_max: 1e-3 }),
+        ..tip
+    };
+    for bad in [
+        TipGoal { position_m: [f64::NAN, 0.0, 0.0], ..tip },
+        TipGoal { position_m: [0.0, f64::INFINITY, 0.0], ..tip },
+        TipGoal { tolerance_m: -1e-3, ..tip },
+        TipGoal { tolerance_m: f64::INFINITY, ..tip },
+        turned([0.0; 4], [0.0; 3]),
+        turned([f64::NAN; 4], [0.0; 3]),
+        turned([0.0, 0.0, 0.0, 1.0], [-0.1, 0.0, 0.0]),
+        turned([0.0, 0.0, 0.0, 1.0], [f64::NAN, 0.0, 0.0]),
+        straight(0.0),
+        straight(f64::NAN),
+        straight(f64::INFINITY),
+    ] {
+        let error = sent(bad).unwrap_err();
+        assert!(matches!(error, PlanRequestError::Tip { .. }), "{bad:?}: {error}");
+    }
+}
+
+#[test]
 fn plan_request_and_answer_survive_the_wire() {
     let mut goal_rad = [0.0; MAX_JOINTS];
     goal_rad[5] = -1.25;
     let request = CheckedPlanRequest {
         joints: 6,
         goal_rad,
+        tip: None,
         when: When::AfterCurrent,
         deadline_ms: 1500,
         seed: 42,

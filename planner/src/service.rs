@@ -6,6 +6,7 @@
 //! no client waits for the arm to move.
 mod moving;
 mod streaming;
+mod tip;
 
 use crate::kind::PlannerKind;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
@@ -25,7 +26,8 @@ use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::service::{PlanServer, ServiceError, TargetServer, Wire};
-use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces};
+use taustream_messages::tip_goal::TipGoal;
+use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
 use tracing::{info, warn};
 
@@ -210,6 +212,9 @@ impl<'a> Service<'a> {
         let options = options(requested)?;
         let (report, phase) = self.outbox.current_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
+        if let Some(tip) = requested.tip.filter(|_| requested.when != When::Cancel) {
+            return self.go_to_tip(request, (requested, &options), (&tip, &report, phase));
+        }
         match (phase, requested.when) {
             (Phase::Holding, When::Cancel) => Err("nothing runs that could be cancelled".to_owned()),
             (Phase::Holding, When::AtOnce | When::AfterCurrent | When::Queue) if report.energised == 1 => {
@@ -220,6 +225,33 @@ impl<'a> Service<'a> {
                 self.replan_in_motion(request, (requested, &options), report)
             }
             _ => Err(not_ready(phase)),
+        }
+    }
+
+    /// Goes to a position or a pose of the tip.
+    fn go_to_tip(
+        &mut self,
+        request: &Request,
+        (requested, options): (&CheckedPlanRequest, &PlanOptions),
+        (tip, report, phase): (&TipGoal, &Report, Phase),
+    ) -> Result<PlanOutcome, String> {
+        let rests = phase == Phase::Holding && report.energised == 1;
+        match &tip.line {
+            Some(line) if rests => {
+                let plan = self.plan_straight(request, report.command_rad, (tip, line, options))?;
+                Ok(self.send(request, &plan))
+            }
+            Some(_) if moving::runs(phase) => {
+                Err("a straight line of the tip begins at rest; wait until the motion has ended".to_owned())
+            }
+            None if rests || moving::runs(phase) => {
+                let near_rad = match requested.when {
+                    When::AfterCurrent | When::Queue if !rests => report.end_rad,
+                    When::AtOnce | When::AfterCurrent | When::Queue | When::Cancel => report.command_rad,
+                };
+                self.answer_tip(request, (requested, options), (tip, near_rad))
+            }
+            Some(_) | None => Err(not_ready(phase)),
         }
     }
 

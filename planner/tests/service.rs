@@ -174,7 +174,15 @@ fn with_service_of(
 }
 
 fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanRequest {
-    CheckedPlanRequest { joints: 6, goal_rad, when, deadline_ms: 1_000, seed: 3, planner: planner.to_owned() }
+    CheckedPlanRequest {
+        joints: 6,
+        goal_rad,
+        tip: None,
+        when,
+        deadline_ms: 1_000,
+        seed: 3,
+        planner: planner.to_owned(),
+    }
 }
 
 /// Asks and waits for the answer.

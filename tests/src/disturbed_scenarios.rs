@@ -143,6 +143,7 @@ fn floods(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let malformed = PlanRequest::from(&CheckedPlanRequest {
         joints: bench.settings.robot.joints.len(),
         goal_rad: [f64::NAN; MAX_JOINTS],
+        tip: None,
         when: When::AtOnce,
         deadline_ms: 1,
         seed: 1,

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use clap::{ArgGroup, Args};
 use taustream_arm::Robot;
 use taustream_motion::JointArray;
-use taustream_planner::goals::{Orientation, TipTarget, nearest_turn};
+use taustream_planner::goals::{Orientation, TipSpeed, TipTarget, nearest_turn};
 
 /// A goal.
 #[derive(Args, Debug)]
@@ -57,6 +57,18 @@ pub(crate) struct GoalArgs {
         conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_position"]
     )]
     tolerance_rad: Tolerances,
+    /// Lead the tip straight to --to-position (its orientation stays) or --to-pose (it turns evenly).
+    #[arg(long, conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg"])]
+    pub(crate) linear: bool,
+    /// Speed of the tip along the straight line, m/s.
+    #[arg(long, value_name = "M_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().linear_m_s, requires = "linear")]
+    tip_speed_m_s: f64,
+    /// Turning speed of the tip along the straight line, rad/s.
+    #[arg(long, value_name = "RAD_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().angular_rad_s, requires = "linear")]
+    tip_speed_rad_s: f64,
+    /// How far the tip may be from the straight line, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = TipSpeed::default().off_m_max, requires = "linear")]
+    line_off_m: f64,
     /// Take each joint with more than one turn to the nearest angle at which its link stands as in the goal.
     #[arg(long, conflicts_with_all = ["by", "by_deg", "to_position", "to_pose"])]
     nearest_turn: bool,
@@ -97,10 +109,22 @@ impl GoalArgs {
         Ok(Goal::Poses(poses_rad))
     }
 
+    /// How the tip goes along a straight line.
+    pub(crate) fn tip_speed(&self) -> TipSpeed {
+        let (linear_m_s, angular_rad_s, off_m_max) =
+            (self.tip_speed_m_s, self.tip_speed_rad_s, self.line_off_m);
+        TipSpeed { linear_m_s, angular_rad_s, off_m_max }
+    }
+
     /// The poses that were given as angles, and the option that gave them.
     pub(crate) fn angles(&self) -> impl Iterator<Item = (&Angles, &'static str)> {
         let in_rad = self.goal.iter().map(|angles| (angles, "--goal"));
         in_rad.chain(self.goal_deg.iter().map(|angles| (angles, "--goal-deg")))
+    }
+
+    /// True when the goal depends on where the arm starts.
+    pub(crate) fn needs_start(&self) -> bool {
+        self.nearest_turn || self.relative().is_some()
     }
 
     fn relative(&self) -> Option<(&Angles, &'static str)> {

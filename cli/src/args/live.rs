@@ -1,6 +1,6 @@
 //! Arguments of the commands that talk to the running streamer and planner.
+use super::goal::GoalArgs;
 use super::offline::{TrajectoryArg, planner_kind};
-use crate::angles::Angles;
 use clap::Args;
 use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;
@@ -74,6 +74,9 @@ fn angle_rad(text: &str) -> Result<f64, String> {
 const REPLAN_HELP: &str = "\
 Examples:
   taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait
+  taustream replan --to-pose 0.4,-0.3,0.35,3.1416,0,0 --tolerance-rad 0.01,0.01,free
+  taustream replan --to-position 0.4,-0.3,0.25 --linear --tip-speed-m-s 0.1 --wait
+  taustream replan --to-named home
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
   taustream replan --goal \"..\" && taustream replan --goal \"..\" --queue && taustream replan --goal \"..\" --queue
 
@@ -86,12 +89,9 @@ whether, and from when, it runs. Exit code 0 means: accepted (with --wait: execu
 #[derive(Args, Debug)]
 #[command(after_help = REPLAN_HELP)]
 pub(crate) struct ReplanArgs {
-    /// Goal pose, rad, one value per joint; a value may have a unit: "90deg".
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, required_unless_present = "goal_deg")]
-    goal: Option<Angles>,
-    /// The same in degrees.
-    #[arg(long, value_name = "DEG,..", allow_hyphen_values = true, value_parser = Angles::of_degrees, conflicts_with = "goal")]
-    goal_deg: Option<Angles>,
+    /// Where to go.
+    #[command(flatten)]
+    pub(crate) goal: GoalArgs,
     /// Leave the running motion as soon as the new one is planned (the default).
     #[arg(long, conflicts_with_all = ["after_current", "queue"])]
     at_once: bool,
@@ -122,15 +122,6 @@ impl ReplanArgs {
             (true, _) => When::AfterCurrent,
             (_, true) => When::Queue,
             (false, false) => When::AtOnce,
-        }
-    }
-
-    /// Where to go, and the option that says so. One of the two is there: clap asks for it.
-    pub(crate) fn goal(&self) -> (&Angles, &'static str) {
-        match (&self.goal, &self.goal_deg) {
-            (None, Some(angles)) => (angles, "--goal-deg"),
-            (Some(angles), _) => (angles, "--goal"),
-            (None, None) => (Angles::NONE, "--goal"),
         }
     }
 }

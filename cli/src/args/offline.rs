@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_optimizers::{METHODS, Method, Reading};
-use taustream_planner::goals::TipSpeed;
 use taustream_planner::{Blend, Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\
@@ -47,18 +46,6 @@ pub(crate) struct PlanArgs {
     /// Where to go.
     #[command(flatten)]
     pub(crate) goal: GoalArgs,
-    /// Lead the tip straight to --to-position (its orientation stays) or --to-pose (it turns evenly).
-    #[arg(long, conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "via", "reach_with", "blend_rad", "blend_m"])]
-    pub(crate) linear: bool,
-    /// Speed of the tip along the straight line, m/s.
-    #[arg(long, value_name = "M_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().linear_m_s, requires = "linear")]
-    tip_speed_m_s: f64,
-    /// Turning speed of the tip along the straight line, rad/s.
-    #[arg(long, value_name = "RAD_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().angular_rad_s, requires = "linear")]
-    tip_speed_rad_s: f64,
-    /// How far the tip may be from the straight line, m.
-    #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = TipSpeed::default().off_m_max, requires = "linear")]
-    line_off_m: f64,
     /// Pose to pass on the way, rad; give it once for each pose, in their order.
     ///
     /// The motion keeps within the blend of the straight lines that join the poses.
@@ -67,13 +54,13 @@ pub(crate) struct PlanArgs {
     /// How far from its path the motion may be at corners: length of the difference of all joints, rad; 0 stops at each.
     ///
     /// Without it, corners are rounded as far as the scene's margins allow, up to 0.4 rad.
-    #[arg(long, value_name = "RAD", allow_negative_numbers = true, value_parser = blend_amount)]
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true, conflicts_with = "linear", value_parser = blend_amount)]
     blend_rad: Option<f64>,
     /// The same as a distance by which any point of the arm may be off, m.
-    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "blend_rad", value_parser = blend_amount)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with_all = ["blend_rad", "linear"], value_parser = blend_amount)]
     blend_m: Option<f64>,
     /// Search poses for --to-position by a swarm (an optimiser by name) instead of inverse kinematics.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_pose"], value_parser = method())]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_pose", "linear"], value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
     /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
@@ -103,13 +90,6 @@ impl PlanArgs {
             (Some(angles), _) => (angles, "--start"),
             (None, None) => (Angles::NONE, "--start"),
         }
-    }
-
-    /// How the tip goes along a straight line.
-    pub(crate) fn tip_speed(&self) -> TipSpeed {
-        let (linear_m_s, angular_rad_s, off_m_max) =
-            (self.tip_speed_m_s, self.tip_speed_rad_s, self.line_off_m);
-        TipSpeed { linear_m_s, angular_rad_s, off_m_max }
     }
 
     /// How far from its corners the motion may pass.

@@ -103,6 +103,7 @@ impl<'a> Session<'a> {
         let request = CheckedPlanRequest {
             joints: demo.settings.robot.joints.len(),
             goal_rad: *goal_rad,
+            tip: None,
             when: When::AtOnce,
             deadline_ms: DEADLINE_MS,
             seed: 1,

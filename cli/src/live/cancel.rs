@@ -20,6 +20,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &CancelArgs) -> Res
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),
         goal_rad: [0.0; MAX_JOINTS],
+        tip: None,
         when: When::Cancel,
         deadline_ms: DEADLINE_MS,
         seed: 1,

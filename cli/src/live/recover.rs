@@ -37,6 +37,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Re
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),
         goal_rad: entry.pose_rad,
+        tip: None,
         when: When::AtOnce,
         deadline_ms: args.deadline_ms,
         seed: 1,

@@ -1,7 +1,7 @@
 //! `taustream replan`: asks the running planner for a motion to a new goal.
 use super::client::{Client, PLANNER};
 use super::follow::{Executed, follow, say_pauses};
-use crate::args::ReplanArgs;
+use crate::args::{Goal, ReplanArgs};
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::offline::verify::Unmodelled;
@@ -16,8 +16,11 @@ use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
-use taustream_messages::{Outcome, PlanRequest, Receipt, Report};
-use taustream_planner::PlannerKind;
+use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
+use taustream_messages::{Outcome, Phase, PlanRequest, Receipt, Report};
+use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::goals::TipSpeed;
+use taustream_planner::{PlannerKind, TipTarget};
 
 /// What a planner may take beyond its deadline: verification, sending, and the streamer's receipt.
 const ANSWER_S: f64 = 5.0;
@@ -134,28 +137,62 @@ pub(crate) struct Wanted {
 /// Asks, prints the receipt, and waits for the end of the motion if requested.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
     let settings = arm::settings_to_talk(settings)?;
-    let arm = ArmName::of(&settings);
-    let (goal, option) = args.goal();
-    let goal_rad = goal.pose_of(&settings.robot, option)?;
-    let client = Client::join(&arm.name)?;
+    let client = Client::join(&settings.name)?;
+    let goal_rad = |start_rad: &JointArray| -> Result<(JointArray, Option<TipGoal>), Failure> {
+        match args.goal.of(&settings.robot, start_rad)? {
+            Goal::Poses(poses) if poses.len() > 1 => {
+                Err(Failure::Usage("replan takes one goal; `taustream plan` compares several".to_owned()))
+            }
+            Goal::Poses(poses) => Ok((poses.first().copied().unwrap_or_default(), None)),
+            Goal::Tip(target) => Ok((
+                [0.0; MAX_JOINTS],
+                Some(tip_goal(&target, args.goal.linear.then(|| args.goal.tip_speed()))),
+            )),
+        }
+    };
+    let (goal_rad, tip) =
+        goal_rad(&if args.goal.needs_start() { start_rad(&client)? } else { [0.0; MAX_JOINTS] })?;
     let wanted =
         Wanted { when: args.when(), deadline_ms: args.deadline_ms, seed: args.seed, planner: args.planner };
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),
         goal_rad,
+        tip,
         when: wanted.when,
         deadline_ms: wanted.deadline_ms,
         seed: wanted.seed,
         planner: wanted.planner.name().to_owned(),
     };
     go(form, (&client, &settings), &request, args.wait).map_err(|failure| {
-        match args.goal().0.degrees_hint(&settings.robot) {
+        let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(&settings.robot));
+        match hint {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))
             }
             _ => failure,
         }
     })
+}
+
+/// Where the arm is commanded to be at rest: now, or at the end of what runs.
+fn start_rad(client: &Client) -> Result<JointArray, Failure> {
+    let (report, phase) = client.report()?;
+    let runs = matches!(phase, Phase::Moving | Phase::Pausing | Phase::Paused);
+    Ok(if runs { report.end_rad } else { report.command_rad })
+}
+
+/// A target of the tip as the planner takes it.
+fn tip_goal(target: &TipTarget, speed: Option<TipSpeed>) -> TipGoal {
+    let orientation = target.orientation.map(|o| TipOrientation {
+        quaternion_xyzw: o.rotation.coords.into(),
+        tolerance_rad: o.tolerance_rad,
+    });
+    let line = speed.map(|TipSpeed { linear_m_s, angular_rad_s, off_m_max }| TipLine {
+        linear_m_s,
+        angular_rad_s,
+        off_m_max,
+    });
+    TipGoal { position_m: target.position_m, tolerance_m: target.tolerance_m, orientation, line }
 }
 
 /// Asks the planner, prints the receipt, and waits for the end of the motion if requested.

@@ -105,7 +105,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
     let found = match args.goal.of(&robot, &start_rad)? {
-        Goal::Tip(target) if args.linear => straight(&situation, &target, args)
+        Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args)
             .map_err(|error| Failure::Refused(format!("no plan: {error}")))
             .map(Ok)?,
         Goal::Tip(target) => to_tip(&situation, &target, (args, &options)),
@@ -133,7 +133,7 @@ struct Planned {
 
 fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, LineError> {
     let started = Instant::now();
-    let Line { imported, length_m, off_m, .. } = plan_line(situation, target, &args.tip_speed())?;
+    let Line { imported, length_m, off_m, .. } = plan_line(situation, target, &args.goal.tip_speed())?;
     let (trajectory, proof) = (imported.trajectory, imported.proof);
     let tip = Some((*target, target.error(situation.robot, &trajectory.end_rad())));
     let score = proof.duration_s;

@@ -33,7 +33,7 @@ pub use target::{ERROR_M_MAX, ERROR_RAD_MAX, Orientation, TipError, TipTarget};
 pub use turns::nearest_turn;
 
 /// Poses to which motions are planned; more only while there is none.
-const GOALS_MAX: usize = 4;
+pub(crate) const GOALS_MAX: usize = 4;
 /// Rounding of forward kinematics, as a share of the arm's reach: a few dozen operations in f64.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
@@ -100,6 +100,26 @@ pub fn plan_to_tip(
     let mut error = target.error(robot, &plan.trajectory.end_rad());
     error.position_m += ROUNDING * reach_m;
     Ok(Reached { plan, pose_rad, error, tries: poses.tries, poses: poses.clear.len() })
+}
+
+/// Clear poses whose tip is at a target, those that take least time from the start first.
+///
+/// # Errors
+/// How far out of reach it is, or what is in the way there.
+pub fn tip_poses(
+    situation: &Situation,
+    target: &TipTarget,
+    options: &PlanOptions,
+    cancel: Option<&AtomicBool>,
+) -> Result<Vec<JointArray>, GoalError> {
+    let Situation { robot, scene, start_rad, .. } = *situation;
+    let budget = Budget::until(options.clock(), cancel);
+    check_target(target)?;
+    let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
+    let reach_m = check_reach(robot, target)?;
+    let (reading, seed, finder) = (options.reading, options.seed, Finder::Inverse);
+    let search = Search { world: &world, budget: &budget, start_rad, target, reach_m, finder, reading, seed };
+    Ok(search.run(options.deadline)?.clear)
 }
 
 /// Plans a verified motion to the best of several poses.

@@ -1,0 +1,69 @@
+//! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
+use super::{Request, Service};
+use crate::goals::{
+    GOALS_MAX, GoalError, Line, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses,
+};
+use crate::plan::{Plan, PlanOptions, StartMargin};
+use nalgebra::{Quaternion, UnitQuaternion};
+use std::time::Instant;
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome};
+use taustream_messages::tip_goal::{TipGoal, TipLine};
+use taustream_motion::JointArray;
+
+/// The target of a goal in the library's words.
+fn target(tip: &TipGoal) -> TipTarget {
+    let orientation = tip.orientation.map(|o| {
+        let [x, y, z, w] = o.quaternion_xyzw;
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        Orientation { rotation, tolerance_rad: o.tolerance_rad }
+    });
+    TipTarget { position_m: tip.position_m, tolerance_m: tip.tolerance_m, orientation }
+}
+
+impl Service<'_> {
+    fn situation(&self, start_rad: JointArray) -> Situation<'_> {
+        Situation { robot: self.robot, scene: self.scene, start_rad, margin: StartMargin::AsItStands }
+    }
+
+    /// Goes to the nearest pose with the tip at its goal; to the next one where no motion is found.
+    pub(super) fn answer_tip(
+        &mut self,
+        request: &Request,
+        (requested, options): (&CheckedPlanRequest, &PlanOptions),
+        (tip, near_rad): (&TipGoal, JointArray),
+    ) -> Result<PlanOutcome, String> {
+        let (situation, target) = (self.situation(near_rad), target(tip));
+        let poses = self.work(request, options.deadline, |cancel| {
+            tip_poses(&situation, &target, options, Some(cancel))
+        })?;
+        let poses = poses.map_err(|e: GoalError| e.to_string())?;
+        let mut why = GoalError::NoTime.to_string();
+        for goal_rad in poses.into_iter().take(GOALS_MAX) {
+            let nearest = CheckedPlanRequest { goal_rad, tip: None, ..requested.clone() };
+            match self.answer(request, &nearest) {
+                Err(reason) => why = reason,
+                done => return done,
+            }
+        }
+        Err(why)
+    }
+
+    /// Leads the tip straight to its goal from a pose at rest.
+    pub(super) fn plan_straight(
+        &self,
+        request: &Request,
+        start_rad: JointArray,
+        (tip, line, options): (&TipGoal, &TipLine, &PlanOptions),
+    ) -> Result<Plan, String> {
+        let started = Instant::now();
+        let (situation, target) = (self.situation(start_rad), target(tip));
+        let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
+        let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
+        let planned = self.work(request, options.deadline, |_| plan_line(&situation, &target, &speed))?;
+        let Line { imported, off_m, .. } = planned.map_err(|e| e.to_string())?;
+        let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * off_m);
+        let (score, planning_s) = (imported.proof.duration_s, started.elapsed().as_secs_f64());
+        let (trajectory, proof) = (imported.trajectory, imported.proof);
+        Ok(Plan { trajectory, how, proof, score, energy_j: None, planning_s, checks: 0 })
+    }
+}
