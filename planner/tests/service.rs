@@ -10,6 +10,7 @@ use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
 use taustream_messages::service::Wire;
 use taustream_messages::target::{CheckedTargets, Target, TargetOutcome};
+use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::{
     CheckedTrajectory, LAYOUT_VERSION, Outcome, Phase, PlanRequest, Receipt, Rejection, Replaces, Report,
     TargetRequest,
@@ -261,6 +262,50 @@ fn service_replan_from_inside_the_margin_is_planned_and_says_so() {
         let PlanOutcome::Planned { how, .. } = outcome else { panic!() };
         let said = "margin 0.0112 m for the first ";
         assert!(how.starts_with(said) && how.contains("nearer to ball than 0.0200 m"), "{how}");
+    });
+}
+
+/// Goal: what `plan` goes to, the service goes to: the tip at a position, in a pose, and along a straight line.
+#[test]
+fn service_goals_of_the_tip_are_planned_at_rest_and_in_motion_and_lines_at_rest_only() {
+    let played = Played::new(Phase::Holding);
+    with_service("tip", &played, |arm, robot| {
+        let tip_of = |q: [f64; 6]| robot.chain.frames(&pose(q))[6];
+        let there = tip_of(THERE);
+        let turned = TipOrientation {
+            quaternion_xyzw: there.rotation.coords.into(),
+            tolerance_rad: [1e-3, 1e-3, f64::INFINITY],
+        };
+        let line = TipLine { linear_m_s: 0.2, angular_rad_s: 1.0, off_m_max: 1e-3 };
+        let here = tip_of(HOME).translation.vector;
+        let aside = [here.x, here.y + 0.1, here.z];
+        let at = |position_m: [f64; 3], orientation, line| CheckedPlanRequest {
+            tip: Some(TipGoal { position_m, tolerance_m: 0.0, orientation, line }),
+            ..request(When::AtOnce, "", pose(HOME))
+        };
+        let position = at(there.translation.vector.into(), None, None);
+        let in_pose = at(there.translation.vector.into(), Some(turned), None);
+        let straight = at(aside, None, Some(line));
+        for (requested, words) in [
+            (&position, "straight line"),
+            (&in_pose, "straight line"),
+            (&straight, "straight line of the tip, at most"),
+        ] {
+            let outcome = ask(arm, requested, || ());
+            assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+            let PlanOutcome::Planned { how, .. } = outcome else { panic!() };
+            assert!(how.contains(words), "{how}");
+        }
+        let far = ask(arm, &at([3.0, 0.0, 0.0], None, None), || ());
+        assert!(reason_of(&far).contains("out of reach"), "{far:?}");
+        played.show(Phase::Moving);
+        let refused = ask(arm, &straight, || ());
+        assert!(reason_of(&refused).contains("begins at rest"), "{refused:?}");
+        receipt_of(&ask(arm, &CheckedPlanRequest { when: When::AfterCurrent, ..in_pose.clone() }, || ()));
+        played.show(Phase::Disabled);
+        for requested in [&position, &straight] {
+            assert!(reason_of(&ask(arm, requested, || ())).contains("taustream enable"));
+        }
     });
 }
 
