@@ -24,8 +24,9 @@ use taustream_motion::cut::{Kept, kept};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 use tracing::{info, warn};
 
-/// How often a piece is made anew because the arm was faster.
-const TRIES: u32 = 3;
+/// How often a piece is made anew because the arm was faster; each aims twice as far ahead. The last target of a stream has
+/// no newer one behind it, so that giving up on it would leave the arm on the way.
+const TRIES: u32 = 5;
 /// Shares of the way to a target that are tried until one is proven free.
 const SHARES: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.03];
 /// How often refusals are logged, at most.
