@@ -16,15 +16,22 @@ const ITERATION_SLACK_M: f64 = 5e-5;
 /// A segment shorter than this is a point.
 const POINT_M: f64 = 1e-12;
 
-/// The hard inside of a shape.
+/// The hard inside of a shape, in its own axes.
 #[derive(Clone)]
-enum Core {
+pub enum Core {
     /// From the first to the second point; equal points make a sphere.
     Segment(Vector, Vector),
     /// Half edges around the origin.
     Box(Vector),
-    /// Anything that only parry3d knows.
-    Other,
+    /// Around the origin, along y.
+    Cylinder {
+        /// Half of its length.
+        half_m: f64,
+        /// Its radius.
+        radius_m: f64,
+    },
+    /// Anything convex that only parry3d knows.
+    Convex,
     /// Triangles; the solid is what they enclose.
     Mesh(Arc<TriMesh>),
 }
@@ -81,7 +88,8 @@ impl Body {
                 let local = local * Pose::from_rotation(Rot3::from_rotation_x(std::f64::consts::FRAC_PI_2));
                 let parry = Arc::new(Cylinder::new(0.5 * length_m, *radius_m));
                 let bound_m = radius_m.hypot(0.5 * length_m);
-                Self { core: Core::Other, radius_m: 0.0, local, centre: Vector::ZERO, bound_m, parry }
+                let core = Core::Cylinder { half_m: 0.5 * length_m, radius_m: *radius_m };
+                Self { core, radius_m: 0.0, local, centre: Vector::ZERO, bound_m, parry }
             }
             Shape::Hull { vertices_m, triangles, rounding_m } => {
                 let corners = corners(vertices_m, triangles)?;
@@ -89,7 +97,7 @@ impl Body {
                 // Inside of the hull, which the middle of its bounding box need not be.
                 let centre = hull.points().iter().sum::<Vector>() / hull.points().len() as f64;
                 let far_m = hull.points().iter().map(|p| (*p - centre).length()).fold(0.0, f64::max);
-                let (core, bound_m) = (Core::Other, far_m + rounding_m);
+                let (core, bound_m) = (Core::Convex, far_m + rounding_m);
                 Self { core, radius_m: *rounding_m, local, centre, bound_m, parry: hull }
             }
             Shape::Mesh { vertices_m, triangles } => {
@@ -117,7 +125,7 @@ impl Body {
         let centre = pose.transform_point(self.centre);
         let ends = match self.core {
             Core::Segment(a, b) => [pose.transform_point(a), pose.transform_point(b)],
-            Core::Box(_) | Core::Other | Core::Mesh(_) => [centre; 2],
+            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) => [centre; 2],
         };
         Posed { pose, centre, ends }
     }
@@ -134,6 +142,58 @@ impl Body {
         self.radius_m
     }
 
+    /// The shape without the radius around it, in its own axes.
+    #[must_use]
+    pub fn core(&self) -> &Core {
+        &self.core
+    }
+
+    /// From the frame to the core's axes.
+    #[must_use]
+    pub fn local(&self) -> &Pose {
+        &self.local
+    }
+
+    /// Centre and half edges of a box around the core, along its axes.
+    #[must_use]
+    pub fn core_bounds(&self) -> (Vector, Vector) {
+        match self.core {
+            Core::Segment(a, b) => (0.5 * (a + b), (0.5 * (b - a)).abs()),
+            Core::Box(half) => (Vector::ZERO, half),
+            Core::Cylinder { half_m, radius_m } => (Vector::ZERO, Vector::new(radius_m, half_m, radius_m)),
+            Core::Convex | Core::Mesh(_) => {
+                let around = self.parry.compute_local_aabb();
+                (around.center(), around.half_extents())
+            }
+        }
+    }
+
+    /// How deep a point, in the core's axes, lies in it: at most the least distance to its surface; negative outside.
+    #[must_use]
+    pub fn core_depth_m(&self, point: Vector) -> f64 {
+        match self.core {
+            Core::Box(half) => {
+                let inside = half - point.abs();
+                if inside.min_element() >= 0.0 {
+                    inside.min_element()
+                } else {
+                    -(-inside).max(Vector::ZERO).length()
+                }
+            }
+            Core::Cylinder { half_m, radius_m } => {
+                let (beside, above) = (point.x.hypot(point.z) - radius_m, point.y.abs() - half_m);
+                if beside <= 0.0 && above <= 0.0 {
+                    -beside.max(above)
+                } else {
+                    -point_to_cylinder_m(point, half_m, radius_m)
+                }
+            }
+            Core::Segment(..) | Core::Convex | Core::Mesh(_) => {
+                -self.parry.distance_to_local_point(point, false)
+            }
+        }
+    }
+
     /// Upper bound of the distance of the shape's points to the axis through `point` along the unit `direction`.
     #[must_use]
     pub fn lever_m(&self, at: &Posed, point: Vector, direction: Vector) -> f64 {
@@ -141,7 +201,9 @@ impl Body {
         match self.core {
             // The distance to a line is convex: the ends of a segment are the furthest.
             Core::Segment(..) => distance_m(at.ends[0]).max(distance_m(at.ends[1])) + self.radius_m,
-            Core::Box(_) | Core::Other | Core::Mesh(_) => distance_m(at.centre) + self.bound_m,
+            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) => {
+                distance_m(at.centre) + self.bound_m
+            }
         }
     }
 
@@ -169,6 +231,12 @@ impl Body {
                 let [a, b] = into(&at.pose, &other_at.ends);
                 segment_to_box_m(a, b, *half)
             }
+            (Core::Segment(a, b), Core::Cylinder { half_m, radius_m }) if a == b => {
+                point_to_cylinder_m(other_at.pose.inverse_transform_point(at.centre), *half_m, *radius_m)
+            }
+            (Core::Cylinder { half_m, radius_m }, Core::Segment(a, b)) if a == b => {
+                point_to_cylinder_m(at.pose.inverse_transform_point(other_at.centre), *half_m, *radius_m)
+            }
             _ => self.iterated_distance_m(&at.pose, other, &other_at.pose),
         }
     }
@@ -189,7 +257,9 @@ impl Body {
             let Core::Mesh(triangles) = &mesh.core else { return false };
             let point = match &body.core {
                 Core::Mesh(m) => m.vertices().first().map(|v| body_at.pose.transform_point(*v)),
-                Core::Segment(..) | Core::Box(_) | Core::Other => Some(body_at.ends[0]),
+                Core::Segment(..) | Core::Box(_) | Core::Cylinder { .. } | Core::Convex => {
+                    Some(body_at.ends[0])
+                }
             };
             point.is_some_and(|p| encloses(triangles, mesh_at.pose.inverse_transform_point(p)))
         };
@@ -219,6 +289,12 @@ fn convex_distance_m(a: &dyn SupportMap, b: &dyn SupportMap, at: &Pose) -> f64 {
     let back = at.rotation.inverse() * -towards_b;
     let begin_of_b_m = at.transform_point(b.local_support_point(back)).dot(towards_b);
     (begin_of_b_m - end_of_a_m).max(0.0)
+}
+
+/// Distance of a point to a solid cylinder around the origin, along y.
+fn point_to_cylinder_m(point: Vector, half_m: f64, radius_m: f64) -> f64 {
+    let (beside, above) = (point.x.hypot(point.z) - radius_m, point.y.abs() - half_m);
+    beside.max(0.0).hypot(above.max(0.0))
 }
 
 /// True when the triangles go round the point: the solid angle that they fill is more than half of the sphere.

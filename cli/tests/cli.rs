@@ -15,6 +15,8 @@ mod imports;
 mod json;
 #[path = "cli/manual.rs"]
 mod manual;
+#[path = "cli/mbm.rs"]
+mod mbm;
 #[path = "cli/papers.rs"]
 mod papers;
 #[path = "cli/planners.rs"]

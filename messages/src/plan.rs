@@ -52,7 +52,7 @@ pub struct CheckedPlanRequest {
     pub tip: Option<TipGoal>,
     /// When to replace it.
     pub when: When,
-    /// How long planning may take.
+    /// How long planning may take; the planner spends it on shorter motions. With 0 it answers as soon as it can.
     pub deadline_ms: u32,
     /// Seed of every random choice.
     pub seed: u64,

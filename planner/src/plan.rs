@@ -53,6 +53,9 @@ pub struct PlanOptions {
     /// True when the clock aborts at the deadline. Without it only the budget that is derived from the deadline ends the
     /// work, so that one seed gives one answer on any machine, however busy: for comparisons, not for arms.
     pub keeps_deadline: bool,
+    /// True to spend the deadline on shorter motions; false to answer with what a few searches and shortcuts find, in milliseconds,
+    /// and to use the deadline only as long as there is no answer.
+    pub spends_deadline: bool,
 }
 
 impl Default for PlanOptions {
@@ -60,7 +63,18 @@ impl Default for PlanOptions {
         let (deadline, planner) = (Duration::from_millis(2000), PlannerKind::Auto);
         let (reading, improvement) = (Reading::Corrected, Improvement::default());
         let (objective, blend) = (Objective::default(), Blend::default());
-        Self { seed: 0, deadline, planner, reading, improvement, objective, blend, keeps_deadline: true }
+        let (keeps_deadline, spends_deadline) = (true, false);
+        Self {
+            seed: 0,
+            deadline,
+            planner,
+            reading,
+            improvement,
+            objective,
+            blend,
+            keeps_deadline,
+            spends_deadline,
+        }
     }
 }
 
@@ -86,6 +100,8 @@ pub struct Plan {
     pub energy_j: Option<f64>,
     /// How long planning took.
     pub planning_s: f64,
+    /// Processor time of the planning thread until the first verified motion.
+    pub first_s: f64,
     /// Poses that searches, shortcuts and refinements checked: the measure of work that every machine agrees on.
     pub checks: usize,
 }

@@ -37,8 +37,6 @@ const WAIT_AT_MOST: Duration = Duration::from_millis(2);
 const ATTEND_EVERY: Duration = Duration::from_millis(5);
 /// How often it looks for the files behind its services.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Deadline of a request that states none.
-const DEADLINE_DEFAULT: Duration = Duration::from_millis(2_000);
 /// Longest deadline: others wait meanwhile.
 const DEADLINE_MAX: Duration = Duration::from_secs(60);
 /// How long the streamer may take for a receipt.
@@ -432,11 +430,12 @@ fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {
         name => PlannerKind::from_name(name)
             .ok_or_else(|| format!("unknown planner `{name}`; use one of {}", PlannerKind::names()))?,
     };
-    let deadline = match requested.deadline_ms {
-        0 => DEADLINE_DEFAULT,
-        ms => Duration::from_millis(ms.into()).min(DEADLINE_MAX),
+    let default = PlanOptions::default();
+    let (deadline, spends_deadline) = match requested.deadline_ms {
+        0 => (default.deadline, false),
+        ms => (Duration::from_millis(ms.into()).min(DEADLINE_MAX), true),
     };
-    Ok(PlanOptions { seed: requested.seed, deadline, planner, ..PlanOptions::default() })
+    Ok(PlanOptions { seed: requested.seed, deadline, planner, spends_deadline, ..default })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

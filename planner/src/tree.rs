@@ -204,12 +204,13 @@ pub fn rrt_connect(
     let end = field.checks().saturating_add(checks_max);
     let mut from_start = Tree { nodes: vec![(*start_rad, 0)] };
     let mut from_goal = Tree { nodes: vec![(*goal_rad, 0)] };
-    let mut swapped = false;
     loop {
         let nodes = from_start.nodes.len() + from_goal.nodes.len();
         if is_spent(field, nodes, end) {
             return Search { path: None, nodes };
         }
+        // The smaller one: a tree that hardly grows stands where it is narrow, and needs the samples.
+        let swapped = from_goal.nodes.len() < from_start.nodes.len();
         let (growing, other) =
             if swapped { (&mut from_goal, &mut from_start) } else { (&mut from_start, &mut from_goal) };
         let target = field.random_pose(rng);
@@ -224,7 +225,6 @@ pub fn rrt_connect(
                 return Search { path: Some(path), nodes };
             }
         }
-        swapped = !swapped;
     }
 }
 

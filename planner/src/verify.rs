@@ -165,6 +165,29 @@ pub fn verify_stretches(
     trajectory: &Trajectory,
     budget: &Budget,
 ) -> Result<Proof, Violation> {
+    prove_stretches(stretches, trajectory, (budget, DEEPEST_SAMPLES))
+}
+
+/// Like [`verify_stretches`], for candidates: a contact is stated as it is met.
+///
+/// # Errors
+/// The first violation; `Unresolved` when the clock cut in, or when there is no stretch.
+pub(crate) fn prove_candidate(
+    stretches: &[Stretch],
+    trajectory: &Trajectory,
+    budget: &Budget,
+) -> Result<Proof, Violation> {
+    prove_stretches(stretches, trajectory, (budget, 0))
+}
+
+/// Samples at which the deepest contact is looked for, to be stated.
+const DEEPEST_SAMPLES: u32 = 2_000;
+
+fn prove_stretches(
+    stretches: &[Stretch],
+    trajectory: &Trajectory,
+    (budget, samples): (&Budget, u32),
+) -> Result<Proof, Violation> {
     let Some(first) = stretches.first() else { return Err(Violation::Unresolved { checks: 0, at_s: 0.0 }) };
     // Limits first: beyond them angles may be so large that geometry means nothing.
     let [begin_s, _] = first.span_s;
@@ -183,7 +206,7 @@ pub fn verify_stretches(
     };
     for stretch in stretches {
         let clearance = sweep(stretch.world, trajectory, stretch.span_s, &SweepRules::PROOF, budget)
-            .map_err(|blocked| explain(stretch, trajectory, &blocked, budget))?;
+            .map_err(|blocked| explain(stretch, trajectory, &blocked, (budget, samples)))?;
         if clearance.proven_m < proof.clearance_m {
             let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
             proof.clearance_required_m = clearance.pair.map_or(0.0, |pair| pair.required_m);
@@ -230,18 +253,22 @@ fn check_limits(world: &World, trajectory: &Trajectory, begin_s: f64) -> Result<
 }
 
 /// States the contact where it is deepest, which tells more than the instant at which it begins.
-fn explain(stretch: &Stretch, trajectory: &Trajectory, blocked: &Blocked, budget: &Budget) -> Violation {
-    const SAMPLES: u32 = 2_000;
+fn explain(
+    stretch: &Stretch,
+    trajectory: &Trajectory,
+    blocked: &Blocked,
+    (budget, samples): (&Budget, u32),
+) -> Violation {
     let Some((mut pair, mut distance_m)) = blocked.pair else {
         return Violation::Unresolved { checks: blocked.checks, at_s: blocked.at };
     };
     let (world, [begin_s, end_s]) = (stretch.world, stretch.span_s);
     let (from_s, mut at_s) = (blocked.at, blocked.at);
-    for i in 0..=SAMPLES {
+    for i in 1..=samples {
         if budget.is_over_after(world.pairs().len()) {
             break;
         }
-        let t_s = begin_s + (end_s - begin_s) * f64::from(i) / f64::from(SAMPLES);
+        let t_s = begin_s + (end_s - begin_s) * f64::from(i) / f64::from(samples);
         if let Some((p, d)) = world.closest(&trajectory.sample(t_s).position_rad)
             && d - p.required_m < distance_m - pair.required_m
         {

@@ -56,6 +56,10 @@ struct Axis {
     direction: Vector,
 }
 
+/// The frames of the chain in one pose of the arm.
+#[derive(Clone, Debug)]
+pub struct Frames(Vec<Pose>);
+
 /// Everything that can collide.
 #[derive(Clone)]
 pub struct World<'a> {
@@ -65,6 +69,8 @@ pub struct World<'a> {
     pairs: Vec<Pair>,
     axes: Vec<Axis>,
     reach_m: JointArray,
+    margin_m: f64,
+    extent_m: f64,
 }
 
 /// The bodies of the links in one pose of the arm.
@@ -102,7 +108,17 @@ impl<'a> World<'a> {
             obstacles.push(StillBody { name: obstacle.name.clone(), body, at });
         }
         let axes = axes(robot);
-        let mut world = Self { robot, links, obstacles, pairs: Vec::new(), axes, reach_m: [0.0; MAX_JOINTS] };
+        let mut world = Self {
+            robot,
+            links,
+            obstacles,
+            pairs: Vec::new(),
+            axes,
+            reach_m: [0.0; MAX_JOINTS],
+            margin_m: scene.margin_m,
+            extent_m: 0.0,
+        };
+        world.extent_m = world.farthest_m();
         world.pairs = world.pairs_to_keep(scene.margin_m);
         world.reach_m = world.joint_reach_m();
         Ok(world)
@@ -146,6 +162,22 @@ impl<'a> World<'a> {
         relaxed
     }
 
+    /// Furthest that a point of the arm can be from the base's origin, in any pose (m).
+    fn farthest_m(&self) -> f64 {
+        let mut snapshot = Snapshot::default();
+        self.place(&[0.0; MAX_JOINTS], &mut snapshot);
+        let step_m = |index: usize| {
+            let joint = self.robot.chain.joint(index);
+            joint.map_or(0.0, |j| j.pre.translation.vector.norm() + j.post.translation.vector.norm())
+        };
+        let body_m = |(body, at): (&LinkBody, &Posed)| {
+            let frame = snapshot.frames.get(body.frame);
+            let own_m = frame.map_or(0.0, |f| (at.centre - f.translation).length());
+            (0..body.frame).map(step_m).sum::<f64>() + own_m + body.body.bound_m()
+        };
+        self.links.iter().zip(&snapshot.at).map(body_m).fold(0.0, f64::max)
+    }
+
     /// Furthest that a point of the arm can be from each joint's axis, in any pose (m).
     fn joint_reach_m(&self) -> JointArray {
         let mut snapshot = Snapshot::default();
@@ -185,6 +217,53 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn reach_m(&self) -> &JointArray {
         &self.reach_m
+    }
+
+    /// What links keep from obstacles, unless a pair states less (m).
+    #[must_use]
+    pub fn margin_m(&self) -> f64 {
+        self.margin_m
+    }
+    /// Furthest that a point of the arm can be from the base's origin, in any pose (m).
+    #[must_use]
+    pub fn extent_m(&self) -> f64 {
+        self.extent_m
+    }
+    /// The bodies of the links, each with the index of the frame that it is rigid with.
+    pub fn link_bodies(&self) -> impl Iterator<Item = (usize, &Body)> {
+        self.links.iter().map(|link| (link.frame, &link.body))
+    }
+    /// The obstacles, with their poses.
+    pub fn obstacle_bodies(&self) -> impl Iterator<Item = (&Body, &Posed)> {
+        self.obstacles.iter().map(|obstacle| (&obstacle.body, &obstacle.at))
+    }
+
+    /// The frames in a pose, for pairs that are asked for one by one.
+    #[must_use]
+    pub fn frames(&self, position_rad: &JointArray) -> Frames {
+        let frames = self.robot.chain.frames(position_rad);
+        Frames(frames.iter().take(self.joints() + 1).map(to_parry).collect())
+    }
+
+    /// True when a pair keeps what it must and `extra_m` more.
+    #[must_use]
+    pub fn keeps(&self, pair: &Pair, frames: &Frames, extra_m: f64) -> bool {
+        let placed = |link: usize| {
+            let LinkBody { frame, body, .. } = &self.links[link];
+            (body, body.placed(&frames.0[*frame]))
+        };
+        let (a, a_at) = placed(pair.link);
+        let distance_m = match pair.other {
+            Other::Obstacle(o) => {
+                let StillBody { body, at, .. } = &self.obstacles[o];
+                a.distance_m(&a_at, body, at)
+            }
+            Other::Link(other) => {
+                let (b, b_at) = placed(other);
+                a.distance_m(&a_at, b, &b_at)
+            }
+        };
+        distance_m > pair.required_m + extra_m
     }
 
     /// Places the links' bodies.

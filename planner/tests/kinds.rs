@@ -46,8 +46,14 @@ fn improvements_never_lengthen_a_motion_and_repeat_without_the_clock() {
         (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
     let found = |improvement, seed| {
         let deadline = Duration::from_millis(200);
-        let options =
-            PlanOptions { seed, deadline, improvement, keeps_deadline: false, ..PlanOptions::default() };
+        let options = PlanOptions {
+            spends_deadline: true,
+            keeps_deadline: false,
+            seed,
+            deadline,
+            improvement,
+            ..PlanOptions::default()
+        };
         let plan = plan(&robot, &scene, &start, &goal, &options).expect("found");
         assert!(!plan.how.contains("cut short"), "{}", plan.how);
         plan

@@ -68,7 +68,13 @@ fn more_time_never_makes_a_motion_longer() {
         let mut before_s = f64::INFINITY;
         for deadline_ms in [100, 200, 500, 1_000, 2_000] {
             let deadline = Duration::from_millis(deadline_ms);
-            let options = PlanOptions { seed, deadline, keeps_deadline: false, ..PlanOptions::default() };
+            let options = PlanOptions {
+                spends_deadline: true,
+                keeps_deadline: false,
+                seed,
+                deadline,
+                ..PlanOptions::default()
+            };
             let plan = plan(&robot, &scene, &start, &goal, &options).expect("a motion");
             let duration_s = plan.proof.duration_s;
             println!(

@@ -85,6 +85,7 @@ impl Contest {
             planner: entrant.planner,
             improvement: entrant.improvement,
             keeps_deadline: false,
+            spends_deadline: true,
             ..PlanOptions::default()
         };
         let began_s = processor_s();
@@ -139,7 +140,7 @@ fn distances(robot: &Robot, trajectory: &Trajectory) -> [f64; 2] {
 }
 
 /// Processor time of this thread so far, s.
-fn processor_s() -> f64 {
+pub(super) fn processor_s() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }

@@ -6,6 +6,8 @@
 mod contest;
 mod entrant;
 mod escape;
+pub mod mbm;
+mod problem_file;
 mod problems;
 mod published;
 mod standings;

@@ -101,9 +101,10 @@ pub(crate) struct ReplanArgs {
     /// Start when every motion that was accepted has ended: several goals in a row.
     #[arg(long)]
     queue: bool,
-    /// Deadline of planning, ms.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
-    pub(crate) deadline_ms: u32,
+    /// Deadline of planning, ms, which is spent on shorter motions. Without it the answer comes after a few searches and
+    /// shortcuts, mostly within milliseconds, and after 2000 ms at most.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    pub(crate) deadline_ms: Option<u32>,
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,

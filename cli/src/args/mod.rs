@@ -3,6 +3,7 @@ mod cuts;
 mod goal;
 mod import;
 mod live;
+mod mbm;
 mod offline;
 mod papers;
 mod planners;
@@ -21,6 +22,7 @@ pub(crate) use offline::{
 };
 
 pub(crate) use cuts::CutsBenchArgs;
+pub(crate) use mbm::MbmArgs;
 pub(crate) use papers::PapersArgs;
 pub(crate) use planners::PlannersArgs;
 pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};

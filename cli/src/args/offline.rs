@@ -74,9 +74,10 @@ pub(crate) struct PlanArgs {
     /// Seed of every random choice.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Deadline of planning, ms.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
-    pub(crate) deadline_ms: u32,
+    /// Deadline of planning, ms, which is spent on shorter motions. Without it the answer comes after a few searches and
+    /// shortcuts, mostly within milliseconds, and after 2000 ms at most.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    pub(crate) deadline_ms: Option<u32>,
     /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
@@ -301,6 +302,8 @@ pub(crate) enum BenchName {
     Cost(CostBenchArgs),
     /// Check the claims of the five papers, and print their tables beside ours.
     Papers(super::PapersArgs),
+    /// Plan published problems (MotionBenchMaker): problems solved, planning time, motions, with and without deadlines.
+    Mbm(super::MbmArgs),
     /// Compare the planners by name: problems solved, planning time, quality of the motions.
     Planners(super::PlannersArgs),
     /// Measure lag and error behind a stream of targets, beside Ruckig and interpolation.

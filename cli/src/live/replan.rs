@@ -20,7 +20,7 @@ use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::{Outcome, Phase, PlanRequest, Receipt, Report};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::goals::TipSpeed;
-use taustream_planner::{PlannerKind, TipTarget};
+use taustream_planner::{PlanOptions, PlannerKind, TipTarget};
 
 /// What a planner may take beyond its deadline: verification, sending, and the streamer's receipt.
 const ANSWER_S: f64 = 5.0;
@@ -129,6 +129,7 @@ pub(crate) fn from_words(from_s: f64, tick: u64) -> String {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
     pub(crate) when: When,
+    /// 0 for the planner's own.
     pub(crate) deadline_ms: u32,
     pub(crate) seed: u64,
     pub(crate) planner: PlannerKind,
@@ -152,8 +153,12 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     };
     let (goal_rad, tip) =
         goal_rad(&if args.goal.needs_start() { start_rad(&client)? } else { [0.0; MAX_JOINTS] })?;
-    let wanted =
-        Wanted { when: args.when(), deadline_ms: args.deadline_ms, seed: args.seed, planner: args.planner };
+    let wanted = Wanted {
+        when: args.when(),
+        deadline_ms: args.deadline_ms.unwrap_or(0),
+        seed: args.seed,
+        planner: args.planner,
+    };
     let request = CheckedPlanRequest {
         joints: settings.robot.joints.len(),
         goal_rad,
@@ -202,7 +207,7 @@ pub(crate) fn go(
     request: &CheckedPlanRequest,
     wait: bool,
 ) -> Result<(), Failure> {
-    form.progress(format_args!("planning, {:.1} s at most ..", f64::from(request.deadline_ms) * 1e-3));
+    form.progress(format_args!("planning, {:.1} s at most ..", deadline_s(request)));
     let arm = ArmName::of(settings);
     let planned = ask_while(client, &arm, request, &mut || Ok(()))?;
     let answered_ns = now_ns();
@@ -225,6 +230,12 @@ pub(crate) fn go(
     form.print(&Answer { arm: arm.name, planned, unmodelled_links, stages, executed })
 }
 
+/// How long the planner may take at most.
+fn deadline_s(request: &CheckedPlanRequest) -> f64 {
+    let default_s = PlanOptions::default().deadline.as_secs_f64();
+    if request.deadline_ms == 0 { default_s } else { f64::from(request.deadline_ms) * 1e-3 }
+}
+
 /// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
 /// planner plans.
 pub(crate) fn ask_while(
@@ -238,7 +249,7 @@ pub(crate) fn ask_while(
         When::AtOnce | When::Cancel => 0.0,
         When::AfterCurrent | When::Queue => remaining_s(&client.report()?.0),
     };
-    let limit_s = f64::from(request.deadline_ms) * 1e-3 + ANSWER_S + remaining_s;
+    let limit_s = deadline_s(request) + ANSWER_S + remaining_s;
     let asked_ns = now_ns();
     let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
     match reply.outcome() {

@@ -23,6 +23,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         BenchName::Compare(args) => return super::compare::run(form, args),
         BenchName::Cost(args) => return super::cost_bench::run(form, args),
         BenchName::Follow(args) => return super::follow_bench::run(form, args),
+        BenchName::Mbm(args) => return super::mbm::run(form, args),
         BenchName::Papers(args) => return super::papers::run(form, args),
         BenchName::Planners(args) => return super::planners::run(form, args),
         BenchName::Cuts(args) => return super::cuts_bench::run(form, args),

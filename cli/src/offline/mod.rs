@@ -10,6 +10,7 @@ mod cuts_bench;
 mod follow_bench;
 pub(crate) mod import;
 mod limit_sets;
+mod mbm;
 mod papers;
 pub(crate) mod plan;
 mod planners;

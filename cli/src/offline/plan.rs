@@ -94,14 +94,17 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     let scene = arm::scene(&args.scene)?;
     let (start, option) = args.start();
     let start_rad = start.pose_of(&robot, option)?;
+    let default = PlanOptions::default();
+    let deadline = args.deadline_ms.map(|ms| Duration::from_millis(ms.into()));
     let options = PlanOptions {
         seed: args.seed,
-        deadline: Duration::from_millis(args.deadline_ms.into()),
+        deadline: deadline.unwrap_or(default.deadline),
+        spends_deadline: deadline.is_some(),
         planner: args.planner,
         reading: args.reading,
         objective: args.objective,
         blend: args.blend(),
-        ..PlanOptions::default()
+        ..default
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
     let found = match args.goal.of(&robot, &start_rad)? {

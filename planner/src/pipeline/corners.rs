@@ -1,49 +1,141 @@
 //! Rounding the corners of a path, as far as that is free.
-use super::{Pipeline, SLOWER, SLOWER_TRIES};
+use super::Pipeline;
+use crate::lanes::Lanes;
 use crate::objective::Objective;
 use crate::plan::Blend;
-use crate::timing::Timed;
-use taustream_motion::JointArray;
-use taustream_motion::limits::{Quantity, check_motion};
+use crate::timing::{Timed, distance};
+use crate::tree::Space;
+use taustream_motion::{JointArray, Trajectory};
 
 /// How far from its corners a motion may pass, widest first (rad, length of the difference of all joints).
 const BLENDS_RAD: [f64; 4] = [0.4, 0.15, 0.05, 0.015];
 /// A path that is estimated to take this many times as long as the best one is not timed.
 const HOPELESS: f64 = 1.1;
-/// A motion that is longer than the best one by more than this factor is not improved.
+/// A motion that is longer than the best one by more than this factor is not looked for.
 const PROMISING: f64 = 1.15;
+/// Share of a blend that a motion makes use of at its corner, about.
+const USED: f64 = 0.7;
+/// Share of a segment that a corner takes at most.
+const REACH: f64 = 0.45;
+/// Poses at which a rounded corner is looked at before it is timed.
+const CORNER_POSES: u32 = 9;
+/// Instants a second at which a timed motion is looked at before it is proven.
+const INSTANTS_A_SECOND: f64 = 120.0;
+/// What it keeps beyond the margin at them (m).
+const INSTANTS_EXTRA_M: f64 = 1e-4;
+/// Most of them.
+const INSTANTS_MAX: f64 = 4_000.0;
+
+/// The blend of each corner, by its number among the widths.
+struct Blends<'a> {
+    widths_rad: &'a [f64],
+    /// One a corner.
+    levels: Vec<usize>,
+}
+
+impl Blends<'_> {
+    fn radians(&self) -> Vec<f64> {
+        self.levels.iter().filter_map(|level| self.widths_rad.get(*level).copied()).collect()
+    }
+
+    /// Makes a corner tighter; false when it is as tight as any.
+    fn tighten(&mut self, corner: usize) -> bool {
+        let most = self.widths_rad.len().saturating_sub(1);
+        match self.levels.get_mut(corner) {
+            Some(level) if *level < most => {
+                *level += 1;
+                true
+            }
+            Some(_) | None => false,
+        }
+    }
+
+    fn tighten_all(&mut self) -> bool {
+        (0..self.levels.len()).fold(false, |any, corner| self.tighten(corner) | any)
+    }
+}
 
 impl Pipeline<'_> {
     /// Rounds the corners of a path as far as that is free, and proves the motion; stops at them where nothing else is.
     ///
-    /// The widest blend of all corners that is free is proven at once; then one corner after the other gets a wider one, since
-    /// a tight one must not hold back the rest.
-    pub(super) fn round(&mut self, path: &[JointArray], source: &str) {
+    /// Each corner begins with the widest blend that is free where it is rounded. What is timed is looked at again, as it
+    /// need not be as wide as its blends, nor as narrow between the corners; where it is in the way, the nearest corner gets a tighter blend.
+    pub(super) fn round(&mut self, path: &[JointArray], source: &str, lanes: Option<&Lanes>) {
         let estimate_s = self.estimate_s(path);
         if self.best_s().is_finite() && estimate_s > HOPELESS * self.least_estimate_s {
             return;
         }
         self.least_estimate_s = estimate_s.min(self.least_estimate_s);
         let whole = self.whole_path(path);
-        let widths_rad = self.blends_rad();
-        let mut left = self.stage_budgets.timings;
-        let found = self.widest(&whole, &widths_rad, &mut left);
-        let is_proven = found.as_ref().is_some_and(|(_, timed)| self.prove_rounded(&whole, timed, source));
-        match found {
-            Some((width, timed)) if is_proven => {
-                if timed.trajectory.duration_s() <= PROMISING * self.best_s()
-                    && let Some(wider) = self.widened(&whole, &widths_rad[..=width], (timed, left))
-                {
-                    self.prove_rounded(&whole, &wider, source);
-                }
-            }
-            Some(_) | None if self.best_s().is_infinite() => self.propose(path, source),
-            Some(_) | None => {}
+        let own;
+        let lanes = if let Some(lanes) = lanes {
+            lanes
+        } else {
+            own = Lanes::new(self.space.world);
+            &own
+        };
+        if !self.round_whole(&whole, source, lanes) && self.best.is_none() {
+            self.propose(path, source);
         }
     }
 
-    fn prove_rounded(&mut self, whole: &[JointArray], timed: &Timed, source: &str) -> bool {
-        let (corners, at_most_rad) = (whole.len().saturating_sub(2), timed.deviation_rad);
+    /// True when a rounded motion is proven.
+    fn round_whole(&mut self, whole: &[JointArray], source: &str, lanes: &Lanes) -> bool {
+        let widths_rad = self.blends_rad();
+        let corners = whole.len().saturating_sub(2);
+        if widths_rad.is_empty() || corners == 0 {
+            return false;
+        }
+        let level = |corner: usize| {
+            let is_free = |width: &f64| lanes.are_free(&rounded(whole, corner, *width), 0.0);
+            widths_rad.iter().position(is_free).unwrap_or(widths_rad.len() - 1)
+        };
+        let mut blends = Blends { widths_rad: &widths_rad, levels: (0..corners).map(level).collect() };
+        for _ in 0..self.stage_budgets.timings {
+            if self.space.budget.is_over() {
+                return false;
+            }
+            let most_s = PROMISING * self.best_s();
+            let timed = self.path(whole).rounded(&blends.radians(), most_s);
+            let tightened = match timed {
+                None => blends.tighten_all(),
+                Some(timed) => match self.in_the_way(&timed.trajectory, lanes) {
+                    Some(pose_rad) => {
+                        let apart = |i: &usize| distance(&whole[*i], &pose_rad);
+                        let nearest = (1..=corners).min_by(|i, j| apart(i).total_cmp(&apart(j)));
+                        nearest.is_some_and(|i| blends.tighten(i - 1)) || blends.tighten_all()
+                    }
+                    None if self.prove_rounded(corners, &timed, source) => return true,
+                    None => blends.tighten_all(),
+                },
+            };
+            if !tightened {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// The first sampled pose of a motion that is not free.
+    fn in_the_way(&self, motion: &Trajectory, lanes: &Lanes) -> Option<JointArray> {
+        if self.margin_exit.is_some() {
+            // Another world counts at first.
+            return if self.keeps_apart(motion) { None } else { Some(*motion.base_rad()) };
+        }
+        let duration_s = motion.duration_s();
+        let instants = (duration_s * INSTANTS_A_SECOND).ceil().clamp(1.0, INSTANTS_MAX);
+        let mut poses_rad = Vec::new();
+        let mut i = 1.0;
+        while i < instants {
+            poses_rad.push(motion.sample(duration_s * i / instants).position_rad);
+            i += 1.0;
+        }
+        self.space.note_checks(poses_rad.len());
+        lanes.first_blocked(&poses_rad, INSTANTS_EXTRA_M).map(|i| poses_rad[i])
+    }
+
+    fn prove_rounded(&mut self, corners: usize, timed: &Timed, source: &str) -> bool {
+        let at_most_rad = timed.deviation_rad;
         self.prove(timed, &format!("{source}, {corners} corners rounded by at most {at_most_rad:.3} rad"))
     }
 
@@ -51,64 +143,6 @@ impl Pipeline<'_> {
     fn best_s(&self) -> f64 {
         let by_time = self.best.as_ref().filter(|_| self.evaluator.objective == Objective::Time);
         by_time.map_or(f64::INFINITY, |best| best.proof.duration_s)
-    }
-
-    /// A motion with such blends, if it is free and about as short as requested.
-    fn attempt(
-        &self,
-        whole: &[JointArray],
-        blends_rad: &[f64],
-        (left, most_s): (&mut usize, f64),
-    ) -> Option<Timed> {
-        *left = left.checked_sub(1)?;
-        if self.space.budget.is_over() {
-            return None;
-        }
-        let timed = self.within_limits(self.path(whole).rounded(blends_rad, most_s)?)?;
-        self.keeps_apart(&timed.trajectory).then_some(timed)
-    }
-
-    /// The widest blend of all corners that is free, by its number.
-    fn widest(&self, whole: &[JointArray], widths_rad: &[f64], left: &mut usize) -> Option<(usize, Timed)> {
-        let corners = whole.len().saturating_sub(2);
-        let most_s = PROMISING * self.best_s();
-        widths_rad.iter().enumerate().find_map(|(width, blend_rad)| {
-            self.attempt(whole, &vec![*blend_rad; corners], (left, most_s)).map(|timed| (width, timed))
-        })
-    }
-
-    /// A shorter motion, where single corners have wider blends than the last of the given ones, which all have.
-    fn widened(&self, whole: &[JointArray], widths_rad: &[f64], from: (Timed, usize)) -> Option<Timed> {
-        let ((mut best, mut left), mut is_shorter) = (from, false);
-        let (all_rad, wider_rad) = widths_rad.split_last()?;
-        let corners = whole.len().saturating_sub(2);
-        let mut blends_rad = vec![*all_rad; corners];
-        for wider in wider_rad.iter().rev() {
-            for corner in 0..corners {
-                let narrow = std::mem::replace(&mut blends_rad[corner], *wider);
-                let most_s = best.trajectory.duration_s();
-                match self.attempt(whole, &blends_rad, (&mut left, most_s)) {
-                    Some(timed) if timed.trajectory.duration_s() < best.trajectory.duration_s() => {
-                        (best, is_shorter) = (timed, true);
-                    }
-                    Some(_) | None => blends_rad[corner] = narrow,
-                }
-            }
-        }
-        is_shorter.then_some(best)
-    }
-
-    /// A motion that is proven to keep the limits, a little slower if its peaks were met between samples; `None` when a
-    /// position limit is in the way.
-    fn within_limits(&self, mut timed: Timed) -> Option<Timed> {
-        for _ in 0..SLOWER_TRIES {
-            match check_motion(&timed.trajectory, &self.limits) {
-                Ok(_) => return Some(timed),
-                Err(violation) if violation.quantity == Quantity::Position => return None,
-                Err(_) => timed = timed.slower(SLOWER)?,
-            }
-        }
-        None
     }
 
     /// How far from its corners a motion may pass, widest first (rad); empty when it has to stop at them.
@@ -126,4 +160,24 @@ impl Pipeline<'_> {
         let shares = BLENDS_RAD.iter().map(|blend_rad| blend_rad / BLENDS_RAD[0]);
         if is_usable { shares.map(|share| share * most_rad).collect() } else { Vec::new() }
     }
+}
+
+/// Poses of a corner that is rounded by a blend, about as a motion does: on a parabola through both of its segments.
+fn rounded(whole: &[JointArray], corner: usize, blend_rad: f64) -> Vec<JointArray> {
+    let (before, at, after) = (&whole[corner], &whole[corner + 1], &whole[corner + 2]);
+    let (to_rad, from_rad) = (distance(before, at), distance(at, after));
+    let turn = (0..at.len()).map(|j| {
+        let (u, v) = ((before[j] - at[j]) / to_rad, (after[j] - at[j]) / from_rad);
+        (u + v) * (u + v)
+    });
+    // The parabola between two points at this length from the corner passes it at a quarter of that times the turn.
+    let turn = turn.sum::<f64>().sqrt();
+    let length_rad = (4.0 * USED * blend_rad / turn).min(REACH * to_rad.min(from_rad));
+    let begin = Space::between(at, before, length_rad / to_rad);
+    let end = Space::between(at, after, length_rad / from_rad);
+    let pose = |i: u32| {
+        let share = f64::from(i) / f64::from(CORNER_POSES - 1);
+        Space::between(&Space::between(&begin, at, share), &Space::between(at, &end, share), share)
+    };
+    (0..CORNER_POSES).map(pose).collect()
 }

@@ -4,6 +4,7 @@
 //! found is shortened, rounded and proven at once; from then on there is an answer, and later stages can only replace it by
 //! a better one. A longer deadline does the same work first, then more, so it can only give a better motion.
 mod corners;
+mod quick;
 mod through;
 
 use crate::budget::Budget;
@@ -18,10 +19,12 @@ use crate::search::Searcher;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
 use crate::tree::Space;
-use crate::verify::{Proof, Stretch, Violation, verify_in, verify_stretches};
+use crate::verify::{Proof, Stretch, Violation, prove_candidate, verify_in};
 use crate::world::World;
+use rustix::time::{ClockId, clock_gettime};
 use std::ops::Range;
 use std::time::Duration;
+use taustream_motion::limits::Quantity;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
 use taustream_optimizers::{METHODS, Method, Optimizer, Setup};
 
@@ -40,6 +43,8 @@ const SHORTCUTS: usize = 120;
 /// A motion that misses a limit is made slower by this factor, a few times.
 const SLOWER: f64 = 1.002;
 const SLOWER_TRIES: usize = 6;
+/// Poses of sampled edges granted a millisecond, where the clock does not end the work: about what a small controller checks.
+const SAMPLED_A_MS: usize = 2_000;
 /// Evaluations of a refinement's first round; each later one has twice as many.
 const FIRST_REFINEMENT: usize = 64;
 
@@ -49,6 +54,8 @@ const FIRST_REFINEMENT: usize = 64;
 struct StageBudgets {
     /// Poses checked by all searches.
     search_checks: usize,
+    /// Poses of sampled edges.
+    sampled_checks: usize,
     /// Evaluations of the refinement.
     refinements: usize,
     /// Timings of one path tried.
@@ -72,6 +79,8 @@ impl StageBudgets {
         let ms = counted_ms(options.deadline);
         Self {
             search_checks: search_checks(options.deadline),
+            // While the clock ends it, nothing else does.
+            sampled_checks: if options.keeps_deadline { usize::MAX } else { ms * SAMPLED_A_MS },
             refinements: ms,
             timings: (ms / 150).clamp(6, 12),
         }
@@ -99,6 +108,12 @@ struct Best {
     score: f64,
 }
 
+/// Processor time of this thread so far, s.
+fn processor_s() -> f64 {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
 /// One planning run.
 pub struct Pipeline<'a> {
     space: Space<'a>,
@@ -111,6 +126,9 @@ pub struct Pipeline<'a> {
     /// What was done, as text.
     tried: Vec<String>,
     best: Option<Best>,
+    /// Processor time of the thread at the start, and until the first verified motion.
+    began_s: f64,
+    first_s: f64,
     /// The least estimate of a path that was timed with rounded corners.
     least_estimate_s: f64,
     /// Why the latest motion was not proven.
@@ -137,6 +155,8 @@ impl<'a> Pipeline<'a> {
             limits: world.robot().limits(),
             tried: Vec::new(),
             best: None,
+            began_s: processor_s(),
+            first_s: 0.0,
             least_estimate_s: f64::INFINITY,
             violation: None,
             untimed: false,
@@ -176,7 +196,9 @@ impl<'a> Pipeline<'a> {
                     self.by_objective(&[(&line, LINE)]);
                 }
             }
-            PlannerKind::RrtConnect => self.search_first(Searcher::RrtConnect, &line),
+            PlannerKind::RrtConnect => {
+                self.quick(&line, self.stage_budgets.sampled_checks);
+            }
             PlannerKind::Rrt => self.search_first(Searcher::Rrt, &line),
             PlannerKind::Rbf => self.search_first(Searcher::Rbf, &line),
             PlannerKind::Bfo => self.search_first(Searcher::Bfo, &line),
@@ -185,7 +207,7 @@ impl<'a> Pipeline<'a> {
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
                 let optimizer = (method.make)(setup);
                 if let Some(refined) = self.refine(&line, &*optimizer, evaluations, LINE) {
-                    self.round(&refined, &optimizer.name().to_uppercase());
+                    self.round(&refined, &optimizer.name().to_uppercase(), None);
                 }
             }
         }
@@ -199,17 +221,16 @@ impl<'a> Pipeline<'a> {
 
     /// A path round what blocks the straight line: searched, and improved.
     fn around(&mut self, line: &[JointArray]) {
-        let searcher = Searcher::RrtConnect;
-        let first = self.search(searcher, line, 0..SEARCHES, self.stage_budgets.search_checks);
-        let Some((_, path)) = first else { return };
+        let Some(path) = self.quick(line, self.stage_budgets.sampled_checks) else { return };
         match self.options.improvement {
             _ if self.evaluator.objective != Objective::Time => {
                 self.by_objective(&[(&path, "that"), (line, LINE)]);
             }
+            _ if !self.options.spends_deadline => {}
             Improvement::Nothing => {}
             Improvement::Searches => {
                 let more = SEARCHES..SEARCHES + MORE_SEARCHES;
-                self.search(searcher, line, more, self.stage_budgets.refinements * refine::POSES);
+                self.search(Searcher::RrtConnect, line, more, self.stage_budgets.refinements * refine::POSES);
             }
             Improvement::Method(method) => self.refine_around(method, &[(&path, "that"), (line, LINE)]),
         }
@@ -241,7 +262,7 @@ impl<'a> Pipeline<'a> {
             let source = optimizer.name().to_uppercase();
             for (path, from) in starts {
                 if let Some(refined) = self.refine(path, &*optimizer, each, from) {
-                    self.round(&refined, &source);
+                    self.round(&refined, &source, None);
                 }
             }
             each *= 2;
@@ -299,7 +320,7 @@ impl<'a> Pipeline<'a> {
                 self.propose(line, "straight line");
                 if self.margin_exit.is_some() {
                     // The exit path ends in a corner, or on the line: no need to stop there.
-                    self.round(line, "straight line");
+                    self.round(line, "straight line", None);
                 }
                 self.best.is_some()
             }
@@ -347,7 +368,7 @@ impl<'a> Pipeline<'a> {
                     // An answer before time is spent on better ones.
                     self.propose(&path, &searched(searcher));
                 }
-                self.round(&path, &searched(searcher));
+                self.round(&path, &searched(searcher), None);
             }
             if best.as_ref().is_none_or(|(b, _)| estimate_s < *b) {
                 best = Some((estimate_s, path));
@@ -421,6 +442,9 @@ impl<'a> Pipeline<'a> {
     /// Keeps a verified motion if it is better than what there is.
     fn keep(&mut self, trajectory: Trajectory, proof: Proof, how: String) {
         let score = self.evaluator.score(&trajectory, &proof);
+        if self.best.is_none() {
+            self.first_s = processor_s() - self.began_s;
+        }
         if self.best.as_ref().is_none_or(|best| score < best.score) {
             self.best = Some(Best { trajectory, proof, how, score });
         }
@@ -433,7 +457,7 @@ impl<'a> Pipeline<'a> {
         for _ in 0..SLOWER_TRIES {
             let Some(stretches) = self.stretches(&timed.trajectory) else { return false };
             let left_s = stretches.first().map(|s| s.span_s[1]);
-            match verify_stretches(&stretches, &timed.trajectory, self.space.budget) {
+            match prove_candidate(&stretches, &timed.trajectory, self.space.budget) {
                 Ok(proof) => {
                     let note = self.margin_exit.as_ref().and_then(|l| l.note.as_ref());
                     let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
@@ -441,7 +465,9 @@ impl<'a> Pipeline<'a> {
                     return true;
                 }
                 Err(violation) => {
-                    let limit = matches!(violation, Violation::Limit { .. });
+                    // Slower, a position limit stays in the way.
+                    let limit = matches!(&violation, Violation::Limit { violation, .. }
+                        if violation.quantity != Quantity::Position);
                     self.violation = Some(violation);
                     let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else { return false };
                     timed = slower;
@@ -466,8 +492,8 @@ impl<'a> Pipeline<'a> {
                     how = format!("{how} (tried: {tried})");
                 }
                 let (energy_j, checks) = (self.evaluator.energy_j(&trajectory), self.space.checks());
-                let planning_s = budget.elapsed_s();
-                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, checks })
+                let (planning_s, first_s) = (budget.elapsed_s(), self.first_s);
+                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, first_s, checks })
             }
             (None, Some(violation)) => {
                 if cut && matches!(violation, Violation::Unresolved { .. }) {

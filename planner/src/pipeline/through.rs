@@ -26,7 +26,7 @@ impl Pipeline<'_> {
             _ => {
                 let source = format!("through {} poses", poses_rad.len());
                 self.propose(&whole, &source);
-                self.round(&whole, &source);
+                self.round(&whole, &source, None);
             }
         }
         self.finish()

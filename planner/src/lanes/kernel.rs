@@ -1,0 +1,417 @@
+//! The kernel: poses in lanes, groups of links against obstacles and each other, spheres where a group is near.
+use super::Scratch;
+use super::arithmetic::{Ops, Vector, Vector3};
+use super::grid::Bounds;
+use super::model::{Form, Group, Model, Obstacle};
+use pulp::{Simd, WithSimd};
+use std::f64::consts::PI;
+use taustream_motion::{JointArray, MAX_JOINTS};
+
+/// Most lanes of any machine.
+const LANES_MAX: usize = 16;
+/// Adding and subtracting it leaves a number's whole part: 1.5 * 2^52.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
+
+/// What a suspect pair is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    /// A link body, and an obstacle or link.
+    Obstacle(usize, usize),
+    /// Index into the world's pairs.
+    Pair(usize),
+}
+
+/// A pair of bodies that may be too near in a pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Suspect {
+    pub(super) pose: u32,
+    pub(super) question: Question,
+}
+
+/// Poses to look at.
+pub(super) struct Pass<'a> {
+    pub(super) model: &'a Model,
+    pub(super) poses_rad: &'a [JointArray],
+    /// Kept beyond what every pair must.
+    pub(super) extra_m: f64,
+    pub(super) scratch: &'a mut Scratch,
+}
+
+impl WithSimd for Pass<'_> {
+    /// False when some pose is surely not free.
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let Self { model, poses_rad, extra_m, scratch } = self;
+        let lanes = S::F32_LANES.min(LANES_MAX);
+        let strides = poses_rad.len().div_ceil(lanes);
+        scratch.centres.resize(model.spheres.len() * 3 * S::F32_LANES, 0.0);
+        // Lanes are spread over the poses: what blocks an edge is met in its first chunk.
+        for first in 0..strides {
+            let mut chunk = Chunk::new(Ops(simd), (model, extra_m), (poses_rad, first, strides));
+            if chunk.is_blocked(scratch) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// The arm in as many poses as there are lanes.
+struct Chunk<'a, S: Simd> {
+    ops: Ops<S>,
+    model: &'a Model,
+    extra: f32,
+    /// Index of the first lane's pose, from one lane's to the next, and how many poses there are.
+    poses: [usize; 3],
+    /// Columns and origin of each frame.
+    frames: [([Vector3<S>; 3], Vector3<S>); MAX_JOINTS + 1],
+    /// Groups whose spheres are placed, a bit each.
+    placed: u64,
+}
+
+impl<'a, S: Simd> Chunk<'a, S> {
+    #[inline(always)]
+    fn new(
+        ops: Ops<S>,
+        (model, extra_m): (&'a Model, f64),
+        (poses_rad, first, strides): (&[JointArray], usize, usize),
+    ) -> Self {
+        let (one, zero) = (ops.all(1.0), ops.all(0.0));
+        let mut columns = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
+        let mut origin = [zero; 3];
+        let mut frames = [(columns, origin); MAX_JOINTS + 1];
+        for (j, joint) in model.joints.iter().enumerate() {
+            let mut angles = [0.0_f32; LANES_MAX];
+            for (lane, angle) in angles.iter_mut().enumerate().take(S::F32_LANES) {
+                let pose = &poses_rad[(first + lane * strides).min(poses_rad.len() - 1)];
+                let halves = pose[j] * (1.0 / PI) + joint.offset;
+                let whole = (halves * 0.5 + WHOLE) - WHOLE;
+                #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
+                let rest = (halves - 2.0 * whole) as f32;
+                *angle = rest;
+            }
+            let (angle, _) = S::as_simd_f32s(&angles);
+            let [sin, cos] = ops.sin_cos_pi(angle[0]);
+            origin = ops.moved(origin, &columns, joint.shift);
+            let zero3 = [zero; 3];
+            let fixed = [
+                ops.moved(zero3, &columns, joint.columns[0]),
+                ops.moved(zero3, &columns, joint.columns[1]),
+                ops.moved(zero3, &columns, joint.columns[2]),
+            ];
+            for k in 0..3 {
+                let (x, y) = (fixed[0][k], fixed[1][k]);
+                columns[0][k] = ops.mul_add(sin, y, ops.0.mul_f32s(cos, x));
+                columns[1][k] = ops.sub_mul(sin, x, ops.0.mul_f32s(cos, y));
+            }
+            columns[2] = fixed[2];
+            frames[j + 1] = (columns, origin);
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
+        let extra = extra_m as f32;
+        Self { ops, model, extra, poses: [first, strides, poses_rad.len()], frames, placed: 0 }
+    }
+
+    /// True when some pose is surely not free; writes down the pairs that f32 leaves open.
+    #[inline(always)]
+    fn is_blocked(&mut self, scratch: &mut Scratch) -> bool {
+        let mut middles = [[self.ops.all(0.0); 3]; MAX_JOINTS + 1];
+        for (group, middle) in self.model.groups.iter().zip(&mut middles) {
+            let (columns, origin) = &self.frames[group.frame];
+            *middle = self.ops.moved(*origin, columns, group.centre);
+        }
+        for (index, group) in self.model.groups.iter().enumerate() {
+            if group.frame > 0 && self.meets_obstacles((index, group), middles[index], scratch) {
+                return true;
+            }
+        }
+        self.meets_itself(&middles, scratch)
+    }
+
+    #[inline(always)]
+    fn meets_obstacles(
+        &mut self,
+        (index, group): (usize, &Group),
+        middle: Vector3<S>,
+        scratch: &mut Scratch,
+    ) -> bool {
+        let model = self.model;
+        let Some(tree) = &model.tree else {
+            // Most groups are clear of everything: one look at the least of all is enough then.
+            let mut slack = self.ops.all(f32::MAX);
+            for obstacle in &model.obstacles {
+                let keep = self.ops.all(self.group_keep(group, obstacle));
+                let apart = distance(self.ops, obstacle, middle);
+                slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, keep));
+            }
+            if self.ops.0.reduce_min_f32s(slack) > 0.0 {
+                return false;
+            }
+            for (o, obstacle) in model.obstacles.iter().enumerate() {
+                if self.is_near(group, middle, obstacle) && self.meets((index, group), (o, obstacle), scratch)
+                {
+                    return true;
+                }
+            }
+            return false;
+        };
+        let region = self.region(middle, group.radius + self.extra + model.tolerance);
+        let mut near = std::mem::take(&mut scratch.near);
+        tree.near(&region, &mut near);
+        let mut meets = false;
+        for o in &near {
+            let o = *o as usize;
+            let obstacle = &model.obstacles[o];
+            if self.is_near(group, middle, obstacle) && self.meets((index, group), (o, obstacle), scratch) {
+                meets = true;
+                break;
+            }
+        }
+        scratch.near = near;
+        meets
+    }
+
+    /// A box around spheres at some points.
+    #[inline(always)]
+    fn region(&self, middle: Vector3<S>, radius: f32) -> Bounds {
+        let simd = self.ops.0;
+        let [x, y, z] = middle;
+        let low = [simd.reduce_min_f32s(x), simd.reduce_min_f32s(y), simd.reduce_min_f32s(z)];
+        let high = [simd.reduce_max_f32s(x), simd.reduce_max_f32s(y), simd.reduce_max_f32s(z)];
+        Bounds { low: low.map(|at| at - radius), high: high.map(|at| at + radius) }
+    }
+
+    /// True when something of a group may be nearer to an obstacle than it must.
+    #[inline(always)]
+    fn is_near(&self, group: &Group, middle: Vector3<S>, obstacle: &Obstacle) -> bool {
+        let keep = self.group_keep(group, obstacle);
+        self.ops.0.reduce_min_f32s(distance(self.ops, obstacle, middle)) <= keep
+    }
+
+    /// What the middle of a group keeps from an obstacle's core at least where nothing of it is near.
+    #[inline(always)]
+    fn group_keep(&self, group: &Group, obstacle: &Obstacle) -> f32 {
+        group.radius + obstacle.radius + self.model.margin + self.extra + obstacle.tolerance
+    }
+
+    /// Places the spheres of a group, once.
+    #[inline(always)]
+    fn place(&mut self, (index, group): (usize, &Group), centres: &mut [f32]) {
+        if self.placed & (1 << index) != 0 {
+            return;
+        }
+        self.placed |= 1 << index;
+        let (columns, origin) = &self.frames[group.frame];
+        let (slots, _) = S::as_mut_simd_f32s(centres);
+        for (sphere, slots) in group.spheres.clone().zip(slots[3 * group.spheres.start..].chunks_exact_mut(3))
+        {
+            let at = self.ops.moved(*origin, columns, self.model.spheres[sphere].centre);
+            slots.copy_from_slice(&at);
+        }
+    }
+
+    #[inline(always)]
+    fn centre(centres: &[f32], sphere: usize) -> Vector3<S> {
+        let (slots, _) = S::as_simd_f32s(centres);
+        [slots[3 * sphere], slots[3 * sphere + 1], slots[3 * sphere + 2]]
+    }
+
+    /// The spheres of a group against an obstacle.
+    #[inline(always)]
+    fn meets(
+        &mut self,
+        (index, group): (usize, &Group),
+        (o, obstacle): (usize, &Obstacle),
+        scratch: &mut Scratch,
+    ) -> bool {
+        self.place((index, group), &mut scratch.centres);
+        let model = self.model;
+        let keep = obstacle.radius + model.margin + self.extra + obstacle.tolerance;
+        let mut slack = self.ops.all(f32::MAX);
+        for sphere in group.spheres.clone() {
+            let apart = distance(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
+            let kept = self.ops.all(keep + model.spheres[sphere].outer);
+            slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, kept));
+        }
+        if self.ops.0.reduce_min_f32s(slack) > 0.0 {
+            return false;
+        }
+        for cover in &model.covers[group.bodies.clone()] {
+            let mut open = 0_u32;
+            for sphere in cover.spheres.clone() {
+                let distance = distance(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
+                let Some(least) = self.below(distance, keep + model.spheres[sphere].outer, &mut open) else {
+                    continue;
+                };
+                if obstacle.is_coarse {
+                    continue;
+                }
+                let required = model.least_margin((cover.link, o));
+                let sure = model.spheres[sphere].inner + obstacle.radius + required + self.extra
+                    - obstacle.tolerance;
+                if least < sure {
+                    return true;
+                }
+            }
+            self.suspect(open, Question::Obstacle(cover.link, o), scratch);
+        }
+        false
+    }
+
+    /// The least of some distances when it is not above a limit; marks the lanes that are not.
+    #[inline(always)]
+    fn below(&self, distances: Vector<S>, limit: f32, open: &mut u32) -> Option<f32> {
+        let least = self.ops.0.reduce_min_f32s(distances);
+        if least > limit {
+            return None;
+        }
+        let mut values = [f32::INFINITY; LANES_MAX];
+        let (slots, _) = S::as_mut_simd_f32s(&mut values);
+        slots[0] = distances;
+        for (lane, value) in values.iter().enumerate().take(S::F32_LANES) {
+            *open |= u32::from(*value <= limit) << lane;
+        }
+        Some(least)
+    }
+
+    #[inline(always)]
+    fn suspect(&self, open: u32, question: Question, scratch: &mut Scratch) {
+        let [first, strides, count] = self.poses;
+        let mut open = open;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize;
+            open &= open - 1;
+            let pose = first + lane * strides;
+            if pose < count {
+                scratch.suspects.push(Suspect { pose: u32::try_from(pose).unwrap_or(u32::MAX), question });
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn meets_itself(&mut self, middles: &[Vector3<S>; MAX_JOINTS + 1], scratch: &mut Scratch) -> bool {
+        let model = self.model;
+        for pair in &model.group_pairs {
+            let [a, b] = pair.groups;
+            let (of_a, of_b) = (&model.groups[a], &model.groups[b]);
+            let apart = self.ops.length(self.ops.sub3(middles[a], middles[b]));
+            let more = self.extra + model.tolerance;
+            if self.ops.0.reduce_min_f32s(apart) > of_a.radius + of_b.radius + pair.required + more {
+                continue;
+            }
+            self.place((a, of_a), &mut scratch.centres);
+            self.place((b, of_b), &mut scratch.centres);
+            let mut slack = self.ops.all(f32::MAX);
+            for bodies in &pair.bodies {
+                slack = self.ops.min(slack, self.body_slack(bodies, &scratch.centres));
+            }
+            if self.ops.0.reduce_min_f32s(slack) > 0.0 {
+                continue;
+            }
+            for bodies in &pair.bodies {
+                if self.bodies_meet(bodies, scratch) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// How much more than they must the larger spheres of two bodies keep.
+    #[inline(always)]
+    fn body_slack(&self, bodies: &super::model::BodyPair, centres: &[f32]) -> Vector<S> {
+        let model = self.model;
+        let [a, b] = bodies.covers.map(|cover| model.covers[cover].spheres.clone());
+        let more = bodies.required + self.extra + model.tolerance;
+        let mut slack = self.ops.all(f32::MAX);
+        for i in a {
+            let at = Self::centre(centres, i);
+            for j in b.clone() {
+                let apart = self.ops.length(self.ops.sub3(at, Self::centre(centres, j)));
+                let kept = self.ops.all(model.spheres[i].outer + model.spheres[j].outer + more);
+                slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, kept));
+            }
+        }
+        slack
+    }
+
+    #[inline(always)]
+    fn bodies_meet(&mut self, bodies: &super::model::BodyPair, scratch: &mut Scratch) -> bool {
+        let model = self.model;
+        let [a, b] = bodies.covers.map(|cover| model.covers[cover].spheres.clone());
+        let more = bodies.required + self.extra;
+        let mut open = 0_u32;
+        for i in a {
+            let (at, one) = (Self::centre(&scratch.centres, i), &model.spheres[i]);
+            for j in b.clone() {
+                let other = &model.spheres[j];
+                let apart = self.ops.length(self.ops.sub3(at, Self::centre(&scratch.centres, j)));
+                let keep = one.outer + other.outer + more + model.tolerance;
+                let Some(least) = self.below(apart, keep, &mut open) else { continue };
+                if one.inner > 0.0
+                    && other.inner > 0.0
+                    && least < one.inner + other.inner + more - model.tolerance
+                {
+                    return true;
+                }
+            }
+        }
+        self.suspect(open, Question::Pair(bodies.pair), scratch);
+        false
+    }
+}
+
+/// Distance of points from an obstacle's core.
+#[inline(always)]
+fn distance<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vector<S> {
+    let from = ops.sub3(point, ops.all3(obstacle.centre));
+    match &obstacle.form {
+        Form::AlignedBox(half) => outside(ops, from, *half),
+        Form::Box(half) => {
+            let rows = &obstacle.rows;
+            let seen = [along(ops, from, rows[0]), along(ops, from, rows[1]), along(ops, from, rows[2])];
+            outside(ops, seen, *half)
+        }
+        Form::Cylinder([half, radius]) => {
+            let axis = ops.all3(obstacle.rows[0]);
+            let height = ops.dot(from, axis);
+            let across = [
+                ops.sub_mul(axis[0], height, from[0]),
+                ops.sub_mul(axis[1], height, from[1]),
+                ops.sub_mul(axis[2], height, from[2]),
+            ];
+            let zero = ops.all(0.0);
+            let beside = ops.max(ops.0.sub_f32s(ops.length(across), ops.all(*radius)), zero);
+            let above = ops.max(ops.0.sub_f32s(ops.abs(height), ops.all(*half)), zero);
+            ops.0.sqrt_f32s(ops.mul_add(beside, beside, ops.0.mul_f32s(above, above)))
+        }
+        Form::Segment(half, per_length2) => {
+            let half = ops.all3(*half);
+            let share = ops.0.mul_f32s(ops.dot(from, half), ops.all(*per_length2));
+            let share = ops.0.min_f32s(ops.max(share, ops.all(-1.0)), ops.all(1.0));
+            let across = [
+                ops.sub_mul(half[0], share, from[0]),
+                ops.sub_mul(half[1], share, from[1]),
+                ops.sub_mul(half[2], share, from[2]),
+            ];
+            ops.length(across)
+        }
+    }
+}
+
+#[inline(always)]
+fn along<S: Simd>(ops: Ops<S>, from: Vector3<S>, row: [f32; 3]) -> Vector<S> {
+    ops.dot(from, ops.all3(row))
+}
+
+/// Distance from a box around the origin.
+#[inline(always)]
+fn outside<S: Simd>(ops: Ops<S>, at: Vector3<S>, half: [f32; 3]) -> Vector<S> {
+    let zero = ops.all(0.0);
+    let x = ops.max(ops.0.sub_f32s(ops.abs(at[0]), ops.all(half[0])), zero);
+    let y = ops.max(ops.0.sub_f32s(ops.abs(at[1]), ops.all(half[1])), zero);
+    let z = ops.max(ops.0.sub_f32s(ops.abs(at[2]), ops.all(half[2])), zero);
+    ops.length([x, y, z])
+}

@@ -1,0 +1,103 @@
+//! Many poses at once, in f32 vectors: which of them keep every distance.
+//!
+//! The answer for each pose is the exact model's ([`World`]). Links are covered by spheres: larger ones that hold the whole shape, and
+//! smaller ones that lie within it. A pose whose larger spheres keep every distance, and more by what f32 can be wrong, is
+//! free. A pose in which a smaller sphere does not keep it, by as much, is not. For the few poses between the two, the pairs of bodies
+//! in question are measured by the exact model.
+mod arithmetic;
+mod cover;
+mod grid;
+mod kernel;
+mod model;
+mod rounding;
+
+use crate::world::{Frames, Other, Pair, World};
+use kernel::{Pass, Question, Suspect};
+use model::Model;
+use pulp::Arch;
+use std::cell::RefCell;
+use taustream_motion::JointArray;
+
+/// The world in f32, beside the exact one.
+pub struct Lanes<'a> {
+    world: &'a World<'a>,
+    model: Model,
+    arch: Arch,
+    scratch: RefCell<Scratch>,
+}
+
+/// Memory that is used again.
+#[derive(Default)]
+struct Scratch {
+    /// Centres of the spheres, x, y and z of each in turn.
+    centres: Vec<f32>,
+    /// Obstacles near a group.
+    near: Vec<u32>,
+    suspects: Vec<Suspect>,
+}
+
+impl<'a> Lanes<'a> {
+    /// Prepares a world.
+    #[must_use]
+    pub fn new(world: &'a World<'a>) -> Self {
+        Self { world, model: Model::new(world), arch: Arch::new(), scratch: RefCell::default() }
+    }
+
+    /// The same on plain arithmetic, one pose at a time: to compare.
+    #[must_use]
+    pub fn scalar(self) -> Self {
+        Self { arch: Arch::Scalar, ..self }
+    }
+
+    /// True when every one of the poses keeps what every pair must, and `extra_m` more.
+    #[must_use]
+    pub fn are_free(&self, poses_rad: &[JointArray], extra_m: f64) -> bool {
+        let scratch = &mut *self.scratch.borrow_mut();
+        scratch.suspects.clear();
+        let pass = Pass { model: &self.model, poses_rad, extra_m, scratch };
+        if !self.arch.dispatch(pass) {
+            return false;
+        }
+        self.are_suspects_free(poses_rad, extra_m, &mut scratch.suspects)
+    }
+
+    /// The first of the poses that is not free.
+    #[must_use]
+    pub fn first_blocked(&self, poses_rad: &[JointArray], extra_m: f64) -> Option<usize> {
+        if self.are_free(poses_rad, extra_m) {
+            return None;
+        }
+        let (mut free, mut blocked) = (0, poses_rad.len());
+        // Poses before `free` are free, one of those before `blocked` is not.
+        while free + 1 < blocked {
+            let middle = usize::midpoint(free, blocked);
+            if self.are_free(&poses_rad[free..middle], extra_m) { free = middle } else { blocked = middle }
+        }
+        Some(free)
+    }
+
+    fn pair(&self, question: Question) -> Option<Pair> {
+        match question {
+            Question::Obstacle(link, obstacle) => {
+                let exception = self.model.exceptions.get(&(link, obstacle)).copied();
+                let required_m = exception.unwrap_or(self.world.margin_m());
+                Some(Pair { link, other: Other::Obstacle(obstacle), required_m })
+            }
+            Question::Pair(index) => self.world.pairs().get(index).copied(),
+        }
+    }
+
+    /// Measures the pairs that f32 leaves open.
+    fn are_suspects_free(&self, poses_rad: &[JointArray], extra_m: f64, suspects: &mut [Suspect]) -> bool {
+        suspects.sort_unstable_by_key(|suspect| suspect.pose);
+        let mut placed: Option<(u32, Frames)> = None;
+        suspects.iter().all(|suspect| {
+            let Some(pose_rad) = poses_rad.get(suspect.pose as usize) else { return false };
+            let frames = match &placed {
+                Some((pose, frames)) if *pose == suspect.pose => frames,
+                Some(_) | None => &placed.insert((suspect.pose, self.world.frames(pose_rad))).1,
+            };
+            self.pair(suspect.question).is_some_and(|pair| self.world.keeps(&pair, frames, extra_m))
+        })
+    }
+}

@@ -1,0 +1,152 @@
+//! The lanes answer as the exact model does.
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use std::path::{Path, PathBuf};
+use taustream_arm::{Obstacle, Robot, Scene, Shape};
+use taustream_motion::chain::Pose;
+use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::lanes::Lanes;
+use taustream_planner::rng::SeededRng;
+use taustream_planner::world::{Snapshot, World};
+
+/// Poses of each arm; a million are asked for by `TAUSTREAM_POSES=1000000`.
+const POSES: u64 = 12_000;
+/// Poses of one scene.
+const POSES_PER_SCENE: u64 = 400;
+
+fn poses() -> u64 {
+    std::env::var("TAUSTREAM_POSES").ok().and_then(|text| text.parse().ok()).unwrap_or(POSES)
+}
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots").join(name)
+}
+
+fn shape(rng: &mut SeededRng) -> Shape {
+    let mut size = || rng.within(0.02, 0.3);
+    let sizes = [size(), size(), size()];
+    match rng.index(6) {
+        0 => Shape::Sphere { radius_m: sizes[0] },
+        1 => Shape::Capsule { radius_m: 0.5 * sizes[0], length_m: 2.0 * sizes[1] },
+        2 => Shape::Cylinder { radius_m: 0.5 * sizes[0], length_m: 2.0 * sizes[1] },
+        3 => {
+            let corner = |i: u32| {
+                let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
+                Point3::new(sign(1) * sizes[0], sign(2) * sizes[1], sign(4) * sizes[2] * 0.5)
+            };
+            let triangles = [
+                [0, 2, 1],
+                [1, 2, 3],
+                [4, 5, 6],
+                [5, 7, 6],
+                [0, 1, 4],
+                [1, 5, 4],
+                [2, 6, 3],
+                [3, 6, 7],
+                [0, 4, 2],
+                [2, 4, 6],
+                [1, 3, 5],
+                [3, 7, 5],
+            ];
+            Shape::Mesh { vertices_m: (0..8).map(corner).collect(), triangles: triangles.to_vec() }
+        }
+        _ => Shape::Box { size_m: sizes.map(|s| 2.0 * s) },
+    }
+}
+
+/// Obstacles up to `far_m` away from the base.
+fn scene(rng: &mut SeededRng, obstacles: usize, far_m: f64) -> Scene {
+    let mut obstacle = |i: usize| {
+        let shape = shape(rng);
+        let mut v =
+            |far: f64| Vector3::new(rng.within(-far, far), rng.within(-far, far), rng.within(-far, far));
+        let at = Translation3::from(v(far_m));
+        // Half of them along the axes of space.
+        let turn = if i.is_multiple_of(2) {
+            UnitQuaternion::identity()
+        } else {
+            UnitQuaternion::from_scaled_axis(v(3.0))
+        };
+        Obstacle { name: format!("thing {i}"), pose: Pose::from_parts(at, turn), shape }
+    };
+    let obstacles = (0..obstacles).map(&mut obstacle).collect();
+    Scene { file: PathBuf::new(), margin_m: rng.within(0.0, 0.02), obstacles }
+}
+
+fn pose(rng: &mut SeededRng, robot: &Robot) -> JointArray {
+    let mut pose = [0.0; MAX_JOINTS];
+    for (q, joint) in pose.iter_mut().zip(&robot.joints) {
+        let [low, high] = joint.limits.position_rad;
+        *q = rng.within(low, high);
+    }
+    pose
+}
+
+/// Goal: for every pose the lanes say what the exact model says, whatever the machine's instructions.
+/// Method: random scenes of every kind of shape, few obstacles and many; at least three poses in ten in contact, as many free.
+#[test]
+fn lanes_answer_as_the_exact_model_for_random_poses() {
+    for (arm, (name, far_m)) in [("ur5.toml", 1.1), ("piper.toml", 0.5)].into_iter().enumerate() {
+        let robot = Robot::load(&file(name)).expect("shipped");
+        let (mut free, mut all) = (0_u64, 0_u64);
+        for number in 0..poses().div_ceil(POSES_PER_SCENE) {
+            let mut rng = SeededRng::new(number, 60 + arm as u64);
+            let few = 1 + rng.index(5);
+            let scene = scene(&mut rng, if number % 8 == 0 { 40 } else { few }, far_m);
+            let world = World::new(&robot, &scene).expect("builds");
+            let world =
+                if number % 5 == 1 { world.relaxed(&pose(&mut rng, &robot), 0.0, 1e-4) } else { world };
+            let lanes = [Lanes::new(&world), Lanes::new(&world).scalar()];
+            let extra_m = if number % 3 == 0 { 0.0 } else { 2e-4 };
+            let mut snapshot = Snapshot::default();
+            let drawn: Vec<JointArray> = (0..POSES_PER_SCENE).map(|_| pose(&mut rng, &robot)).collect();
+            let mut kept = Vec::new();
+            for pose in &drawn {
+                let exact = world.is_free(pose, extra_m, &mut snapshot);
+                let said = lanes.each_ref().map(|l| l.are_free(std::slice::from_ref(pose), extra_m));
+                assert_eq!(said, [exact; 2], "{name}, scene {number}: {pose:?}");
+                (free, all) = (free + u64::from(exact), all + 1);
+                if exact {
+                    kept.push(*pose);
+                }
+            }
+            // Together they are free, with any one that is not they are not.
+            assert!(lanes.iter().all(|l| l.are_free(&kept, extra_m)), "{name}, scene {number}");
+            if let Some(blocked) = drawn.iter().find(|pose| !kept.contains(pose)) {
+                kept.insert(kept.len() / 3, *blocked);
+                assert!(!lanes.iter().any(|l| l.are_free(&kept, extra_m)), "{name}, scene {number}");
+            }
+        }
+        let contact = 1.0 - free as f64 / all as f64;
+        assert!((0.3..0.9).contains(&contact), "{name}: {contact} of the poses in contact");
+    }
+}
+
+/// Goal: next to the limit, where f32 cannot decide, the exact model does.
+/// Method: bisection along random edges to the last free pose; poses within a micrometre on either side of it.
+#[test]
+fn lanes_answer_as_the_exact_model_next_to_contact() {
+    let robot = Robot::load(&file("ur5.toml")).expect("shipped");
+    let mut found = 0;
+    for number in 0..150 {
+        let mut rng = SeededRng::new(number, 70);
+        let scene = scene(&mut rng, 3, 1.1);
+        let world = World::new(&robot, &scene).expect("builds");
+        let (lanes, mut snapshot) = (Lanes::new(&world), Snapshot::default());
+        let (mut free, mut blocked) = (pose(&mut rng, &robot), pose(&mut rng, &robot));
+        let mut is_free = |pose: &JointArray| world.is_free(pose, 0.0, &mut snapshot);
+        if !is_free(&free) || is_free(&blocked) {
+            continue;
+        }
+        for _ in 0..60 {
+            let middle: JointArray = std::array::from_fn(|j| 0.5 * (free[j] + blocked[j]));
+            if is_free(&middle) {
+                free = middle;
+            } else {
+                blocked = middle;
+            }
+            assert_eq!(lanes.are_free(&[middle], 0.0), is_free(&middle), "scene {number}: {middle:?}");
+        }
+        found += 1;
+    }
+    assert!(found > 15, "{found} edges with one end in contact");
+}
