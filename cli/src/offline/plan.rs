@@ -142,7 +142,8 @@ fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Resul
     let score = proof.duration_s;
     let how = "straight line of the tip".to_owned();
     let planning_s = started.elapsed().as_secs_f64();
-    let plan = Plan { trajectory, how, proof, score, energy_j: None, planning_s, checks: 0 };
+    let plan =
+        Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 };
     Ok(Planned { plan, tip, line: Some([length_m, off_m]) })
 }
 
