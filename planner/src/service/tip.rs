@@ -64,6 +64,6 @@ impl Service<'_> {
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * off_m);
         let (score, planning_s) = (imported.proof.duration_s, started.elapsed().as_secs_f64());
         let (trajectory, proof) = (imported.trajectory, imported.proof);
-        Ok(Plan { trajectory, how, proof, score, energy_j: None, planning_s, checks: 0 })
+        Ok(Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 })
     }
 }
