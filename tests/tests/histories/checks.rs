@@ -7,6 +7,7 @@ use crate::harness::JOINTS;
 use std::fmt;
 use taustream_messages::Phase;
 use taustream_motion::LimitSet;
+use taustream_motion::range::POSITION_TOLERANCE_RAD;
 
 /// Cycles that the steps of differences span.
 const WIDTHS: [usize; 3] = [1, 3, 10];
@@ -109,7 +110,8 @@ fn check_drive(log: &Log, joint: usize, report: &mut Report<'_>) {
     let steady = steady_since(log);
     let mut run = 0;
     for (index, &(tick, position_rad)) in setpoints.iter().enumerate() {
-        if !(low - 1e-9..=high + 1e-9).contains(&position_rad) {
+        let inside = low - POSITION_TOLERANCE_RAD..=high + POSITION_TOLERANCE_RAD;
+        if !inside.contains(&position_rad) {
             report(Rule::Range, format!("joint {joint} at {position_rad} rad, tick {tick}"));
         }
         let Some(&(before, last_rad)) = index.checked_sub(1).map(|before| &setpoints[before]) else {
@@ -223,6 +225,9 @@ fn check_pair(log: &Log, [before, now]: [&Cycle; 2], report: &mut Report<'_>) {
             && now.s > motion.from_s
             && before.s > motion.from_s
             && before.id == now.id
+            // What was not sent is sampled again, and a takeover is not one.
+            && before.sent
+            && now.sent
             && log.cycles.iter().any(|cycle| cycle.id == motion.id)
             && now.id != 0
     });

@@ -49,7 +49,7 @@ const CORRUPTIONS: [(Rule, Corruption); 13] = [
         at > 0
     }),
     (Rule::Range, |log| {
-        log.limits[0].position_rad[1] = log.drives[0].last().map_or(0.0, |last| last.1) - 1e-6;
+        log.limits[0].position_rad[1] = log.drives[0].last().map_or(0.0, |last| last.1) - 2e-3;
         !log.drives[0].is_empty()
     }),
     (Rule::OnPath, |log| middle(log, moving).is_some_and(|at| shift(log, at, 1e-10))),
