@@ -142,7 +142,8 @@ pub(super) fn robot(
     Robot::from_toml(&absolute.with_extension("toml"), &text).map_err(|faults| faults.to_string())
 }
 
-/// The link that the last of the joints moves, as a URDF file says it.
+/// The link behind the last of the joints on the way from base to tip, as a URDF file says it; their order in the list is the
+/// problems' own.
 ///
 /// # Errors
 /// When the file cannot be read, or has no such joint.
@@ -150,12 +151,36 @@ pub(super) fn link_behind_last(urdf: &Path, joints: &[String]) -> Result<String,
     let fail = |why: String| format!("{}: {why}", urdf.display());
     let text = fs::read_to_string(urdf).map_err(|e| fail(e.to_string()))?;
     let document = roxmltree::Document::parse(&text).map_err(|e| fail(e.to_string()))?;
-    let last = joints.last().ok_or_else(|| fail("the problems name no joints".to_owned()))?;
-    let mut elements = document.descendants();
-    let joint = elements.find(|e| e.has_tag_name("joint") && e.attribute("name") == Some(last));
-    let child = joint.and_then(|joint| joint.children().find(|e| e.has_tag_name("child")));
-    let link = child.and_then(|child| child.attribute("link"));
-    link.map(str::to_owned).ok_or_else(|| fail(format!("it has no joint {last} with a child link")))
+    let elements = document.root_element().children().filter(|e| e.has_tag_name("joint"));
+    let link = |joint: &roxmltree::Node, tag: &str| -> Option<String> {
+        let end = joint.children().find(|e| e.has_tag_name(tag))?;
+        end.attribute("link").map(str::to_owned)
+    };
+    // Parent and child link of every joint, fixed ones included.
+    let ends: Vec<(&str, String, String)> = elements
+        .filter_map(|joint| Some((joint.attribute("name")?, link(&joint, "parent")?, link(&joint, "child")?)))
+        .collect();
+    let child_of = |name: &str| ends.iter().find(|(joint, ..)| *joint == name).map(|(.., child)| child);
+    let joints_before = |link: &str| {
+        let (mut at, mut count) = (link, 0);
+        // No longer than there are joints: a file may have a ring.
+        for _ in 0..ends.len() {
+            let Some((joint, parent, _)) = ends.iter().find(|(.., child)| child == at) else { break };
+            count += usize::from(joints.iter().any(|name| name == joint));
+            at = parent;
+        }
+        count
+    };
+    let mut last = None;
+    for name in joints {
+        let child =
+            child_of(name).ok_or_else(|| fail(format!("it has no joint {name} with a child link")))?;
+        let before = joints_before(child);
+        if last.is_none_or(|(most, _)| before > most) {
+            last = Some((before, child));
+        }
+    }
+    last.map(|(_, child)| child.clone()).ok_or_else(|| fail("the problems name no joints".to_owned()))
 }
 
 /// JSON strings without control characters are TOML strings.
@@ -168,7 +193,12 @@ fn obstacle(index: usize, thing: &Thing) -> Result<Obstacle, String> {
     let [x, y, z, w] = thing.q;
     let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6)
         .filter(|turn| turn.coords.iter().chain(&thing.p).all(|v| v.is_finite()))
-        .ok_or_else(|| format!("obstacle {}: its pose is not one", thing.name))?;
+        .ok_or_else(|| {
+            format!(
+                "obstacle {}: its pose is none: three finite numbers of m and a quaternion are needed",
+                thing.name
+            )
+        })?;
     let shape = match thing.form {
         Form::Box { size } => Shape::Box { size_m: size },
         Form::Cylinder { length, radius } => Shape::Cylinder { radius_m: radius, length_m: length },

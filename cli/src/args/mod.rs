@@ -65,7 +65,7 @@ fn after_help() -> String {
 }
 
 /// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
-const WITHOUT_SETTINGS: [&[&str]; 17] = [
+const WITHOUT_SETTINGS: [&[&str]; 19] = [
     &["plan"],
     &["import"],
     &["sample"],
@@ -78,7 +78,9 @@ const WITHOUT_SETTINGS: [&[&str]; 17] = [
     &["man"],
     &["bench", "compare"],
     &["bench", "cost"],
+    &["bench", "cuts"],
     &["bench", "follow"],
+    &["bench", "mbm"],
     &["bench", "papers"],
     &["bench", "planners"],
     &["bench", "stops"],
