@@ -1,7 +1,7 @@
 //! Processes that are stopped, killed or flooded under a moving arm: the streamer says so, blames no drive, and comes back by command
 //! alone; a planner is missed by nobody until the next request.
 use crate::scenarios::{CheckMode, Goals, Scenario, enable, go, is_ready_to_enable, set_off};
-use crate::test_bench::{TIMEOUT, TestBench};
+use crate::test_bench::{Motion, TIMEOUT, TestBench};
 use crate::virtual_arm::random::SeededRng;
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
@@ -24,7 +24,11 @@ const FLOOD: u32 = 400;
 /// Every scenario, in the order in which they run.
 pub const ALL: &[Scenario] = &[
     scenario("streamer_stopped_shortly_mid_motion_goes_on_or_pauses", stopped_shortly),
-    scenario("streamer_stopped_for_long_mid_motion_names_its_own_stall", stopped_for_long),
+    // What the drives send meanwhile overflows the socket of a process that is stopped.
+    Scenario {
+        check_mode: CheckMode::WithLosses,
+        ..scenario("streamer_stopped_for_long_mid_motion_names_its_own_stall", stopped_for_long)
+    },
     scenario("planners_killed_in_motion_one_after_the_other_change_nothing", planners_killed),
     scenario("request_floods_in_motion_change_nothing", floods),
 ];
@@ -110,7 +114,7 @@ fn planners_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let mut rng = SeededRng::new(count, 2);
     let mut goal = 0;
     for number in 0..count {
-        bench.replan(&goals.text(goal)?).with_context(|| format!("before kill {number}"))?;
+        replan_once_known(bench, &goals.text(goal)?).with_context(|| format!("before kill {number}"))?;
         sleep(Duration::from_millis(rng.whole(50, 600)));
         goal = (goal + 1) % goals.0.len();
         let last = bench.replan(&goals.text(goal)?).with_context(|| format!("kill {number}, in motion"))?;
@@ -126,11 +130,25 @@ fn planners_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
         }
         goal = (goal + 1) % goals.0.len();
     }
-    let motion = bench.replan(&goals.text(goal)?)?;
+    let motion = replan_once_known(bench, &goals.text(goal)?)?;
     let report = bench.await_end_of(motion)?;
     ensure!(report.guard_trips == 0, "the guard tripped");
     println!("       {count} planners were killed in motion; {} trajectories accepted", report.accepted);
     Ok(())
+}
+
+/// A replacement that waits is known to the planner that has sent it; its successor refuses until the motion has taken over, and
+/// says why.
+fn replan_once_known(bench: &TestBench, goal: &str) -> Result<Motion> {
+    let since = Instant::now();
+    loop {
+        match bench.replan(goal) {
+            Err(why) if format!("{why:#}").contains("not known here") && since.elapsed() < TIMEOUT => {
+                sleep(Duration::from_millis(50));
+            }
+            answer => return answer,
+        }
+    }
 }
 
 /// Commands that change nothing, and requests to plan that are refused, as fast as they can be sent.
