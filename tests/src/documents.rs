@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Commands of the source tree, and the step of `cargo xtask test` that covers each of them.
-const CHECKOUT_LINES: [(&str, &str); 11] = [
+const CHECKOUT_LINES: [(&str, &str); 12] = [
+    ("cargo test --workspace --test histories", "tests"),
     ("cargo test --workspace --test virtual_arm", "tests"),
     ("cargo xtask planted --check", "planted faults"),
     ("cargo xtask planted", "nothing: it takes hours"),
