@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
-use taustream_planner::goals::{Line, LineError, TipError, plan_line};
+use taustream_planner::goals::{LineError, TipError, plan_line};
 use taustream_planner::{
     Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
     plan_to_tip,
@@ -136,15 +136,11 @@ struct Planned {
 
 fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, LineError> {
     let started = Instant::now();
-    let Line { imported, length_m, off_m, .. } = plan_line(situation, target, &args.goal.tip_speed())?;
-    let (trajectory, proof) = (imported.trajectory, imported.proof);
-    let tip = Some((*target, target.error(situation.robot, &trajectory.end_rad())));
-    let score = proof.duration_s;
-    let how = "straight line of the tip".to_owned();
-    let planning_s = started.elapsed().as_secs_f64();
-    let plan =
-        Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 };
-    Ok(Planned { plan, tip, line: Some([length_m, off_m]) })
+    let found = plan_line(situation, target, &args.goal.tip_speed())?;
+    let line = Some([found.length_m, found.off_m]);
+    let plan = found.into_plan("straight line of the tip".to_owned(), started.elapsed().as_secs_f64());
+    let tip = Some((*target, target.error(situation.robot, &plan.trajectory.end_rad())));
+    Ok(Planned { plan, tip, line })
 }
 
 fn to_tip(

@@ -8,7 +8,7 @@ use super::inverse::Inverse;
 use super::target::{Orientation, TipTarget};
 use super::{Situation, check_reach, check_target};
 use crate::import::{ImportError, Imported, Reference, import};
-use crate::plan::{PoseOf, check_pose};
+use crate::plan::{Plan, PoseOf, check_pose};
 use crate::timing::line::LineLimits;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taustream_arm::{MotionTable, Robot};
@@ -57,6 +57,16 @@ pub struct Line {
     pub angle_rad: f64,
     /// How far the tip is from the line at most.
     pub off_m: f64,
+}
+
+impl Line {
+    /// The motion as a plan, which took so long to find.
+    #[must_use]
+    pub fn into_plan(self, how: String, planning_s: f64) -> Plan {
+        let Imported { trajectory, proof, .. } = self.imported;
+        let score = proof.duration_s;
+        Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 }
+    }
 }
 
 /// Why there is no such motion.

@@ -18,7 +18,7 @@ use crate::plan::{
 };
 use crate::world::World;
 use nalgebra::Vector3;
-use poses::Search;
+use poses::{Poses, Search};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
@@ -75,15 +75,11 @@ pub fn plan_to_tip(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Reached, GoalError> {
-    let Situation { robot, scene, start_rad, .. } = *situation;
+    let Situation { robot, start_rad, .. } = *situation;
     let budget = Budget::until(options.clock(), cancel);
     check_target(target)?;
     check_pose(robot, PoseOf::Start, &start_rad)?;
-    let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
-    let reach_m = check_reach(robot, target)?;
-    let (reading, seed) = (options.reading, options.seed);
-    let search = Search { world: &world, budget: &budget, start_rad, target, reach_m, finder, reading, seed };
-    let poses = search.run(options.deadline)?;
+    let (poses, reach_m) = find_poses(situation, (target, finder), options, &budget)?;
     let (mut plan, pose_rad) =
         best_motion(situation, &poses.clear, options, (&budget, cancel))?.map_err(|(planned, error)| {
             let poses = poses.clear.len();
@@ -112,14 +108,24 @@ pub fn tip_poses(
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
 ) -> Result<Vec<JointArray>, GoalError> {
-    let Situation { robot, scene, start_rad, .. } = *situation;
     let budget = Budget::until(options.clock(), cancel);
     check_target(target)?;
+    Ok(find_poses(situation, (target, Finder::Inverse), options, &budget)?.0.clear)
+}
+
+/// Clear poses whose tip is at a target, and how far the arm reaches at most (m).
+fn find_poses(
+    situation: &Situation,
+    (target, finder): (&TipTarget, Finder),
+    options: &PlanOptions,
+    budget: &Budget,
+) -> Result<(Poses, f64), GoalError> {
+    let Situation { robot, scene, start_rad, .. } = *situation;
     let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
     let reach_m = check_reach(robot, target)?;
-    let (reading, seed, finder) = (options.reading, options.seed, Finder::Inverse);
-    let search = Search { world: &world, budget: &budget, start_rad, target, reach_m, finder, reading, seed };
-    Ok(search.run(options.deadline)?.clear)
+    let (reading, seed) = (options.reading, options.seed);
+    let search = Search { world: &world, budget, start_rad, target, reach_m, finder, reading, seed };
+    Ok((search.run(options.deadline)?, reach_m))
 }
 
 /// Plans a verified motion to the best of several poses.

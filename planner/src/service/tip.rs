@@ -1,8 +1,6 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
 use super::{Request, Service};
-use crate::goals::{
-    GOALS_MAX, GoalError, Line, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses,
-};
+use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
 use crate::plan::{Plan, PlanOptions, StartMargin};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::time::Instant;
@@ -60,10 +58,8 @@ impl Service<'_> {
         let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
         let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
         let planned = self.work(request, options.deadline, |_| plan_line(&situation, &target, &speed))?;
-        let Line { imported, off_m, .. } = planned.map_err(|e| e.to_string())?;
-        let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * off_m);
-        let (score, planning_s) = (imported.proof.duration_s, started.elapsed().as_secs_f64());
-        let (trajectory, proof) = (imported.trajectory, imported.proof);
-        Ok(Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 })
+        let line = planned.map_err(|e| e.to_string())?;
+        let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);
+        Ok(line.into_plan(how, started.elapsed().as_secs_f64()))
     }
 }
