@@ -6,6 +6,7 @@ mod live;
 mod mbm;
 mod offline;
 mod papers;
+mod pictures;
 mod planners;
 mod stream;
 mod timing;
@@ -24,6 +25,7 @@ pub(crate) use offline::{
 pub(crate) use cuts::CutsBenchArgs;
 pub(crate) use mbm::MbmArgs;
 pub(crate) use papers::PapersArgs;
+pub(crate) use pictures::PicturesArgs;
 pub(crate) use planners::PlannersArgs;
 pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};
 pub(crate) use timing::TimingArgs;
@@ -65,7 +67,7 @@ fn after_help() -> String {
 }
 
 /// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
-const WITHOUT_SETTINGS: [&[&str]; 19] = [
+const WITHOUT_SETTINGS: [&[&str]; 20] = [
     &["plan"],
     &["import"],
     &["sample"],
@@ -82,6 +84,7 @@ const WITHOUT_SETTINGS: [&[&str]; 19] = [
     &["bench", "follow"],
     &["bench", "mbm"],
     &["bench", "papers"],
+    &["bench", "pictures"],
     &["bench", "planners"],
     &["bench", "stops"],
     &["bench", "timing"],

@@ -312,6 +312,8 @@ pub(crate) enum BenchName {
     Timing(super::TimingArgs),
     /// Measure how long stops take and how far they go, by speed, by phase and by move, against the optimum along the path.
     Stops(StopsBenchArgs),
+    /// Draw one move through three points and one replacement in motion, as others make them and as ours.
+    Pictures(super::PicturesArgs),
     /// Measure how long replacements of running motions take, against the optimum from the state at the cut.
     Cuts(super::CutsBenchArgs),
 }
