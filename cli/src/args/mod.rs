@@ -8,6 +8,7 @@ mod offline;
 mod papers;
 mod pictures;
 mod planners;
+mod scene;
 mod stream;
 mod timing;
 
@@ -27,6 +28,7 @@ pub(crate) use mbm::MbmArgs;
 pub(crate) use papers::PapersArgs;
 pub(crate) use pictures::PicturesArgs;
 pub(crate) use planners::PlannersArgs;
+pub(crate) use scene::{AddArgs, MoveArgs, SceneAction, SceneArgs, Triple};
 pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};
 pub(crate) use timing::TimingArgs;
 
@@ -193,6 +195,8 @@ pub(crate) enum Action {
     Follow(FollowArgs),
     /// Move one joint, or the tip along an axis, while a key is held.
     Jog(JogArgs),
+    /// List and change the running planner's scene: add, move, remove, attach to the tip, detach.
+    Scene(SceneArgs),
     /// Bring the running motion to rest, and drop the motions that wait.
     Cancel(CancelArgs),
     /// Lead joints that are outside their position limits back inside.

@@ -153,9 +153,9 @@ impl Service<'_> {
             Way::RestFirst => PlanOptions { deadline: Duration::from_secs_f64(search_s), ..*options },
             Way::Taper | Way::Direct | Way::End => *options,
         };
-        let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
+        let (revision, goal_rad) = (self.revision(), requested.goal_rad);
         let made = self.work(request, limited.deadline, |cancel| {
-            let surroundings = Surroundings { robot, scene, cancel };
+            let surroundings = Surroundings { robot: &revision.robot, scene: &revision.scene, cancel };
             match way {
                 Way::Taper => surroundings.taper(&cut, &limited),
                 Way::Direct => surroundings.direct_or_after_end([&cut, &end], &goal_rad, &limited),
@@ -167,6 +167,13 @@ impl Service<'_> {
             Ok(made) => made,
             Err(e) => return Ok(Tried::NoWay(e.to_string())),
         };
+        let from_s = match made.replaces {
+            Replaces::Cut { at_s, .. } => at_s,
+            Replaces::Rest => 0.0,
+        };
+        if let Err(reason) = self.still_free(&revision, (&made.trajectory, from_s)) {
+            return Ok(Tried::NoWay(reason));
+        }
         let (planning_s, proven_ns) = (begun.elapsed().as_secs_f64(), now_ns());
         if !request.is_connected() {
             return Ok(Tried::Done(failed("the client has disconnected; motion not sent")));
@@ -184,6 +191,11 @@ impl Service<'_> {
         }
         let stages = PlanStages { planned_ns: made.planned_ns, ..self.stages(&sent, proven_ns) };
         Ok(Tried::Done(outcome(&sent, made, (planning_s, stages))))
+    }
+
+    /// The cut of what runs, or waits, for a replacement that reaches the streamer within `latency_s`.
+    pub(super) fn cut_ahead(&self, report: &Report, latency_s: f64) -> CutPoint {
+        self.cut(report, (When::AtOnce, Way::Direct), latency_s)
     }
 
     /// What is cut, and when, for a replacement that reaches the streamer within `latency_s`.
