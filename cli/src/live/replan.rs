@@ -98,6 +98,14 @@ impl fmt::Display for Answer {
     }
 }
 
+impl Planned {
+    /// The same plan, of which another trajectory has taken the rest.
+    pub(crate) fn rerouted(self, trajectory_id: u64) -> Self {
+        let planner = format!("{}; rerouted when the scene changed", self.planner);
+        Self { trajectory_id, planner, ..self }
+    }
+}
+
 impl fmt::Display for Planned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s", self.planner, self.planning_s)?;

@@ -72,12 +72,12 @@ impl fmt::Display for Listed {
 
 /// What a change did.
 #[derive(Debug, Serialize)]
-struct Changed {
+pub(crate) struct Changed {
     arm: String,
     revision: u64,
     objects: usize,
-    effect: &'static str,
-    trajectory_id: Option<u64>,
+    pub(crate) effect: &'static str,
+    pub(crate) trajectory_id: Option<u64>,
     note: Option<String>,
     checked_s: f64,
     acted_s: f64,
@@ -127,7 +127,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &SceneArgs) -> Resu
 }
 
 /// The way to the planner's scene.
-struct ScenePort<'a> {
+pub(crate) struct ScenePort<'a> {
     // Ports go before their node.
     scene: SceneClient,
     events: Events,
@@ -135,7 +135,7 @@ struct ScenePort<'a> {
 }
 
 impl<'a> ScenePort<'a> {
-    fn open(client: &'a Client) -> Result<Self, Failure> {
+    pub(crate) fn open(client: &'a Client) -> Result<Self, Failure> {
         let (scene, events) = (client.wire().scene_client()?, client.wire().events(Topic::Plan));
         Ok(Self { scene, events, client })
     }
@@ -210,7 +210,8 @@ impl<'a> ScenePort<'a> {
         Ok(SceneChange::Move { name, pose: ObjectPose { position_m, quaternion_xyzw } })
     }
 
-    fn change(&mut self, arm: &str, changes: &[SceneChange]) -> Result<Changed, Failure> {
+    /// Sends changes, up to 16 of them.
+    pub(crate) fn change(&mut self, arm: &str, changes: &[SceneChange]) -> Result<Changed, Failure> {
         let request = CheckedSceneRequest::Change(changes.to_vec());
         let SceneOutcome::Changed { revision, total, effect, note, times_ns } = self.ask(&request)? else {
             return Err(no_sense());

@@ -1,5 +1,5 @@
 //! Buses in `taustream check`: the table, the result, the remedies.
-#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+#![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use crate::common::{Scratch, config};
 
 /// The shipped six servos on one bus that `keys` describe; its file names robot and scene by whole paths.
