@@ -208,7 +208,6 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Reference(_)
         | Action::Status
         | Action::Watch(_) => true,
-        Action::Scene(args) => !args.reads_a_file(),
         Action::Plan(_)
         | Action::Import(_)
         | Action::Sample(_)
@@ -269,7 +268,6 @@ mod tests {
             &["status", "--settings", "/etc/shadow"],
             &["status", "--settings", "../settings"],
             &["status", "--settings", "x.toml"],
-            &["scene", "add", "--file", "/etc/shadow"],
         ] {
             let refused = understood(&text(words, None));
             assert!(matches!(refused, Err(Failure::Usage(_))), "{words:?}: {refused:?}");

@@ -19,8 +19,6 @@ mod manual;
 mod mbm;
 #[path = "cli/papers.rs"]
 mod papers;
-#[path = "cli/pictures.rs"]
-mod pictures;
 #[path = "cli/planners.rs"]
 mod planners;
 #[path = "cli/plot.rs"]

@@ -10,7 +10,6 @@ pub(crate) mod recover;
 pub(crate) mod reference;
 pub(crate) mod replan;
 pub(crate) mod run;
-pub(crate) mod scene;
 pub(crate) mod status;
 mod stop_way;
 mod target_lines;
