@@ -80,7 +80,7 @@ pub struct Scene {
 pub const MARGIN_M_DEFAULT: f64 = 0.02;
 
 /// Most obstacles in a scene.
-const OBSTACLES_MAX: usize = 1000;
+pub const OBSTACLES_MAX: usize = 1000;
 
 const MARGIN_M: Bounds = Bounds::within(0.0, 1.0, "m");
 const CENTER_M: Bounds = Bounds::within(-100.0, 100.0, "m");

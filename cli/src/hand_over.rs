@@ -208,6 +208,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Reference(_)
         | Action::Status
         | Action::Watch(_) => true,
+        Action::Scene(args) => !args.reads_a_file(),
         Action::Plan(_)
         | Action::Import(_)
         | Action::Sample(_)
@@ -268,6 +269,7 @@ mod tests {
             &["status", "--settings", "/etc/shadow"],
             &["status", "--settings", "../settings"],
             &["status", "--settings", "x.toml"],
+            &["scene", "add", "--file", "/etc/shadow"],
         ] {
             let refused = understood(&text(words, None));
             assert!(matches!(refused, Err(Failure::Usage(_))), "{words:?}: {refused:?}");

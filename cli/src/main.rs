@@ -76,6 +76,7 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
         Action::Replan(args) => interrupt::watch().and_then(|()| live::replan::run(form, settings, args)),
         Action::Follow(args) => interrupt::watch().and_then(|()| live::targets::run(form, settings, args)),
         Action::Jog(args) => interrupt::watch().and_then(|()| live::jog::run(form, settings, args)),
+        Action::Scene(args) => interrupt::watch().and_then(|()| live::scene::run(form, settings, args)),
         Action::Cancel(args) => interrupt::watch().and_then(|()| live::cancel::run(form, settings, args)),
         Action::Recover(args) => interrupt::watch().and_then(|()| live::recover::run(form, settings, args)),
         Action::Run(args) => interrupt::watch().and_then(|()| live::run::run(form, settings, args)),

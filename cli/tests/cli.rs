@@ -19,6 +19,8 @@ mod manual;
 mod mbm;
 #[path = "cli/papers.rs"]
 mod papers;
+#[path = "cli/pictures.rs"]
+mod pictures;
 #[path = "cli/planners.rs"]
 mod planners;
 #[path = "cli/plot.rs"]

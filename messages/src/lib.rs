@@ -18,12 +18,13 @@ pub mod plan;
 pub mod receipt;
 pub mod reference_state;
 pub mod report;
+pub mod scene;
+pub mod scene_reply;
 pub mod service;
 pub mod target;
 pub mod text;
 pub mod tip_goal;
 pub mod trajectory;
-pub mod way_points;
 
 pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
@@ -34,9 +35,11 @@ pub use plan::{PlanReply, PlanRequest};
 pub use receipt::{Outcome, Receipt, Rejection};
 pub use reference_state::ReferenceState;
 pub use report::Report;
+pub use scene::{CheckedSceneRequest, SceneRequest};
+pub use scene_reply::SceneReply;
 pub use target::{CheckedTargets, TargetReply, TargetRequest};
 pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 6;
+pub const LAYOUT_VERSION: u32 = 5;

@@ -6,8 +6,8 @@
 use crate::files::{ArmFiles, Footprint, NODE_COUNTER, ROOT, SEGMENTS, UsersLock};
 use crate::operator::abstract_name;
 use crate::{
-    CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, TargetReply, TargetRequest,
-    TrajectoryMessage,
+    CommandReply, CommandRequest, PlanReply, PlanRequest, Receipt, Report, SceneReply, SceneRequest,
+    TargetReply, TargetRequest, TrajectoryMessage,
 };
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
@@ -41,6 +41,10 @@ pub type CommandClient = Client<ipc::Service, CommandRequest, (), CommandReply, 
 pub type CommandServer = Server<ipc::Service, CommandRequest, (), CommandReply, ()>;
 /// Asks the planner.
 pub type PlanClient = Client<ipc::Service, PlanRequest, (), PlanReply, ()>;
+/// Changes the planner's scene.
+pub type SceneClient = Client<ipc::Service, SceneRequest, (), SceneReply, ()>;
+/// Takes changes of the scene.
+pub type SceneServer = Server<ipc::Service, SceneRequest, (), SceneReply, ()>;
 /// Sends targets to the planner.
 pub type TargetClient = Client<ipc::Service, TargetRequest, (), TargetReply, ()>;
 /// Takes targets.
@@ -54,6 +58,8 @@ pub(crate) const NODES_MAX: usize = 32;
 const SUBSCRIBERS_MAX: usize = 24;
 /// Most processes that may send trajectories at one time.
 const PUBLISHERS_MAX: usize = 4;
+/// The streamer and the planner, and one each that has died and is not cleared away yet.
+const TRAJECTORY_READERS_MAX: usize = 4;
 /// Reports that a slow reader may lag behind; older ones are overwritten.
 const REPORT_BUFFER: usize = 64;
 /// Receipts that a slow reader may lag behind.
@@ -376,7 +382,7 @@ publish_subscribe!(
     TrajectoryMessage,
     "trajectory",
     PUBLISHERS_MAX,
-    2,
+    TRAJECTORY_READERS_MAX,
     TRAJECTORY_BUFFER
 );
 publish_subscribe!(
@@ -455,3 +461,4 @@ macro_rules! request_response {
 request_response!(command_service, command_client, command_server, CommandRequest, CommandReply, "command");
 request_response!(plan_service, plan_client, plan_server, PlanRequest, PlanReply, "plan");
 request_response!(target_service, target_client, target_server, TargetRequest, TargetReply, "target");
+request_response!(scene_service, scene_client, scene_server, SceneRequest, SceneReply, "scene");

@@ -4,17 +4,22 @@
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanRequestError, PlanStages, When};
+use taustream_messages::scene::{
+    CHANGES_MAX, FAR_M, FixedTo, MASS_KG_MAX, ObjectPose, ObjectShape, PAGE, SceneChange, SceneRequestError,
+    What, is_object_name,
+};
+use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
 use taustream_messages::target::{
     CheckedTargets, DUE_S_MAX, TARGETS_MAX, Target, TargetError, TargetOutcome,
 };
 use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::trajectory::{Corrupted, MessageError};
-use taustream_messages::way_points::{Blend, WAY_POINTS_MAX};
 use taustream_messages::{
-    CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome, Phase, PlanReply,
-    PlanRequest, Receipt, Rejection, Replaces, Report, TargetReply, TargetRequest, Text, TrajectoryMessage,
+    CheckedSceneRequest, CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome,
+    Phase, PlanReply, PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply, SceneRequest,
+    TargetReply, TargetRequest, Text, TrajectoryMessage,
 };
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
 /// Makes a message of arbitrary bytes, as a hostile sender can.
 #[expect(unsafe_code, reason = "a test of arbitrary bits has to write arbitrary bits")]
@@ -80,6 +85,29 @@ proptest! {
         }
         if let TargetOutcome::Refused { reason } = from_bytes::<TargetReply>(&reply).outcome() {
             prop_assert!(reason.chars().all(|c| !c.is_control()));
+        }
+    }
+
+    #[test]
+    fn scene_changes_of_any_bytes_are_checked_or_refused(
+        request in bytes_of(size_of::<SceneRequest>()),
+        reply in bytes_of(size_of::<SceneReply>()),
+    ) {
+        if let Ok(CheckedSceneRequest::Change(changes)) = CheckedSceneRequest::try_from(&*from_bytes::<SceneRequest>(&request)) {
+            prop_assert!((1..=CHANGES_MAX).contains(&changes.len()));
+            for change in &changes {
+                prop_assert!(is_object_name(change.name()));
+                if let SceneChange::Add { pose, mass_kg, .. } = change {
+                    prop_assert!(pose.position_m.iter().all(|x| x.abs() <= FAR_M));
+                    prop_assert!((0.0..=MASS_KG_MAX).contains(mass_kg));
+                }
+            }
+        }
+        match from_bytes::<SceneReply>(&reply).outcome() {
+            SceneOutcome::Listed { objects, .. } => prop_assert!(objects.len() <= PAGE),
+            SceneOutcome::Changed { note: text, .. } | SceneOutcome::Refused { reason: text } => {
+                prop_assert!(text.chars().all(|c| !c.is_control()));
+            }
         }
     }
 
@@ -219,9 +247,13 @@ fn goals_of_the_tip_survive_the_wire_and_numbers_that_make_no_sense_are_refused(
         line: Some(TipLine { linear_m_s: 0.1, angular_rad_s: 1.0, off_m_max: 1e-3 }),
     };
     let request = |tip: TipGoal| CheckedPlanRequest {
+        joints: 6,
+        goal_rad: [0.0; MAX_JOINTS],
         tip: Some(tip),
+        when: When::AtOnce,
         deadline_ms: 100,
-        ..CheckedPlanRequest::to_pose(6, [0.0; MAX_JOINTS])
+        seed: 1,
+        planner: String::new(),
     };
     let sent = |tip: TipGoal| CheckedPlanRequest::try_from(&PlanRequest::from(&request(tip)));
     for tip in [
@@ -263,11 +295,13 @@ fn plan_request_and_answer_survive_the_wire() {
     let mut goal_rad = [0.0; MAX_JOINTS];
     goal_rad[5] = -1.25;
     let request = CheckedPlanRequest {
+        joints: 6,
+        goal_rad,
+        tip: None,
         when: When::AfterCurrent,
         deadline_ms: 1500,
         seed: 42,
         planner: "rrt-connect".into(),
-        ..CheckedPlanRequest::to_pose(6, goal_rad)
     };
     assert_eq!(CheckedPlanRequest::try_from(&PlanRequest::from(&request)), Ok(request));
     let outcomes = [
@@ -285,37 +319,6 @@ fn plan_request_and_answer_survive_the_wire() {
     ];
     for outcome in outcomes {
         assert_eq!(PlanReply::new(&outcome).outcome(), outcome);
-    }
-}
-
-#[test]
-fn way_points_survive_the_wire_and_those_that_make_no_sense_are_refused() {
-    let pose = |value_rad: f64| std::array::from_fn(|joint| if joint < 6 { value_rad } else { 0.0 });
-    let with = |via_rad: Vec<JointArray>, blend| CheckedPlanRequest {
-        via_rad,
-        blend,
-        ..CheckedPlanRequest::to_pose(6, pose(0.5))
-    };
-    let sent = |request: &CheckedPlanRequest| CheckedPlanRequest::try_from(&PlanRequest::from(request));
-    for good in [
-        with(Vec::new(), Blend::Clearance),
-        with(vec![pose(0.1), pose(-0.2)], Blend::Radians(0.0)),
-        with(vec![pose(0.3); WAY_POINTS_MAX], Blend::Metres(0.05)),
-    ] {
-        assert_eq!(sent(&good), Ok(good));
-    }
-    let mut seventh = pose(0.1);
-    seventh[6] = 0.1;
-    for bad in [
-        with(vec![pose(0.3); WAY_POINTS_MAX + 1], Blend::Clearance),
-        with(vec![pose(0.3), pose(f64::NAN)], Blend::Clearance),
-        with(vec![pose(f64::INFINITY)], Blend::Clearance),
-        with(vec![seventh], Blend::Clearance),
-        with(vec![pose(0.3)], Blend::Radians(f64::NAN)),
-        with(vec![pose(0.3)], Blend::Radians(-1e-3)),
-        with(vec![pose(0.3)], Blend::Metres(f64::INFINITY)),
-    ] {
-        assert!(sent(&bad).is_err(), "{bad:?}");
     }
 }
 
@@ -384,5 +387,99 @@ fn replies_to_targets_arrive_as_they_were_sent() {
     for outcome in outcomes {
         let reply = TargetReply::new(11, &outcome);
         assert_eq!((reply.sequence(), reply.outcome()), (11, outcome));
+    }
+}
+
+fn object_pose(position_m: [f64; 3]) -> ObjectPose {
+    ObjectPose { position_m, quaternion_xyzw: [0.0, 0.6, 0.0, 0.8] }
+}
+
+fn addition(name: &str, shape: ObjectShape, pose: ObjectPose) -> SceneChange {
+    SceneChange::Add {
+        name: name.to_owned(),
+        shape,
+        pose,
+        fixed_to: FixedTo::Tip,
+        mass_kg: 2.0,
+        replaces: true,
+    }
+}
+
+#[test]
+fn scene_changes_and_answers_arrive_as_they_were_sent() {
+    let pose = object_pose([0.1, -2.0, 3.0]);
+    let name = || "a".repeat(64);
+    let all = vec![
+        addition(&name(), ObjectShape::Box { size_m: [1.0, 2.0, 3.0] }, pose),
+        addition("b", ObjectShape::Sphere { radius_m: 0.1 }, pose),
+        addition("c", ObjectShape::Cylinder { radius_m: 0.1, length_m: 0.2 }, pose),
+        addition("d", ObjectShape::Capsule { radius_m: 0.1, length_m: 0.2 }, pose),
+        SceneChange::Remove { name: name() },
+        SceneChange::Move { name: name(), pose },
+        SceneChange::Attach { name: name(), mass_kg: 0.0 },
+        SceneChange::Detach { name: name() },
+    ];
+    for request in [CheckedSceneRequest::Change(all), CheckedSceneRequest::List { first: 32 }] {
+        assert_eq!(CheckedSceneRequest::try_from(&SceneRequest::from(&request)), Ok(request));
+    }
+    let object =
+        ListedObject { name: name(), shape: ObjectShape::Mesh, pose, fixed_to: FixedTo::Base, mass_kg: 0.0 };
+    let listed = |objects| SceneOutcome::Listed {
+        revision: 9,
+        total: 40,
+        first: 16,
+        objects,
+        last_effect: "what".to_owned(),
+    };
+    let changed = |effect| SceneOutcome::Changed {
+        revision: 9,
+        total: 3,
+        effect,
+        note: "why".to_owned(),
+        times_ns: [1, 2, 3],
+    };
+    for outcome in [
+        listed(vec![object.clone(); PAGE]),
+        listed(Vec::new()),
+        changed(MotionEffect::Rests),
+        changed(MotionEffect::Free),
+        changed(MotionEffect::Rerouted { trajectory_id: 7 }),
+        changed(MotionEffect::Stopped),
+        changed(MotionEffect::StoppedLate),
+        SceneOutcome::Refused { reason: "no".to_owned() },
+    ] {
+        assert_eq!(SceneReply::new(&outcome).outcome(), outcome);
+    }
+}
+
+#[test]
+fn scene_changes_that_make_no_sense_are_refused_with_their_place() {
+    let good = addition("a", ObjectShape::Sphere { radius_m: 0.1 }, object_pose([0.0; 3]));
+    let (ball, here) = (ObjectShape::Sphere { radius_m: 0.1 }, object_pose([0.0; 3]));
+    let stretched = ObjectPose { quaternion_xyzw: [0.0, 0.0, 0.0, 1.1], ..here };
+    let heavy = |mass_kg| SceneChange::Attach { name: "a".to_owned(), mass_kg };
+    for (bad, expected) in [
+        (addition("", ball, here), What::Name),
+        (addition("a b", ball, here), What::Name),
+        (addition(&"a".repeat(65), ball, here), What::Name),
+        (addition("a", ObjectShape::Sphere { radius_m: -1.0 }, here), What::Size { value_m: -1.0 }),
+        (addition("a", ObjectShape::Box { size_m: [1.0, 101.0, 1.0] }, here), What::Size { value_m: 101.0 }),
+        (addition("a", ObjectShape::Mesh, here), What::Mesh),
+        (
+            addition("a", ball, object_pose([0.0, f64::INFINITY, 0.0])),
+            What::Position { value_m: f64::INFINITY },
+        ),
+        (addition("a", ball, stretched), What::Quaternion { length: 1.1 }),
+        (heavy(-1.0), What::Mass { value_kg: -1.0 }),
+    ] {
+        let request = CheckedSceneRequest::Change(vec![good.clone(), bad]);
+        let refused = CheckedSceneRequest::try_from(&SceneRequest::from(&request));
+        let Err(SceneRequestError::Change { index: 1, what }) = refused else { panic!("{refused:?}") };
+        assert_eq!(what.to_string(), expected.to_string());
+    }
+    for count in [0, CHANGES_MAX + 1] {
+        let request = CheckedSceneRequest::Change(vec![good.clone(); count]);
+        let refused = CheckedSceneRequest::try_from(&SceneRequest::from(&request));
+        assert_eq!(refused, Err(SceneRequestError::Count { got: u32::try_from(count).expect("small") }));
     }
 }

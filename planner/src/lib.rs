@@ -16,6 +16,7 @@ pub mod import;
 pub mod in_motion;
 pub mod kind;
 pub mod lanes;
+pub mod live_scene;
 pub mod margin_exit;
 pub mod objective;
 pub mod pipeline;
@@ -27,6 +28,7 @@ pub mod search;
 pub mod send;
 pub mod service;
 pub mod shortcut;
+pub mod stop_ahead;
 pub mod stream;
 pub mod stream_cut;
 pub mod timing;
@@ -37,9 +39,7 @@ pub mod world;
 pub use taustream_arm::rng;
 
 pub use goals::{Finder, GoalError, Orientation, Reached, Situation, TipTarget, plan_to_any, plan_to_tip};
-pub use taustream_messages::way_points::Blend;
-
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
-pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
+pub use plan::{Blend, Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
 pub use verify::{Contact, Proof, Violation, verify};

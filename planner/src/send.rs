@@ -93,6 +93,8 @@ pub struct Outbox<'a> {
     events: RefCell<Events>,
     /// The newest report that made sense.
     newest: Cell<Option<(Report, Phase)>>,
+    /// When the streamer's newest acceptance came, by `CLOCK_MONOTONIC`, ns: older reports do not know what it accepted.
+    accepted_ns: Cell<u64>,
     /// What was sent, newest last: what runs may be cut only by whoever knows its strokes.
     sent: RefCell<VecDeque<(u64, Trajectory)>>,
 }
@@ -105,10 +107,10 @@ impl<'a> Outbox<'a> {
     pub fn open(wire: &'a Wire) -> Result<Self, SendError> {
         // The receipt's port first: it must be there before anything that is answered.
         let (receipts, reports) = (wire.receipt_subscriber()?, wire.report_subscriber()?);
-        let (newest, sent) = (Cell::new(None), RefCell::default());
+        let (newest, accepted_ns, sent) = (Cell::new(None), Cell::new(0), RefCell::default());
         let (trajectories, events) =
             (wire.trajectory_publisher()?, RefCell::new(wire.events(Topic::Trajectory)));
-        Ok(Self { wire, trajectories, receipts, reports, events, newest, sent })
+        Ok(Self { wire, trajectories, receipts, reports, events, newest, accepted_ns, sent })
     }
 
     /// The newest report that has arrived since the last call, if there is one that makes sense.
@@ -209,6 +211,7 @@ impl<'a> Outbox<'a> {
         let receipt = self.receipt(trajectory_id, timeout)?;
         // Without a receipt it may have been accepted all the same.
         if !matches!(receipt.and_then(|receipt| receipt.outcome()), Some(Outcome::Rejected(_))) {
+            self.accepted_ns.set(now_ns());
             let mut sent = self.sent.borrow_mut();
             if sent.len() == SENT_MAX {
                 sent.pop_front();
@@ -216,6 +219,11 @@ impl<'a> Outbox<'a> {
             sent.push_back((trajectory_id, trajectory.clone()));
         }
         Ok(SentTrajectory { trajectory_id, generation, receipt, sent_ns })
+    }
+
+    /// When the streamer's newest acceptance came, by `CLOCK_MONOTONIC`, ns.
+    pub(crate) fn accepted_ns(&self) -> u64 {
+        self.accepted_ns.get()
     }
 
     /// The strokes of a trajectory that was sent from here.

@@ -4,16 +4,22 @@
 //! commanded pose; while a motion runs, it is replaced (`moving`). The streamer takes a replacement in advance and keeps it
 //! until its cut, so that nothing of it hangs on this process. A motion whose requester has gone in the meantime is not sent:
 //! no client waits for the arm to move.
+mod foreign;
 mod moving;
+mod scene;
+mod scene_effect;
 mod streaming;
 mod tip;
 
 use crate::kind::PlannerKind;
-use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_through_until, plan_until};
-use crate::send::{Outbox, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
+use crate::live_scene::LiveScene;
+use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
+use crate::send::{Outbox, RECEIPT_TAKES, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
+use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
@@ -25,7 +31,7 @@ use taustream_messages::clock::now_ns;
 use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
-use taustream_messages::service::{PlanServer, ServiceError, TargetServer, Wire};
+use taustream_messages::service::{CommandClient, PlanServer, SceneServer, ServiceError, TargetServer, Wire};
 use taustream_messages::tip_goal::TipGoal;
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
@@ -33,8 +39,8 @@ use tracing::{info, warn};
 
 /// How long the service waits for a request before it looks at targets, reports and files again: targets come without events.
 const WAIT_AT_MOST: Duration = Duration::from_millis(2);
-/// How often it looks at requests and requesters while it plans.
-const ATTEND_EVERY: Duration = Duration::from_millis(5);
+/// How often it looks at requests, requesters and the scene while it plans.
+const ATTEND_EVERY: Duration = Duration::from_millis(2);
 /// How often it looks for the files behind its services.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Longest deadline: others wait meanwhile.
@@ -67,6 +73,9 @@ pub enum OpenError {
     /// The ports to the streamer cannot be opened.
     #[error(transparent)]
     Send(#[from] SendError),
+    /// The scene, or the robot, has a shape that cannot be built.
+    #[error("{0}")]
+    Scene(String),
     /// There is no thread to feed the watchdog from.
     #[error("cannot start a thread: {0}")]
     Thread(String),
@@ -85,7 +94,7 @@ impl OpenError {
                     | ServiceError::Blocked { .. }
             ),
             Self::Served { .. } | Self::Send(_) => false,
-            Self::Thread(_) => true,
+            Self::Thread(_) | Self::Scene(_) => true,
         }
     }
 }
@@ -93,7 +102,13 @@ impl OpenError {
 /// The planner of one arm.
 pub struct Service<'a> {
     robot: &'a Robot,
-    scene: &'a Scene,
+    live_scene: RefCell<LiveScene>,
+    scene_server: SceneServer,
+    /// What became of a motion by a change of the scene last.
+    last_effect: RefCell<String>,
+    foreign: Foreign,
+    commands: CommandClient,
+    command_events: Events,
     outbox: Outbox<'a>,
     server: PlanServer,
     stop: &'a AtomicBool,
@@ -102,9 +117,8 @@ pub struct Service<'a> {
     received_ns: u64,
     seen: Seen,
     latency: Latency,
-    corner_latency: Latency,
     targets: TargetServer,
-    stream: Stream<'a>,
+    stream: Stream,
     promise: Promise,
     footprint: Footprint,
 }
@@ -124,10 +138,11 @@ impl<'a> Service<'a> {
     pub fn open(
         wire: &'a Wire,
         robot: &'a Robot,
-        scene: &'a Scene,
+        scene: &Scene,
         stop: &'a AtomicBool,
     ) -> Result<Self, OpenError> {
         let server = take_server(wire)?;
+        let live_scene = LiveScene::new(robot, scene).map_err(|e| OpenError::Scene(e.to_string()))?;
         let outbox = Outbox::open(wire)?;
         let events = wire.events(Topic::Plan);
         if !events.are_there() {
@@ -140,7 +155,12 @@ impl<'a> Service<'a> {
             .map_err(|e| OpenError::Thread(e.to_string()))?;
         Ok(Self {
             robot,
-            scene,
+            live_scene: RefCell::new(live_scene),
+            scene_server: wire.scene_server()?,
+            last_effect: RefCell::default(),
+            foreign: Foreign::open(wire)?,
+            commands: wire.command_client()?,
+            command_events: wire.events(Topic::Command),
             outbox,
             server,
             stop,
@@ -148,7 +168,6 @@ impl<'a> Service<'a> {
             received_ns: 0,
             seen: Seen::default(),
             latency: Latency::default(),
-            corner_latency: Latency::default(),
             targets: wire.target_server()?,
             stream: Stream::new(robot),
             promise,
@@ -184,6 +203,8 @@ impl<'a> Service<'a> {
             Ok(newest) => self.seen.note(newest.is_some()),
             Err(e) => warn!("{e}"),
         }
+        self.foreign.look();
+        self.take_scene_requests();
         match self.server.receive() {
             Ok(Some(request)) => self.take(&request),
             Ok(None) => {}
@@ -237,9 +258,6 @@ impl<'a> Service<'a> {
     ) -> Result<PlanOutcome, String> {
         let rests = phase == Phase::Holding && report.energised == 1;
         match &tip.line {
-            Some(_) if !requested.via_rad.is_empty() => {
-                Err("a straight line of the tip passes no way points".to_owned())
-            }
             Some(line) if rests => {
                 let plan = self.plan_straight(request, report.command_rad, (tip, line, options))?;
                 Ok(self.send(request, &plan))
@@ -248,11 +266,10 @@ impl<'a> Service<'a> {
                 Err("a straight line of the tip begins at rest; wait until the motion has ended".to_owned())
             }
             None if rests || moving::runs(phase) => {
-                let from_rad = match requested.when {
+                let near_rad = match requested.when {
                     When::AfterCurrent | When::Queue if !rests => report.end_rad,
                     When::AtOnce | When::AfterCurrent | When::Queue | When::Cancel => report.command_rad,
                 };
-                let near_rad = requested.via_rad.last().copied().unwrap_or(from_rad);
                 self.answer_tip(request, (requested, options), (tip, near_rad))
             }
             Some(_) | None => Err(not_ready(phase)),
@@ -266,20 +283,15 @@ impl<'a> Service<'a> {
         start_rad: JointArray,
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
     ) -> Result<Plan, String> {
-        let (robot, scene, goal_rad) = (self.robot, self.scene, requested.goal_rad);
-        if !requested.via_rad.is_empty() {
-            let mut all_rad = vec![start_rad];
-            all_rad.extend(requested.points_rad());
-            let planned = self.work(request, options.deadline, |cancel| {
-                plan_through_until((robot, scene), &all_rad, options, Some(cancel))
-            })?;
-            return planned.map_err(|e: PlanError| e.to_string());
-        }
         // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
+        let (revision, goal_rad) = (self.revision(), requested.goal_rad);
+        let (robot, scene) = (&*revision.robot, &*revision.scene);
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         let planned =
             self.work(request, options.deadline, |cancel| plan_until(&task, options, Some(cancel)))?;
-        planned.map_err(|e: PlanError| e.to_string())
+        let plan = planned.map_err(|e: PlanError| e.to_string())?;
+        self.still_free(&revision, (&plan.trajectory, 0.0))?;
+        Ok(plan)
     }
 
     /// Works on a thread of its own: whatever goes wrong there, the service continues. The work ends when its requester goes;
@@ -323,6 +335,7 @@ impl<'a> Service<'a> {
                 );
                 cancel.store(true, Ordering::Relaxed);
             }
+            self.take_scene_requests();
             if self.stop.load(Ordering::Relaxed) {
                 cancel.store(true, Ordering::Relaxed);
             }
@@ -449,8 +462,7 @@ fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {
         0 => (default.deadline, false),
         ms => (Duration::from_millis(ms.into()).min(DEADLINE_MAX), true),
     };
-    let (seed, blend) = (requested.seed, requested.blend);
-    Ok(PlanOptions { seed, deadline, planner, blend, spends_deadline, ..default })
+    Ok(PlanOptions { seed: requested.seed, deadline, planner, spends_deadline, ..default })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

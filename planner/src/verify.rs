@@ -224,19 +224,39 @@ fn prove_stretches(
 pub fn verify_free(stretch: &Stretch, trajectory: &Trajectory, budget: &Budget) -> Result<(), Violation> {
     let (world, [begin_s, _]) = (stretch.world, stretch.span_s);
     check_limits(world, trajectory, begin_s)?;
+    let found = met(stretch, trajectory, (&SweepRules::MARGIN_EXIT, budget));
+    found.map_or(Ok(()), |(_, violation)| Err(violation))
+}
+
+/// When a stretch of a motion, whose limits are proven, comes too near to something first, and to what. A sweep that the
+/// clock cuts short counts as one that has met something.
+#[must_use]
+pub fn first_contact(
+    stretch: &Stretch,
+    trajectory: &Trajectory,
+    budget: &Budget,
+) -> Option<(f64, Violation)> {
+    met(stretch, trajectory, (&SweepRules::SCENE_CHANGE, budget))
+}
+
+fn met(
+    stretch: &Stretch,
+    trajectory: &Trajectory,
+    (rules, budget): (&SweepRules, &Budget),
+) -> Option<(f64, Violation)> {
+    let (world, [begin_s, _]) = (stretch.world, stretch.span_s);
     if let Some(contact) = world.contact(&trajectory.sample(begin_s).position_rad) {
-        return Err(Violation::Collision { from_s: begin_s, at_s: begin_s, contact });
+        return Some((begin_s, Violation::Collision { from_s: begin_s, at_s: begin_s, contact }));
     }
-    sweep(world, trajectory, stretch.span_s, &SweepRules::MARGIN_EXIT, budget).map_err(|blocked| {
-        let (checks, at_s) = (blocked.checks, blocked.at);
-        match blocked.pair {
-            None => Violation::Unresolved { checks, at_s },
-            Some((pair, distance_m)) => {
-                Violation::Collision { from_s: at_s, at_s, contact: world.contact_of(&pair, distance_m) }
-            }
+    let blocked = sweep(world, trajectory, stretch.span_s, rules, budget).err()?;
+    let (checks, at_s) = (blocked.checks, blocked.at);
+    let violation = match blocked.pair {
+        None => Violation::Unresolved { checks, at_s },
+        Some((pair, distance_m)) => {
+            Violation::Collision { from_s: at_s, at_s, contact: world.contact_of(&pair, distance_m) }
         }
-    })?;
-    Ok(())
+    };
+    Some((at_s, violation))
 }
 
 /// Joints and limits, from an instant on.

@@ -3,12 +3,16 @@
 //! Obstacles keep the scene's margin, links the robot's from each other unless the robot file or the contact rule lets
 //! them touch. The base does not move, so that it is not checked against obstacles: planning
 //! could not change it.
+mod changes;
+
 use crate::collide::{Body, Posed};
 use crate::verify::Contact;
 use parry3d_f64::math::{Pose, Vector};
+use std::ops::Deref;
+use std::sync::Arc;
 use taustream_arm::body::to_parry;
-use taustream_arm::{Robot, Scene};
-use taustream_motion::chain::ChainJoint;
+use taustream_arm::{Obstacle, Robot, Scene};
+use taustream_motion::chain::{self, ChainJoint};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// The other side of a pair.
@@ -49,6 +53,15 @@ struct StillBody {
     at: Posed,
 }
 
+impl StillBody {
+    fn new(obstacle: &Obstacle) -> Result<Self, String> {
+        let body = Body::new(&obstacle.shape, &chain::Pose::identity());
+        let body = body.ok_or_else(|| obstacle.name.clone())?;
+        let at = body.placed(&to_parry(&obstacle.pose));
+        Ok(Self { name: obstacle.name.clone(), body, at })
+    }
+}
+
 /// The axis of a joint in the frame before it: a point of it, and its direction.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
@@ -60,10 +73,28 @@ struct Axis {
 #[derive(Clone, Debug)]
 pub struct Frames(Vec<Pose>);
 
+/// The robot of a world.
+#[derive(Clone)]
+enum RobotOf<'a> {
+    Borrowed(&'a Robot),
+    Shared(Arc<Robot>),
+}
+
+impl Deref for RobotOf<'_> {
+    type Target = Robot;
+
+    fn deref(&self) -> &Robot {
+        match self {
+            Self::Borrowed(robot) => robot,
+            Self::Shared(robot) => robot,
+        }
+    }
+}
+
 /// Everything that can collide.
 #[derive(Clone)]
 pub struct World<'a> {
-    robot: &'a Robot,
+    robot: RobotOf<'a>,
     links: Vec<LinkBody>,
     obstacles: Vec<StillBody>,
     pairs: Vec<Pair>,
@@ -95,6 +126,10 @@ impl<'a> World<'a> {
     /// # Errors
     /// The name of the link or obstacle whose shape cannot be built.
     pub fn new(robot: &'a Robot, scene: &Scene) -> Result<Self, String> {
+        Self::of(RobotOf::Borrowed(robot), scene)
+    }
+
+    fn of(robot: RobotOf<'a>, scene: &Scene) -> Result<Self, String> {
         let mut links = Vec::new();
         for shape in &robot.shapes {
             let name = || robot.links.get(shape.link).cloned().unwrap_or_default();
@@ -103,11 +138,9 @@ impl<'a> World<'a> {
         }
         let mut obstacles = Vec::new();
         for obstacle in &scene.obstacles {
-            let body = Body::new(&obstacle.shape, &obstacle.pose).ok_or_else(|| obstacle.name.clone())?;
-            let at = body.placed(&Pose::identity());
-            obstacles.push(StillBody { name: obstacle.name.clone(), body, at });
+            obstacles.push(StillBody::new(obstacle)?);
         }
-        let axes = axes(robot);
+        let axes = axes(&robot);
         let mut world = Self {
             robot,
             links,
@@ -200,8 +233,8 @@ impl<'a> World<'a> {
 
     /// The robot.
     #[must_use]
-    pub fn robot(&self) -> &'a Robot {
-        self.robot
+    pub fn robot(&self) -> &Robot {
+        &self.robot
     }
     /// How many joints.
     #[must_use]

@@ -12,9 +12,10 @@ fn demo_poses() -> Vec<[f64; 6]> {
     lines
         .filter_map(|line| {
             let inner = line.split_once('[')?.1.split_once(']')?.0;
-            let values: Vec<f64> = inner.split(',').map(|v| v.trim().parse().expect("a number")).collect();
-            values.try_into().ok()
+            let values: Option<Vec<f64>> = inner.split(',').map(|v| v.trim().parse().ok()).collect();
+            values?.try_into().ok()
         })
+        .take(4)
         .collect()
 }
 

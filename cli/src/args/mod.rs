@@ -6,10 +6,11 @@ mod live;
 mod mbm;
 mod offline;
 mod papers;
+mod pictures;
 mod planners;
+mod scene;
 mod stream;
 mod timing;
-mod via;
 
 pub(crate) use goal::Goal;
 pub(crate) use import::ImportArgs;
@@ -25,7 +26,9 @@ pub(crate) use offline::{
 pub(crate) use cuts::CutsBenchArgs;
 pub(crate) use mbm::MbmArgs;
 pub(crate) use papers::PapersArgs;
+pub(crate) use pictures::PicturesArgs;
 pub(crate) use planners::PlannersArgs;
+pub(crate) use scene::{AddArgs, MoveArgs, SceneAction, SceneArgs, Triple};
 pub(crate) use stream::{Axis, FollowArgs, FollowBenchArgs, JogArgs};
 pub(crate) use timing::TimingArgs;
 
@@ -66,7 +69,7 @@ fn after_help() -> String {
 }
 
 /// Commands that talk to no arm: `--settings` means nothing to them, and their help leaves it out.
-const WITHOUT_SETTINGS: [&[&str]; 19] = [
+const WITHOUT_SETTINGS: [&[&str]; 20] = [
     &["plan"],
     &["import"],
     &["sample"],
@@ -83,6 +86,7 @@ const WITHOUT_SETTINGS: [&[&str]; 19] = [
     &["bench", "follow"],
     &["bench", "mbm"],
     &["bench", "papers"],
+    &["bench", "pictures"],
     &["bench", "planners"],
     &["bench", "stops"],
     &["bench", "timing"],
@@ -191,6 +195,8 @@ pub(crate) enum Action {
     Follow(FollowArgs),
     /// Move one joint, or the tip along an axis, while a key is held.
     Jog(JogArgs),
+    /// List and change the running planner's scene: add, move, remove, attach to the tip, detach.
+    Scene(SceneArgs),
     /// Bring the running motion to rest, and drop the motions that wait.
     Cancel(CancelArgs),
     /// Lead joints that are outside their position limits back inside.

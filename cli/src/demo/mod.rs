@@ -1,4 +1,5 @@
 //! `taustream demo`: simulated servos, streamer and planner as real processes, a few moves, a summary and plots.
+mod changing;
 mod file;
 mod processes;
 mod session;

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::live::client::{Client, Limit};
 use crate::live::command::execute;
-use crate::live::follow::follow;
+use crate::live::follow::{Executed, follow};
 use crate::live::replan::ask_while;
 use crate::output::{Form, note};
 use crate::plot::recording::Sample;
@@ -16,7 +16,7 @@ use crate::words::{fault_sentence, pause_sentence};
 use std::cell::RefCell;
 use std::thread;
 use std::time::Duration;
-use taustream_messages::plan::CheckedPlanRequest;
+use taustream_messages::plan::{CheckedPlanRequest, When};
 use taustream_messages::{Command, PauseReason, Phase, Report};
 use taustream_motion::{JointArray, Setpoint};
 
@@ -40,8 +40,8 @@ struct Seen {
 
 /// A demo under way.
 pub(crate) struct Session<'a> {
-    arm: &'a ArmName,
-    client: Client,
+    pub(super) arm: &'a ArmName,
+    pub(super) client: Client,
     seen: RefCell<Seen>,
     limit: Limit,
     moves: Vec<Move>,
@@ -63,7 +63,7 @@ impl<'a> Session<'a> {
             arm,
             client: Client::join(&arm.name)?,
             seen: RefCell::new(Seen {
-                view: View::new(form, arm, Scale::of(&demo.settings), demo.goals_rad.len()),
+                view: View::new(form, arm, Scale::of(&demo.settings), demo.moves()),
                 samples: Vec::new(),
                 first_ns: None,
                 last: None,
@@ -85,32 +85,50 @@ impl<'a> Session<'a> {
             self.recover(why)?;
         }
         execute(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
-        for (i, goal_rad) in demo.goals_rad.iter().enumerate() {
-            self.seen.borrow_mut().view.begin_move(i + 1);
-            let done = loop {
-                match self.go_to(demo, goal_rad, i + 1) {
-                    Ok(done) => break done,
-                    Err(why) => self.recover(why)?,
-                }
-            };
-            self.moves.push(done);
-            self.check_time()?;
+        let joints = demo.settings.robot.joints.len();
+        for goal_rad in &demo.goals_rad {
+            let request = CheckedPlanRequest { deadline_ms: DEADLINE_MS, ..request(*goal_rad, joints) };
+            self.repeat(|session, number| session.go(&request, number))?;
         }
-        Ok(())
+        match &demo.changing_scene {
+            Some(change) => self.go_through_changes(change, joints),
+            None => Ok(()),
+        }
     }
 
-    fn go_to(&self, demo: &DemoFile, goal_rad: &JointArray, number: usize) -> Result<Move, Failure> {
-        let request = CheckedPlanRequest {
-            deadline_ms: DEADLINE_MS,
-            ..CheckedPlanRequest::to_pose(demo.settings.robot.joints.len(), *goal_rad)
+    /// Makes the next move, again after faults.
+    pub(super) fn repeat(
+        &mut self,
+        mut go: impl FnMut(&Self, usize) -> Result<Move, Failure>,
+    ) -> Result<(), Failure> {
+        let number = self.moves.len() + 1;
+        self.seen.borrow_mut().view.begin_move(number);
+        let done = loop {
+            match go(self, number) {
+                Ok(done) => break done,
+                Err(why) => self.recover(why)?,
+            }
         };
-        let planned = ask_while(&self.client, self.arm, &request, &mut || self.look())?;
-        let executed = follow(&self.client, self.arm, planned.trajectory_id, |report, phase| {
-            self.seen.borrow_mut().note(report, phase);
-            self.check_time()?;
-            self.resume_after_stall(report, phase)
-        })?;
+        self.moves.push(done);
+        self.check_time()
+    }
+
+    /// Plans and executes a move.
+    pub(super) fn go(&self, request: &CheckedPlanRequest, number: usize) -> Result<Move, Failure> {
+        let planned = ask_while(&self.client, self.arm, request, &mut || self.look())?;
+        let executed = self.follow_to_its_end(planned.trajectory_id)?;
         Ok(Move::new(number, planned, executed))
+    }
+
+    pub(super) fn follow_to_its_end(&self, trajectory_id: u64) -> Result<Executed, Failure> {
+        follow(&self.client, self.arm, trajectory_id, |report, phase| self.see(report, phase))
+    }
+
+    /// Takes a report of a motion that is followed.
+    pub(super) fn see(&self, report: &Report, phase: Phase) -> Result<(), Failure> {
+        self.seen.borrow_mut().note(report, phase);
+        self.check_time()?;
+        self.resume_after_stall(report, phase)
     }
 
     /// A computer that is busy with other things may leave the arm paused. Then the demo does what an operator would, and
@@ -218,7 +236,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn wait_for(&self, wanted: Phase, what: &str) -> Result<(), Failure> {
+    pub(super) fn wait_for(&self, wanted: Phase, what: &str) -> Result<(), Failure> {
         let limit = Limit::after_s(DRIVES_S_MAX);
         loop {
             let (report, phase) = self.client.report()?;
@@ -239,7 +257,7 @@ impl<'a> Session<'a> {
     }
 
     /// Takes all reports that have arrived.
-    fn look(&self) -> Result<(), Failure> {
+    pub(super) fn look(&self) -> Result<(), Failure> {
         self.client.drain_reports(|report, phase| self.seen.borrow_mut().note(report, phase))
     }
 
@@ -250,6 +268,19 @@ impl<'a> Session<'a> {
         let paused = self.seen.borrow().last.as_ref().and_then(pause_sentence);
         let why = paused.map_or_else(String::new, |why| format!("; the arm is {why}"));
         Err(Failure::Failed(format!("the demo takes longer than --limit-s allows{why}")))
+    }
+}
+
+/// A request for a pose of the joints.
+pub(super) fn request(goal_rad: JointArray, joints: usize) -> CheckedPlanRequest {
+    CheckedPlanRequest {
+        joints,
+        goal_rad,
+        tip: None,
+        when: When::AtOnce,
+        deadline_ms: 0,
+        seed: 1,
+        planner: "auto".to_owned(),
     }
 }
 

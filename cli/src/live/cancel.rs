@@ -8,6 +8,7 @@ use crate::output::Form;
 use std::path::Path;
 use taustream_messages::plan::{CheckedPlanRequest, When};
 use taustream_motion::MAX_JOINTS;
+use taustream_planner::PlannerKind;
 
 /// How long the planner may take, ms.
 const DEADLINE_MS: u32 = 1_000;
@@ -17,9 +18,13 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &CancelArgs) -> Res
     let settings = arm::settings_to_talk(settings)?;
     let client = Client::join(&settings.name)?;
     let request = CheckedPlanRequest {
+        joints: settings.robot.joints.len(),
+        goal_rad: [0.0; MAX_JOINTS],
+        tip: None,
         when: When::Cancel,
         deadline_ms: DEADLINE_MS,
-        ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), [0.0; MAX_JOINTS])
+        seed: 1,
+        planner: PlannerKind::default().name().to_owned(),
     };
     go(form, (&client, &settings), &request, args.wait)
 }

@@ -10,6 +10,7 @@ pub(crate) mod recover;
 pub(crate) mod reference;
 pub(crate) mod replan;
 pub(crate) mod run;
+pub(crate) mod scene;
 pub(crate) mod status;
 mod stop_way;
 mod target_lines;

@@ -25,6 +25,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &BenchArgs) -> Resu
         BenchName::Follow(args) => return super::follow_bench::run(form, args),
         BenchName::Mbm(args) => return super::mbm::run(form, args),
         BenchName::Papers(args) => return super::papers::run(form, args),
+        BenchName::Pictures(args) => return super::pictures::run(form, args),
         BenchName::Planners(args) => return super::planners::run(form, args),
         BenchName::Cuts(args) => return super::cuts_bench::run(form, args),
         BenchName::Stops(args) => return super::stops_bench::run(form, args),

@@ -12,6 +12,7 @@ pub(crate) mod import;
 mod limit_sets;
 mod mbm;
 mod papers;
+mod pictures;
 pub(crate) mod plan;
 mod planners;
 pub(crate) mod plot;

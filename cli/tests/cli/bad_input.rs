@@ -121,6 +121,15 @@ fn configuration_faults_are_refused_with_file_key_and_value() {
     scratch.edited("robots/ur5.toml", "nan.toml", "a_m = -0.425", "a_m = nan");
     scratch.edited("robots/ur5.toml", "zero.toml", "velocity_rad_s = 3.14", "velocity_rad_s = 0.0");
     scratch.edited("robots/ur5.toml", "six.toml", "[-3.1416, 3.1416]", "[-3.1416]");
+    for (name, from, to) in [
+        ("far.toml", "line_to_m = [-0.0183,", "line_to_m = [1000.0,"),
+        ("flat.toml", "radius_m = 0.04", "radius_m = 0.0"),
+        ("late.toml", "after_s = 0.1", "after_s = nan"),
+    ] {
+        let demo = scratch.edited("demo.toml", name, from, to);
+        let text = fs::read_to_string(&demo).unwrap();
+        scratch.write(name, &text.replacen("settings/vcan6.toml", "vcan6", 1));
+    }
     scratch.write("half.toml", "name = \"ur5\n");
     scratch.write("binary.toml", "\u{0}\u{1}\u{2}");
     scratch.write("ball.toml", "[[sphere]]\nname = \"ball\"\ncenter_m = [0.5, 0.0, 0.5]\nradius_m = -1\n");
@@ -138,6 +147,9 @@ fn configuration_faults_are_refused_with_file_key_and_value() {
     refuse_all(
         &scratch,
         &[
+            ("demo --config far.toml", 2, &["far.toml", "changing_scene.line_to_m", "1000"]),
+            ("demo --config flat.toml", 2, &["flat.toml", "changing_scene.radius_m", "above 0"]),
+            ("demo --config late.toml", 2, &["late.toml", "changing_scene.after_s", "from 0 to 60"]),
             ("check unknown.toml", 2, &["unknown.toml", "colour", "no such key"]),
             ("check nan.toml", 2, &["nan.toml", "a_m", "NaN"]),
             ("check zero.toml", 2, &["zero.toml", "velocity_rad_s", "above 0"]),

@@ -1,5 +1,5 @@
 //! Buses in `taustream check`: the table, the result, the remedies.
-#![expect(clippy::expect_used, reason = "a helper of tests fails by panicking")]
+#![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use crate::common::{Scratch, config};
 
 /// The shipped six servos on one bus that `keys` describe; its file names robot and scene by whole paths.
@@ -45,4 +45,18 @@ fn bus_with_high_load_is_warned_of_and_one_with_low_load_is_not() {
         assert!(!fits.done().contains("remedies"), "{}", fits.out);
         assert!(fits.out.contains("no faults"), "{}", fits.out);
     }
+}
+
+/// Whoever reads the first line knows what is wrong, and whoever reads the last one that it was refused.
+#[test]
+fn check_begins_with_the_faults_and_ends_with_the_verdict() {
+    let scratch = Scratch::new();
+    let file = one_bus(&scratch, "bitrate_bit_s = 1000000");
+    let both = scratch.dir.join("both");
+    let to = std::fs::File::create(&both).unwrap();
+    scratch.command(&["check", &file]).stdout(to.try_clone().unwrap()).stderr(to).status().unwrap();
+    let said = std::fs::read_to_string(&both).unwrap();
+    let [first, .., last] = said.trim_end().lines().collect::<Vec<_>>()[..] else { panic!("{said}") };
+    assert!(first.contains("bus[0] = 144.0 % full in the worst case"), "{said}");
+    assert!(last.contains("REFUSED: 1 fault(s), listed first"), "{said}");
 }

@@ -79,6 +79,8 @@ impl SweepRules {
         bracket_m: f64::INFINITY,
         first_contact: false,
     };
+    /// For what runs while the scene changes: the first contact in time counts.
+    pub const SCENE_CHANGE: Self = Self { resolution_m: 1e-5, first_contact: true, ..Self::MARGIN_EXIT };
     /// For candidates of timing, whose geometry is new.
     pub const CANDIDATE: Self = Self {
         extra_m: 1e-5,

@@ -12,7 +12,6 @@ use crate::send::{RECEIPT_TAKES, REPORT_WITHIN, check_robot};
 use crate::stream::{Follower, Lead, Piece, Reference, Trend};
 use crate::stream_cut::{cut, rate};
 use crate::verify::{Stretch, verify_free};
-use crate::world::World;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use std::time::{Duration, Instant};
@@ -39,9 +38,8 @@ const CONTINUE_AFTER: Duration = Duration::from_millis(100);
 type Request = ActiveRequest<ipc::Service, TargetRequest, (), TargetReply, ()>;
 
 /// What is followed.
-pub(super) struct Stream<'a> {
+pub(super) struct Stream {
     follower: Follower,
-    world: Option<World<'a>>,
     latency: Latency,
     committed: Option<Committed>,
     unfinished: Option<Unfinished>,
@@ -100,12 +98,11 @@ enum Failed {
     Refused(String),
 }
 
-impl<'a> Stream<'a> {
-    pub(super) fn new(robot: &'a Robot) -> Self {
+impl Stream {
+    pub(super) fn new(robot: &Robot) -> Self {
         let follower = Follower::new(robot.joints.len(), &robot.limits());
         Self {
             follower,
-            world: None,
             latency: Latency::default(),
             committed: None,
             unfinished: None,
@@ -113,6 +110,13 @@ impl<'a> Stream<'a> {
             logged: None,
             not_logged: 0,
         }
+    }
+
+    /// True when what runs, or waits, is the newest piece of the stream.
+    pub(super) fn leads(&self, report: &Report) -> bool {
+        self.committed.as_ref().is_some_and(|committed| {
+            [report.trajectory_id, report.successor_id].contains(&committed.trajectory_id)
+        })
     }
 
     /// Logs a refusal, unless one was logged just now.
@@ -287,14 +291,8 @@ impl Service<'_> {
         targets: &CheckedTargets,
         (lead, note): (Option<&Lead>, &str),
     ) -> Result<(Piece, String), Failed> {
-        let (robot, scene) = (self.robot, self.scene);
-        let world = match self.stream.world.take() {
-            Some(world) => world,
-            None => World::new(robot, scene).map_err(|name| {
-                Failed::Refused(format!("{name}: its mesh has no usable triangles; correct the file"))
-            })?,
-        };
-        let world = &*self.stream.world.insert(world);
+        // Nothing changes the scene until the piece is sent.
+        let world = &*self.revision().world;
         let kept = kept(&start.base, start.kept_until_s, start.folded_s);
         let from = (&start.reference, start.cut_s);
         let budget = Budget::until(PROOF_WITHIN, None);

@@ -1,6 +1,7 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
 use super::{Request, Service};
 use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
+use crate::live_scene::SceneRevision;
 use crate::plan::{Plan, PlanOptions, StartMargin};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::time::Instant;
@@ -18,11 +19,12 @@ fn target(tip: &TipGoal) -> TipTarget {
     TipTarget { position_m: tip.position_m, tolerance_m: tip.tolerance_m, orientation }
 }
 
-impl Service<'_> {
-    fn situation(&self, start_rad: JointArray) -> Situation<'_> {
-        Situation { robot: self.robot, scene: self.scene, start_rad, margin: StartMargin::AsItStands }
-    }
+fn situation(revision: &SceneRevision, start_rad: JointArray) -> Situation<'_> {
+    let (robot, scene) = (&*revision.robot, &*revision.scene);
+    Situation { robot, scene, start_rad, margin: StartMargin::AsItStands }
+}
 
+impl Service<'_> {
     /// Goes to the nearest pose with the tip at its goal; to the next one where no motion is found.
     pub(super) fn answer_tip(
         &mut self,
@@ -30,7 +32,8 @@ impl Service<'_> {
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
         (tip, near_rad): (&TipGoal, JointArray),
     ) -> Result<PlanOutcome, String> {
-        let (situation, target) = (self.situation(near_rad), target(tip));
+        let revision = self.revision();
+        let (situation, target) = (situation(&revision, near_rad), target(tip));
         let poses = self.work(request, options.deadline, |cancel| {
             tip_poses(&situation, &target, options, Some(cancel))
         })?;
@@ -54,12 +57,15 @@ impl Service<'_> {
         (tip, line, options): (&TipGoal, &TipLine, &PlanOptions),
     ) -> Result<Plan, String> {
         let started = Instant::now();
-        let (situation, target) = (self.situation(start_rad), target(tip));
+        let revision = self.revision();
+        let (situation, target) = (situation(&revision, start_rad), target(tip));
         let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
         let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
         let planned = self.work(request, options.deadline, |_| plan_line(&situation, &target, &speed))?;
         let line = planned.map_err(|e| e.to_string())?;
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);
-        Ok(line.into_plan(how, started.elapsed().as_secs_f64()))
+        let plan = line.into_plan(how, started.elapsed().as_secs_f64());
+        self.still_free(&revision, (&plan.trajectory, 0.0))?;
+        Ok(plan)
     }
 }

@@ -86,23 +86,37 @@ impl Optimum {
     /// How much of the line is behind after a time.
     #[must_use]
     pub fn position(&self, t_s: f64) -> f64 {
+        self.state(t_s).first().copied().unwrap_or_default()
+    }
+
+    /// The share of the line that is behind after a time, and its first three derivatives (1/s, 1/s^2, 1/s^3).
+    #[must_use]
+    pub fn state(&self, t_s: f64) -> [f64; 4] {
         let half_s = 0.5 * self.duration_s();
         if t_s > half_s {
-            return 1.0 - self.before_half(2.0 * half_s - t_s);
+            let [position, velocity, acceleration, jerk] = self.before_half(2.0 * half_s - t_s);
+            return [1.0 - position, velocity, -acceleration, jerk];
         }
         self.before_half(t_s)
     }
 
-    fn before_half(&self, t_s: f64) -> f64 {
-        let [velocity, acceleration, jerk] = self.peaks();
-        let (first_s, ramp_s) = (t_s.clamp(0.0, self.jerk_s), self.ramp_s());
+    fn before_half(&self, t_s: f64) -> [f64; 4] {
+        let [fastest, steepest, jerk] = self.peaks();
+        let phase_s = |begin_s: f64, length_s: f64| (t_s - begin_s).clamp(0.0, length_s);
+        let level_from_s = self.jerk_s + self.acceleration_s;
+        let first_s = phase_s(0.0, self.jerk_s);
+        let second_s = phase_s(self.jerk_s, self.acceleration_s);
+        let third_s = phase_s(level_from_s, self.jerk_s);
         let mut position = jerk * first_s * first_s * first_s / 6.0;
-        let second_s = (t_s - self.jerk_s).clamp(0.0, self.acceleration_s);
-        position += second_s * (0.5 * acceleration * self.jerk_s + 0.5 * acceleration * second_s);
-        let third_s = (t_s - self.jerk_s - self.acceleration_s).clamp(0.0, self.jerk_s);
-        let reached = velocity - 0.5 * acceleration * self.jerk_s;
-        position += third_s * (reached + 0.5 * acceleration * third_s - jerk * third_s * third_s / 6.0);
-        position + velocity * (t_s - ramp_s).max(0.0)
+        position += second_s * (0.5 * steepest * self.jerk_s + 0.5 * steepest * second_s);
+        let reached = fastest - 0.5 * steepest * self.jerk_s;
+        position += third_s * (reached + 0.5 * steepest * third_s - jerk * third_s * third_s / 6.0);
+        position += fastest * (t_s - self.ramp_s()).max(0.0);
+        let velocity =
+            0.5 * jerk * first_s * first_s + steepest * (second_s + third_s) - 0.5 * jerk * third_s * third_s;
+        let now = [(self.jerk_s, jerk), (level_from_s, 0.0), (self.ramp_s(), -jerk)];
+        let jerk_now = now.into_iter().find(|(until_s, _)| t_s < *until_s).map_or(0.0, |(_, jerk)| jerk);
+        [position, velocity, jerk * (first_s - third_s), jerk_now]
     }
 }
 
@@ -121,8 +135,28 @@ mod tests {
                 && a <= line.acceleration * (1.0 + 1e-9)
                 && j <= line.jerk * (1.0 + 1e-9);
             assert!(fits, "seed {seed}: {optimum:?} exceeds {line:?}");
-            let half = optimum.before_half(0.5 * optimum.duration_s());
+            let half = optimum.position(0.5 * optimum.duration_s());
             assert!((half - 0.5).abs() < 1e-9, "seed {seed}: {half} of the line after half the time");
+        }
+    }
+
+    #[test]
+    fn the_derivatives_are_those_of_the_position() {
+        for line in [[1.0, 3.0, 30.0], [0.2, 9.0, 30.0], [5.0, 0.5, 30.0]] {
+            let [velocity, acceleration, jerk] = line;
+            let optimum = LineLimits { velocity, acceleration, jerk }.optimum();
+            let (duration_s, dt_s) = (optimum.duration_s(), 1e-5);
+            for k in 1..997 {
+                let t_s = duration_s * f64::from(k) / 997.0;
+                let [before, now, after] = [-dt_s, 0.0, dt_s].map(|by_s| optimum.state(t_s + by_s));
+                for order in 0..3 {
+                    let rate = (after[order] - before[order]) / (2.0 * dt_s);
+                    // Across a switch of the jerk a difference lies between its two values.
+                    let switches = order == 2 && before[3].to_bits() != after[3].to_bits();
+                    let close = (rate - now[order + 1]).abs() < 1e-3 * jerk;
+                    assert!(close || switches, "order {order} at {t_s} s: {rate}, {}", now[order + 1]);
+                }
+            }
         }
     }
 }

@@ -8,7 +8,6 @@
 pub mod fit;
 mod law;
 pub mod line;
-pub mod onward;
 mod rough;
 mod scale;
 #[cfg(test)]

@@ -1,0 +1,574 @@
+//! A scene that changes under a running planner: over real shared memory, with a streamer played by the test that runs what it
+//! accepts in real time.
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests; a failure in them fails the test")]
+mod common;
+use common::{pose, scene, sphere, ur5, ur5_distances_m, ur5_origins_m};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+use taustream_arm::rng::SeededRng;
+use taustream_arm::{Obstacle, Robot, Scene, runtime};
+use taustream_messages::clock::now_ns;
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::scene::{FixedTo, ObjectPose, ObjectShape, SceneChange};
+use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
+use taustream_messages::service::Wire;
+use taustream_messages::{
+    CheckedSceneRequest, CheckedTrajectory, Command, CommandReply, LAYOUT_VERSION, Outcome, Phase,
+    PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply, SceneRequest,
+};
+use taustream_motion::{JointArray, Trajectory};
+use taustream_planner::live_scene::{LiveScene, SceneChangeError};
+use taustream_planner::send::send_trajectory;
+use taustream_planner::service::Service;
+use taustream_planner::world::World;
+use taustream_planner::{PlanOptions, verify};
+
+const FROM: [f64; 6] = [-1.5, -1.2, 1.2, -1.57, -1.57, 0.0];
+const TO: [f64; 6] = [1.5, -1.2, 1.2, -1.57, -1.57, 0.0];
+const NO_ID: u64 = 0;
+
+fn join(arm: &str, node: &str) -> Wire {
+    Wire::join(arm, node, &runtime::directory().expect("a directory")).expect("joins")
+}
+
+/// A motion that was accepted, on its own axis of trajectory time.
+#[derive(Clone)]
+struct Motion {
+    id: u64,
+    trajectory: Trajectory,
+    /// From when it is sampled.
+    from_s: f64,
+}
+
+#[derive(Default)]
+struct State {
+    running: Option<Motion>,
+    waits: Option<Motion>,
+    zero: Option<Instant>,
+    generation: u64,
+    rest_rad: JointArray,
+    /// What the arm was commanded, every millisecond.
+    commanded: Vec<(Instant, JointArray)>,
+    stops: u32,
+}
+
+/// A streamer that takes what it is sent, and runs it.
+#[derive(Default)]
+struct Played {
+    state: Mutex<State>,
+    end: AtomicBool,
+}
+
+impl State {
+    fn now_s(&self) -> f64 {
+        self.zero.map_or(0.0, |zero| zero.elapsed().as_secs_f64())
+    }
+
+    /// Trajectory time goes on; what has ended, rests.
+    fn step(&mut self) {
+        let now_s = self.now_s();
+        if self.waits.as_ref().is_some_and(|waits| now_s >= waits.from_s) {
+            self.running = self.waits.take();
+        }
+        if let Some(motion) = &self.running {
+            let at_rad = motion.trajectory.sample(now_s).position_rad;
+            self.rest_rad = at_rad;
+            self.commanded.push((Instant::now(), at_rad));
+            if now_s >= motion.trajectory.duration_s() && self.waits.is_none() {
+                self.running = None;
+            }
+        }
+    }
+
+    fn report(&self, robot: &Robot, sequence: u64) -> Report {
+        let end = self.waits.as_ref().or(self.running.as_ref()).map(|motion| &motion.trajectory);
+        Report {
+            layout_version: LAYOUT_VERSION,
+            joint_count: 6,
+            sequence,
+            time_ns: now_ns(),
+            robot_digest: robot.digest,
+            phase: if self.running.is_some() { Phase::Moving } else { Phase::Holding }.code(),
+            energised: 1,
+            sigma: 1.0,
+            speed_percent: 100.0,
+            generation: self.generation,
+            trajectory_id: self.running.as_ref().map_or(NO_ID, |motion| motion.id),
+            trajectory_s: self.now_s(),
+            trajectory_duration_s: self.running.as_ref().map_or(0.0, |motion| motion.trajectory.duration_s()),
+            successor_id: self.waits.as_ref().map_or(0, |motion| motion.id),
+            successor_from_s: self.waits.as_ref().map_or(0.0, |motion| motion.from_s),
+            end_s: end.map_or(0.0, Trajectory::duration_s),
+            end_rad: end.map_or(self.rest_rad, Trajectory::end_rad),
+            command_rad: self.rest_rad,
+            ..Report::default()
+        }
+    }
+
+    fn take(&mut self, checked: CheckedTrajectory) -> Outcome {
+        if checked.generation != self.generation + 1 {
+            let (got, newest) = (checked.generation, self.generation);
+            return Outcome::Rejected(Rejection::StaleGeneration { got, newest });
+        }
+        let (id, trajectory) = (checked.trajectory_id, checked.trajectory);
+        let outcome = match checked.replaces {
+            Replaces::Rest => {
+                assert!(self.running.is_none(), "from rest while the arm moves");
+                (self.zero, self.running) =
+                    (Some(Instant::now()), Some(Motion { id, trajectory, from_s: 0.0 }));
+                Outcome::Accepted { from_s: 0.0, tick: 9 }
+            }
+            Replaces::Cut { at_s, .. } => {
+                let by_s = self.now_s() - at_s;
+                if by_s > 0.0 {
+                    return Outcome::Rejected(Rejection::CutPassed { at_s, by_s });
+                }
+                self.waits = Some(Motion { id, trajectory, from_s: at_s });
+                Outcome::Accepted { from_s: at_s, tick: 0 }
+            }
+        };
+        self.generation += 1;
+        outcome
+    }
+}
+
+impl Played {
+    fn play(&self, arm: &str, robot: &Robot) {
+        let wire = join(arm, "played-streamer");
+        let reports = wire.report_publisher().expect("port");
+        let receipts = wire.receipt_publisher().expect("port");
+        let trajectories = wire.trajectory_subscriber().expect("port");
+        let commands = wire.command_server().expect("port");
+        self.state.lock().expect("no panic").rest_rad = pose(FROM);
+        let mut sequence = 0;
+        while !self.end.load(Ordering::SeqCst) {
+            let mut state = self.state.lock().expect("no panic");
+            state.step();
+            sequence += 1;
+            // Every 10 ms, and at once when something was accepted.
+            let mut is_due = sequence % 10 == 0;
+            while let Some(sample) = trajectories.receive().expect("received") {
+                let checked =
+                    CheckedTrajectory::try_from(&*Box::new(*sample.payload())).expect("a good message");
+                let (id, generation) = (checked.trajectory_id, checked.generation);
+                let outcome = state.take(checked);
+                receipts.send_copy(Receipt::new(id, generation, &outcome)).expect("sent");
+                is_due = true;
+            }
+            while let Some(request) = commands.receive().expect("received") {
+                let command = Command::try_from(request.payload()).expect("a command");
+                assert!(matches!(command, Command::Stop | Command::FastStop), "{command:?}");
+                (state.running, state.waits, state.stops) = (None, None, state.stops + 1);
+                request.send_copy(CommandReply::accepted(Phase::Stopping, "stopping")).expect("sent");
+            }
+            if is_due {
+                reports.send_copy(state.report(robot, sequence)).expect("sent");
+            }
+            drop(state);
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+/// Runs a service and a played streamer around a test.
+fn with_service(name: &str, scene: &Scene, played: &Played, test: impl FnOnce(&Asker)) {
+    let (arm, robot) = (format!("test-{name}-{}", std::process::id()), ur5());
+    let (stop, ready) = (AtomicBool::new(false), AtomicBool::new(false));
+    thread::scope(|s| {
+        s.spawn(|| played.play(&arm, &robot));
+        s.spawn(|| {
+            let wire = join(&arm, "planner");
+            let mut service = Service::open(&wire, &robot, scene, &stop).expect("opens");
+            ready.store(true, Ordering::SeqCst);
+            service.serve();
+        });
+        // Whatever the test does, the threads end: a panic is handed on after that.
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let since = Instant::now();
+            while !ready.load(Ordering::SeqCst) {
+                assert!(since.elapsed() < Duration::from_secs(20), "the service did not open");
+                thread::sleep(Duration::from_millis(5));
+            }
+            test(&Asker { wire: join(&arm, "client") });
+        }));
+        stop.store(true, Ordering::SeqCst);
+        played.end.store(true, Ordering::SeqCst);
+        if let Err(panic) = result {
+            std::panic::resume_unwind(panic);
+        }
+    });
+}
+
+/// Who asks the planner.
+struct Asker {
+    wire: Wire,
+}
+
+impl Asker {
+    fn scene(&self, request: &CheckedSceneRequest) -> SceneOutcome {
+        let client = self.wire.scene_client().expect("port");
+        let pending = client.send_copy(SceneRequest::from(request)).expect("sent");
+        let since = Instant::now();
+        loop {
+            if let Some(reply) = pending.receive().expect("received") {
+                return SceneReply::outcome(reply.payload());
+            }
+            assert!(since.elapsed() < Duration::from_secs(20), "no answer");
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn change(&self, changes: &[SceneChange]) -> (MotionEffect, String) {
+        match self.scene(&CheckedSceneRequest::Change(changes.to_vec())) {
+            SceneOutcome::Changed { effect, note, times_ns: [received, checked, acted], .. } => {
+                assert!(received <= checked && checked <= acted);
+                (effect, note)
+            }
+            outcome @ (SceneOutcome::Listed { .. } | SceneOutcome::Refused { .. }) => panic!("{outcome:?}"),
+        }
+    }
+
+    fn refused(&self, changes: &[SceneChange]) -> String {
+        match self.scene(&CheckedSceneRequest::Change(changes.to_vec())) {
+            SceneOutcome::Refused { reason } => reason,
+            outcome @ (SceneOutcome::Listed { .. } | SceneOutcome::Changed { .. }) => panic!("{outcome:?}"),
+        }
+    }
+
+    fn objects(&self) -> Vec<ListedObject> {
+        let mut all = Vec::new();
+        loop {
+            match self.scene(&CheckedSceneRequest::List { first: all.len() }) {
+                SceneOutcome::Listed { total, first, objects, .. } => {
+                    assert_eq!(first, all.len());
+                    all.extend(objects);
+                    if all.len() >= total {
+                        return all;
+                    }
+                }
+                outcome @ (SceneOutcome::Changed { .. } | SceneOutcome::Refused { .. }) => {
+                    panic!("{outcome:?}")
+                }
+            }
+        }
+    }
+
+    fn go(&self, goal_rad: JointArray) -> PlanOutcome {
+        let client = self.wire.plan_client().expect("port");
+        let request = CheckedPlanRequest {
+            joints: 6,
+            goal_rad,
+            tip: None,
+            when: When::AtOnce,
+            deadline_ms: 0,
+            seed: 1,
+            planner: String::new(),
+        };
+        let pending = client.send_copy(PlanRequest::from(&request)).expect("sent");
+        let since = Instant::now();
+        loop {
+            if let Some(reply) = pending.receive().expect("received") {
+                return reply.payload().outcome();
+            }
+            assert!(since.elapsed() < Duration::from_secs(30), "no answer");
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+fn at(position_m: [f64; 3]) -> ObjectPose {
+    ObjectPose { position_m, quaternion_xyzw: [0.0, 0.0, 0.0, 1.0] }
+}
+
+fn ball(name: &str, position_m: [f64; 3], radius_m: f64) -> SceneChange {
+    SceneChange::Add {
+        name: name.to_owned(),
+        shape: ObjectShape::Sphere { radius_m },
+        pose: at(position_m),
+        fixed_to: FixedTo::Base,
+        mass_kg: 0.0,
+        replaces: false,
+    }
+}
+
+/// Where the tip is on the way from [`FROM`] to [`TO`] when the base's joint stands at an angle.
+fn on_the_way(pan_rad: f64) -> [f64; 3] {
+    let mut q = FROM;
+    q[0] = pan_rad;
+    *ur5_origins_m(&pose(q)).last().expect("a tip")
+}
+
+fn empty() -> Scene {
+    Scene { margin_m: 0.02, ..Scene::default() }
+}
+
+/// What was commanded after an instant keeps the margin from obstacles, by a check that knows nothing of the planner.
+fn assert_commanded_free(played: &Played, since: Instant, obstacles: Vec<Obstacle>) {
+    let (robot, scene) = (ur5(), Scene { obstacles, ..empty() });
+    let state = played.state.lock().expect("no panic");
+    let poses: Vec<&JointArray> =
+        state.commanded.iter().filter(|(when, _)| *when >= since).map(|(_, q)| q).collect();
+    assert!(poses.len() > 100, "{} setpoints", poses.len());
+    for q in poses {
+        let (from_obstacles_m, _) = ur5_distances_m(&robot, &scene, q);
+        assert!(from_obstacles_m > scene.margin_m - 1e-6, "{from_obstacles_m} m at {q:?}");
+    }
+}
+
+fn wait_until_rest(played: &Played) {
+    let since = Instant::now();
+    while played.state.lock().expect("no panic").running.is_some() {
+        assert!(since.elapsed() < Duration::from_secs(20), "the arm moves on");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn scene_change_in_the_way_of_a_motion_leads_the_arm_round_and_others_leave_it() {
+    let played = Played::default();
+    with_service("reroute", &empty(), &played, |asker| {
+        assert_eq!(asker.change(&[ball("far", [0.0, 0.0, 3.0], 0.1)]).0, MotionEffect::Rests);
+        let PlanOutcome::Planned { duration_s, .. } = asker.go(pose(TO)) else { panic!("no plan") };
+        assert!(duration_s > 1.2, "{duration_s}: too short for this test");
+        assert_eq!(
+            asker.change(&[ball("aside", [0.0, 0.0, -2.0], 0.1)]),
+            (MotionEffect::Free, String::new())
+        );
+        let at_m = on_the_way(1.0);
+        let (effect, note) = asker.change(&[ball("in-the-way", at_m, 0.04)]);
+        let since = Instant::now();
+        assert!(matches!(effect, MotionEffect::Rerouted { .. }), "{effect:?}: {note}");
+        for word in ["in-the-way", "link", "required", "rerouted", "t = ", ", in "] {
+            assert!(note.contains(word), "{word}: {note}");
+        }
+        wait_until_rest(&played);
+        assert_commanded_free(&played, since, vec![sphere("in-the-way", at_m, 0.04)]);
+        let state = played.state.lock().expect("no panic");
+        let off_rad = (0..6).map(|j| (state.rest_rad[j] - TO[j]).abs()).fold(0.0, f64::max);
+        assert!(off_rad < 1e-6 && state.stops == 0, "{off_rad} rad off, {} stops", state.stops);
+    });
+}
+
+#[test]
+fn scene_change_round_the_goal_stops_the_arm_on_its_path_and_says_why() {
+    let played = Played::default();
+    with_service("stop", &empty(), &played, |asker| {
+        let PlanOutcome::Planned { .. } = asker.go(pose(TO)) else { panic!("no plan") };
+        let (effect, note) = asker.change(&[ball("on-the-goal", on_the_way(1.5), 0.1)]);
+        assert_eq!(effect, MotionEffect::Stopped, "{note}");
+        assert!(note.contains("on-the-goal") && note.contains("a stop on the path"), "{note}");
+        wait_until_rest(&played);
+        assert_eq!(played.state.lock().expect("no panic").stops, 1);
+        // The next plan knows the scene, and the list what became of the motion.
+        let PlanOutcome::Failed { reason } = asker.go(pose(TO)) else { panic!("a plan into an obstacle") };
+        assert!(reason.contains("on-the-goal"), "{reason}");
+        let SceneOutcome::Listed { last_effect, .. } = asker.scene(&CheckedSceneRequest::List { first: 0 })
+        else {
+            panic!("no list")
+        };
+        assert_eq!(last_effect, note);
+    });
+}
+
+/// Goal: a motion that another process has sent is checked as well, and stopped.
+#[test]
+fn scene_change_in_the_way_of_a_motion_of_another_process_stops_it() {
+    let played = Played::default();
+    with_service("foreign", &empty(), &played, |asker| {
+        let robot = ur5();
+        let plan = taustream_planner::plan(&robot, &empty(), &pose(FROM), &pose(TO), &PlanOptions::default());
+        let motion = plan.expect("a plan").trajectory;
+        let sent = send_trajectory(&asker.wire, &robot, &motion, Duration::from_secs(2)).expect("sent");
+        assert!(matches!(sent.receipt.and_then(|receipt| receipt.outcome()), Some(Outcome::Accepted { .. })));
+        thread::sleep(Duration::from_millis(50));
+        let aside = asker.change(&[ball("aside", [0.0, 0.0, -2.0], 0.1)]);
+        assert_eq!(aside, (MotionEffect::Free, String::new()));
+        let (effect, note) = asker.change(&[ball("in-the-way", on_the_way(1.0), 0.04)]);
+        assert!(effect == MotionEffect::Stopped && note.contains("in-the-way"), "{effect:?} {note}");
+    });
+}
+
+/// Goal: what the tip holds counts in plans, and rests where the tip leaves it.
+#[test]
+fn attached_object_moves_with_the_tip_and_counts_in_plans() {
+    let played = Played::default();
+    let tip_m = on_the_way(FROM[0]);
+    with_service("attach", &empty(), &played, |asker| {
+        // A long rod that hangs 20 cm below the tip.
+        let rod = SceneChange::Add {
+            name: "rod".to_owned(),
+            shape: ObjectShape::Capsule { radius_m: 0.02, length_m: 0.2 },
+            pose: at([tip_m[0], tip_m[1], tip_m[2] - 0.2]),
+            fixed_to: FixedTo::Base,
+            mass_kg: 0.0,
+            replaces: false,
+        };
+        let below = on_the_way(0.0);
+        let hindrance = ball("hindrance", [below[0], below[1], below[2] - 0.25], 0.05);
+        asker.change(&[rod, hindrance.clone()]);
+        let PlanOutcome::Planned { clearance_m, .. } = asker.go(pose(TO)) else { panic!("no plan") };
+        assert!(clearance_m > 0.02);
+        assert!(
+            asker
+                .refused(&[SceneChange::Attach { name: "rod".to_owned(), mass_kg: 1.0 }])
+                .contains("at rest")
+        );
+        wait_until_rest(&played);
+        let PlanOutcome::Planned { .. } = asker.go(pose(FROM)) else { panic!("no plan") };
+        wait_until_rest(&played);
+        thread::sleep(Duration::from_millis(50));
+        asker.change(&[SceneChange::Attach { name: "rod".to_owned(), mass_kg: 1.0 }]);
+        let rod = asker.objects().into_iter().find(|object| object.name == "rod").expect("listed");
+        assert_eq!((rod.fixed_to, rod.mass_kg), (FixedTo::Tip, 1.0));
+        let mut half_way = TO;
+        half_way[0] = 0.0;
+        let PlanOutcome::Failed { reason } = asker.go(pose(half_way)) else { panic!("through the rod") };
+        assert!(reason.contains("rod") && reason.contains("hindrance"), "{reason}");
+        let since = Instant::now();
+        let PlanOutcome::Planned { .. } = asker.go(pose(TO)) else { panic!("no plan round it") };
+        wait_until_rest(&played);
+        thread::sleep(Duration::from_millis(50));
+        asker.change(&[SceneChange::Detach { name: "rod".to_owned() }]);
+        let rod = asker.objects().into_iter().find(|object| object.name == "rod").expect("listed");
+        let tip_m = on_the_way(TO[0]);
+        let off_m = (0..3).map(|i| (rod.pose.position_m[i] - tip_m[i] + [0.0, 0.0, 0.2][i]).abs());
+        assert!(rod.fixed_to == FixedTo::Base && off_m.fold(0.0, f64::max) < 1e-6, "{rod:?}");
+        let goes_out = played.state.lock().expect("no panic").commanded.iter().any(|(when, q)| {
+            *when > since && (q[1] - FROM[1]).abs() + (q[2] - FROM[2]).abs() + (q[3] - FROM[3]).abs() > 0.05
+        });
+        assert!(goes_out, "the rod went through the hindrance");
+    });
+}
+
+/// Goal: whatever programs send, by the thousand, every request is answered and nothing panics.
+#[test]
+fn scene_changes_by_the_thousand_are_answered_and_names_that_do_not_exist_are_said() {
+    let played = Played::default();
+    with_service("flood", &scene("open"), &played, |asker| {
+        let reason = asker.refused(&[SceneChange::Remove { name: "nobody".to_owned() }]);
+        assert!(reason.contains("nobody") && reason.contains("table"), "{reason}");
+        let twice = [ball("one", [0.0, 0.0, 2.0], 0.1), ball("one", [0.0, 0.0, 2.0], 0.1)];
+        assert!(asker.refused(&twice).contains("already"));
+        assert!(asker.refused(&[ball("forearm_none", [f64::NAN, 0.0, 0.0], 0.1)]).contains("NaN m"));
+        assert!(asker.refused(&[ball("link1", [0.0, 0.0, 2.0], 0.1)]).contains("name of a link"));
+        let before = asker.objects().len();
+        let PlanOutcome::Planned { .. } = asker.go(pose(TO)) else { panic!("no plan") };
+        let mut rng = SeededRng::new(4, 11);
+        for _ in 0..300 {
+            let name = |index: usize| format!("o{index}");
+            let changes: Vec<SceneChange> = (0..1 + rng.index(6))
+                .map(|_| {
+                    let (name, far_m) = (name(rng.index(8)), rng.within(1.5, 90.0));
+                    match rng.index(4) {
+                        0 => ball(&name, [0.0, 0.0, far_m], 0.1),
+                        1 => SceneChange::Remove { name },
+                        2 => SceneChange::Move { name, pose: at([0.0, far_m, 0.0]) },
+                        _ => SceneChange::Detach { name },
+                    }
+                })
+                .collect();
+            match asker.scene(&CheckedSceneRequest::Change(changes)) {
+                SceneOutcome::Changed { effect: MotionEffect::Free | MotionEffect::Rests, .. }
+                | SceneOutcome::Refused { .. } => {}
+                outcome @ (SceneOutcome::Changed { .. } | SceneOutcome::Listed { .. }) => {
+                    panic!("{outcome:?}")
+                }
+            }
+        }
+        assert!(asker.objects().len() >= before);
+    });
+}
+
+/// Goal: a world that follows the changes is the world of the scene as it is then.
+/// Method: random changes; least distances in random poses against a world that is built anew.
+#[test]
+fn world_that_follows_changes_is_the_one_that_is_built_anew() {
+    let robot = ur5();
+    let mut live = LiveScene::new(&robot, &scene("pillars")).expect("builds");
+    let mut rng = SeededRng::new(5, 11);
+    let (mut made, mut held) = (0, 0);
+    for round in 0..200 {
+        let position =
+            |rng: &mut SeededRng| at([rng.within(-1.0, 1.0), rng.within(-1.0, 1.0), rng.within(0.0, 1.2)]);
+        let (name, which) = (format!("o{}", rng.index(6)), rng.index(6));
+        let shape = match rng.index(4) {
+            0 => ObjectShape::Sphere { radius_m: 0.1 },
+            1 => ObjectShape::Box { size_m: [0.1, 0.2, 0.3] },
+            2 => ObjectShape::Cylinder { radius_m: 0.05, length_m: 0.3 },
+            _ => ObjectShape::Capsule { radius_m: 0.05, length_m: 0.3 },
+        };
+        let change = match which {
+            0 | 1 => SceneChange::Add {
+                name,
+                shape,
+                pose: position(&mut rng),
+                fixed_to: if rng.unit() < 0.3 { FixedTo::Tip } else { FixedTo::Base },
+                mass_kg: 0.5,
+                replaces: rng.unit() < 0.5,
+            },
+            2 => SceneChange::Remove { name },
+            3 => SceneChange::Move { name, pose: position(&mut rng) },
+            4 => SceneChange::Attach { name, mass_kg: 0.5 },
+            _ => SceneChange::Detach { name },
+        };
+        let rest = pose(std::array::from_fn(|_| rng.within(-2.0, 2.0)));
+        let number = live.current().number;
+        match live.apply(&[change], Some(&rest)) {
+            Ok(_) => made += 1,
+            Err(error) => {
+                assert_eq!(live.current().number, number, "{error}");
+                continue;
+            }
+        }
+        let now = live.current();
+        assert_eq!(now.number, number + 1);
+        let anew = World::new(&now.robot, &now.scene).expect("builds");
+        held += usize::from(now.robot.links.len() > robot.links.len());
+        for _ in 0..5 {
+            let q = pose(std::array::from_fn(|_| rng.within(-3.0, 3.0)));
+            let measured =
+                |world: &World| world.closest(&q).map(|(pair, distance_m)| (world.names(&pair), distance_m));
+            let (Some((a, a_m)), Some((b, b_m))) = (measured(&now.world), measured(&anew)) else { panic!() };
+            assert!(a == b && (a_m - b_m).abs() < 1e-12, "round {round}: {a:?} {a_m}, {b:?} {b_m}");
+        }
+    }
+    assert!(made > 60 && held > 20, "{made} changes, {held} with something at the tip");
+}
+
+#[test]
+fn changes_count_together_or_not_at_all_and_history_joins_them() {
+    let mut live = LiveScene::new(&ur5(), &empty()).expect("builds");
+    let bad = [ball("a", [0.0, 0.0, 2.0], 0.1), SceneChange::Remove { name: "b".to_owned() }];
+    let error = live.apply(&bad, None).expect_err("no b");
+    assert!(
+        matches!(error, SceneChangeError::Unknown { .. }) && error.to_string().contains("has a"),
+        "{error}"
+    );
+    assert!(live.objects().is_empty() && live.current().number == 1);
+    live.apply(&bad[..1], None).expect("one");
+    live.apply(&[ball("b", [0.0, 0.0, 3.0], 0.1)], None).expect("two");
+    live.apply(&[SceneChange::Remove { name: "b".to_owned() }], None).expect("three");
+    let since =
+        |number: u64| live.changed_since(number).expect("known").obstacles.into_iter().collect::<Vec<_>>();
+    assert_eq!(
+        (since(1), since(2), since(4)),
+        (vec!["a".to_owned(), "b".to_owned()], vec!["b".to_owned()], vec![])
+    );
+    let touching = [SceneChange::Add {
+        name: "held".to_owned(),
+        shape: ObjectShape::Sphere { radius_m: 0.5 },
+        pose: at([0.0; 3]),
+        fixed_to: FixedTo::Tip,
+        mass_kg: 0.0,
+        replaces: false,
+    }];
+    let error = live.apply(&touching, Some(&pose(FROM))).expect_err("touches the forearm");
+    assert!(matches!(error, SceneChangeError::Touches { .. }), "{error}");
+    let unplaced = live.apply(&[SceneChange::Attach { name: "a".to_owned(), mass_kg: 0.0 }], None);
+    assert!(matches!(unplaced, Err(SceneChangeError::NoTip { .. })));
+    assert!(
+        verify(&ur5(), &live.current().scene, &Trajectory::new(6, pose(FROM), &[]).expect("rest")).is_ok()
+    );
+}
