@@ -14,10 +14,21 @@
 //! peak. Intervals whose bound is too high are halved. Strokes that cancel each other are no difficulty, because only
 //! the remainder adds their magnitudes. What rounding can hide is added to every bound.
 //!
+//! Most of a motion is proven more quickly: the eighth-order Taylor polynomial of a whole piece, with a bound of what it leaves out, is
+//! bounded in Bernstein form, which takes the strokes' values at one instant only. Where that does not suffice, the piece is
+//! proven as above, which also finds the evidence of a violation.
+//!
+//! Strokes in a row begin and end together, up to rounding. Between such edges no piece is proven: a neighbour's bounds grow by the
+//! little that can happen there.
+//!
 //! A joint that begins outside its range may only come in. The profile of a stroke is monotone, so while every stroke
 //! that has begun leads inwards, the joint cannot go further outside; no bound is needed. From the first stroke that
 //! leads outwards, and at the end, the range holds as for any other joint.
+mod pieces;
+
 use crate::limits::{LimitViolation, Peaks, Quantity, TOLERANCE};
+use crate::polynomial::RESOLUTION;
+use crate::profile_derivatives::{ORDERS, bounds};
 use crate::range::PermittedRange;
 use crate::stroke::{Phi, power};
 use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
@@ -31,12 +42,10 @@ const PEAK_BUDGET: usize = 1_000_000;
 const INTERVAL_BUDGET: usize = 8;
 /// Most halvings of one piece: 2^-40 of a day is 80 ns.
 const DEPTH_MAX: u32 = 40;
-/// Reported peaks are at most this much above the true ones, relatively ..
-const PEAK_RESOLUTION: f64 = 1e-3;
-/// .. or this part of the limit.
+/// Reported peaks are at most [`RESOLUTION`] above the true ones, relatively, or this part of the limit.
 const PEAK_FLOOR: f64 = 1e-6;
-/// Instants of the first look.
-const LOOKS: usize = 128;
+/// Edges that are nearer, relatively, differ by rounding.
+const EDGE_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Relative rounding of a sum of up to 512 terms, each with a relative error of some 4 n epsilon.
 const ROUNDING: f64 = 2e-13;
 /// Once a violation is known, an earlier one is looked for down to this width (s).
@@ -57,24 +66,15 @@ pub(crate) fn check(
         pair.copy_from_slice(&[stroke.start_s, stroke.end_s()]);
     }
     edges.sort_unstable_by(f64::total_cmp);
-    let pieces = || {
-        let pieces = edges.windows(2).map(|w| (w[0].max(begin_s), w[1]));
-        pieces.filter(|(from_s, to_s)| to_s > from_s && to_s.is_finite())
-    };
-    // A first look at some hundred instants, so that bounds are refined only near the peaks of the whole motion.
-    let count = pieces().count().max(1);
-    let looks = LOOKS.div_ceil(count);
-    for (from_s, to_s) in pieces().step_by(count.div_ceil(LOOKS)) {
-        proof.enter(from_s, to_s);
-        for look in 0..looks {
-            #[expect(clippy::cast_precision_loss, reason = "at most 128")]
-            let part = (look as f64 + 0.5) / looks as f64;
-            proof.look(from_s + part * (to_s - from_s));
+    let pieces = edges.windows(2).map(|w| (w[0].max(begin_s), w[1])).filter(|(_, to_s)| to_s.is_finite());
+    for (from_s, to_s) in pieces {
+        if to_s - from_s <= EDGE_ROUNDING * to_s {
+            continue;
         }
-    }
-    for (from_s, to_s) in pieces() {
         proof.enter(from_s, to_s);
-        proof.prove(from_s, to_s)?;
+        if !proof.holds_by_polynomials(from_s, to_s) {
+            proof.prove(from_s, to_s)?;
+        }
     }
     Ok(proof.peaks())
 }
@@ -85,15 +85,20 @@ type Jet = [JointArray; 5];
 pub(crate) struct Proof<'a> {
     trajectory: &'a Trajectory,
     limits: &'a [JointLimits; MAX_JOINTS],
-    /// Of each stroke `c_k/T^k` for k = 0 to 3, and 5.
-    scales: [[f64; 5]; MAX_STROKES],
-    /// Sums over the strokes that run in the current piece of `|delta| c_k/T^k`: k = 0 to 3 for rounding, and 5.
-    size: [JointArray; 4],
-    fifth: JointArray,
+    /// Of each stroke `c_k/T^k`, the bounds of its derivatives.
+    scales: [[f64; ORDERS + 1]; MAX_STROKES],
+    /// Sums of them over the strokes that run in the current piece, times `|delta|`.
+    size: [JointArray; ORDERS + 1],
+    /// What can happen to position, velocity, acceleration and jerk between edges that differ by rounding.
+    beside: [JointArray; 4],
     /// Indices of the strokes that run in the current piece.
     running: [u16; MAX_STROKES],
     running_count: usize,
-    /// Pose after those that have ended before it, and the sum of their |delta|.
+    /// Strokes before this one have ended before it; the pose after them, and the sum of their |delta|.
+    first: usize,
+    ended_rad: JointArray,
+    ended_size_rad: JointArray,
+    /// The same with those that have ended behind one that runs.
     reached_rad: JointArray,
     travelled_rad: JointArray,
     /// Until when each joint comes in from outside its range, and the side; 0 for a joint that begins inside.
@@ -120,7 +125,9 @@ impl Entry {
             return Self::default();
         }
         let above = limits.outside_rad(begins_rad) > 0.0;
-        let outwards = |delta_rad: f64| if above { delta_rad > 0.0 } else { delta_rad < 0.0 };
+        let outwards = |delta_rad: f64| {
+            if above { delta_rad > 0.0 } else { delta_rad < 0.0 }
+        };
         let mut left = trajectory.strokes().iter().filter(|stroke| !stroke.has_ended(begin_s));
         let first = left.find(|stroke| outwards(stroke.delta_rad[joint]));
         Self { until_s: Some(first.map_or(f64::INFINITY, |stroke| stroke.start_s)), above }
@@ -160,14 +167,18 @@ impl<'a> Proof<'a> {
         begin_s: f64,
     ) -> Self {
         let zero = [0.0; MAX_JOINTS];
+        let scales = scales(trajectory);
         Self {
             trajectory,
             limits,
-            scales: scales(trajectory),
-            size: [zero; 4],
-            fifth: zero,
+            beside: beside(trajectory, &scales),
+            scales,
+            size: [zero; ORDERS + 1],
             running: [0; MAX_STROKES],
             running_count: 0,
+            first: 0,
+            ended_rad: *trajectory.base_rad(),
+            ended_size_rad: zero,
             reached_rad: *trajectory.base_rad(),
             travelled_rad: zero,
             entries: core::array::from_fn(|joint| {
@@ -180,7 +191,7 @@ impl<'a> Proof<'a> {
         }
     }
 
-    fn joint_limits(&self) -> impl Iterator<Item = (usize, &'a JointLimits)> {
+    fn joint_limits(&self) -> impl Iterator<Item = (usize, &'a JointLimits)> + use<'a> {
         self.limits.iter().enumerate().take(self.trajectory.joints())
     }
 
@@ -211,14 +222,17 @@ impl<'a> Proof<'a> {
             .map(|violation| LimitViolation { proven: true, ..violation })
     }
 
-    /// Collects what runs between two neighbouring edges.
+    /// Collects what runs between two neighbouring edges; pieces come from left to right.
     pub(crate) fn enter(&mut self, from_s: f64, to_s: f64) {
-        self.size = [[0.0; MAX_JOINTS]; 4];
-        self.fifth = [0.0; MAX_JOINTS];
-        self.reached_rad = *self.trajectory.base_rad();
-        self.travelled_rad = [0.0; MAX_JOINTS];
+        while let Some(stroke) = self.trajectory.strokes().get(self.first).filter(|s| s.has_ended(from_s)) {
+            add_scaled(&mut self.ended_rad, &stroke.delta_rad, 1.0);
+            add_magnitude(&mut self.ended_size_rad, &stroke.delta_rad, 1.0);
+            self.first += 1;
+        }
+        (self.reached_rad, self.travelled_rad) = (self.ended_rad, self.ended_size_rad);
+        self.size = [[0.0; MAX_JOINTS]; ORDERS + 1];
         self.running_count = 0;
-        for (index, stroke) in self.trajectory.strokes().iter().enumerate() {
+        for (index, stroke) in self.trajectory.strokes().iter().enumerate().skip(self.first) {
             if stroke.start_s >= to_s {
                 break;
             }
@@ -227,11 +241,12 @@ impl<'a> Proof<'a> {
                 add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0);
                 continue;
             }
-            let Some([lower @ .., fifth]) = self.scales.get(index) else { continue };
-            for (size, scale) in self.size.iter_mut().zip(lower) {
+            let Some(scales) = self.scales.get(index) else {
+                continue;
+            };
+            for (size, scale) in self.size.iter_mut().zip(scales) {
                 add_magnitude(size, &stroke.delta_rad, *scale);
             }
-            add_magnitude(&mut self.fifth, &stroke.delta_rad, *fifth);
             if let (Some(slot), Ok(index)) = (self.running.get_mut(self.running_count), u16::try_from(index))
             {
                 *slot = index;
@@ -245,7 +260,9 @@ impl<'a> Proof<'a> {
         let mut jet = [[0.0; MAX_JOINTS]; 5];
         jet[0] = self.reached_rad;
         for index in self.running.iter().take(self.running_count) {
-            let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else { continue };
+            let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else {
+                continue;
+            };
             let s = ((t_s - stroke.start_s) / stroke.duration_s).clamp(0.0, 1.0);
             let phi = Phi::at(stroke.n, s);
             let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
@@ -259,11 +276,6 @@ impl<'a> Proof<'a> {
     }
 
     /// Notes what is reached at one instant.
-    fn look(&mut self, t_s: f64) {
-        let jet = self.jet(t_s);
-        self.note(&jet);
-    }
-
     fn note(&mut self, jet: &Jet) {
         for (met, values) in self.met.iter_mut().zip(jet.iter().skip(1)) {
             for (met, value) in met.iter_mut().zip(values) {
@@ -294,7 +306,9 @@ impl<'a> Proof<'a> {
                         break;
                     }
                 }
-                IntervalResult::Fails(violation) if !may_halve => return Err(found.unwrap_or(violation)),
+                IntervalResult::Fails(violation) if !may_halve => {
+                    return Err(found.unwrap_or(violation));
+                }
                 IntervalResult::Fails(_) | IntervalResult::Halve => {
                     if found.is_some() && to_s - from_s < FIRST_S {
                         continue;
@@ -325,7 +339,7 @@ impl<'a> Proof<'a> {
         for (joint, limits) in self.joint_limits() {
             let position_rad = jet[0][joint];
             let rounding = ROUNDING * (position_rad.abs() + self.travelled_rad[joint] + self.size[0][joint]);
-            let reach_rad = self.beyond(&jet, 0, joint, half_s) + rounding;
+            let reach_rad = self.beyond(&jet, 0, joint, half_s) + rounding + self.beside[0][joint];
             let instants_s = [interval.from_s, middle_s];
             if let Some(violation) = self.position_fault(joint, limits, position_rad, instants_s) {
                 return IntervalResult::Fails(violation);
@@ -336,7 +350,8 @@ impl<'a> Proof<'a> {
                 let value = jet[rate + 1][joint].abs();
                 let bound = value
                     + self.beyond(&jet, rate + 1, joint, half_s)
-                    + ROUNDING * self.size[rate + 1][joint];
+                    + ROUNDING * self.size[rate + 1][joint]
+                    + self.beside[rate + 1][joint];
                 let limit = limit_of(limits, quantity);
                 let evidence =
                     |value, proven| LimitViolation { joint, quantity, at_s: middle_s, value, limit, proven };
@@ -347,7 +362,7 @@ impl<'a> Proof<'a> {
                     fails = fails.or(Some(evidence(bound, false)));
                 }
                 let met = self.met[rate][joint];
-                coarse |= bound > (met * (1.0 + PEAK_RESOLUTION)).max(limit * PEAK_FLOOR);
+                coarse |= bound > (met * (1.0 + RESOLUTION)).max(limit * PEAK_FLOOR);
                 bounds[rate][joint] = bound;
             }
         }
@@ -373,7 +388,7 @@ impl<'a> Proof<'a> {
             order += 1.0;
             sum += derivative[joint].abs() * factor;
         }
-        sum + self.fifth[joint] * factor * half_s / order
+        sum + self.size[5][joint] * factor * half_s / order
     }
 
     /// Proven lowest and highest velocity, acceleration and jerk of each joint within `half_s` of an instant, inside the
@@ -427,18 +442,32 @@ fn within(value: f64, limit: f64) -> bool {
     value <= limit
 }
 
-fn scales(trajectory: &Trajectory) -> [[f64; 5]; MAX_STROKES] {
-    let mut scales = [[0.0; 5]; MAX_STROKES];
+fn scales(trajectory: &Trajectory) -> [[f64; ORDERS + 1]; MAX_STROKES] {
+    let mut scales = [[0.0; ORDERS + 1]; MAX_STROKES];
+    let mut known = (0, [0.0; ORDERS + 1]);
     for (scales, stroke) in scales.iter_mut().zip(trajectory.strokes()) {
-        let rate = 1.0 / stroke.duration_s;
-        let mut rate_k = 1.0;
-        for (order, scale) in [0, 1, 2, 3, 5].into_iter().zip(scales) {
-            rate_k = if order == 5 { rate_k * rate } else { rate_k };
-            *scale = rate_k * derivative_bound(order, stroke.n);
+        if known.0 != stroke.n {
+            known = (stroke.n, bounds(stroke.n));
+        }
+        let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
+        for (scale, bound) in scales.iter_mut().zip(known.1) {
+            *scale = rate_k * bound;
             rate_k *= rate;
         }
     }
     scales
+}
+
+/// What can happen to position, velocity, acceleration and jerk between two edges that differ by rounding.
+fn beside(trajectory: &Trajectory, scales: &[[f64; ORDERS + 1]; MAX_STROKES]) -> [JointArray; 4] {
+    let width_s = EDGE_ROUNDING * trajectory.duration_s();
+    let mut beside = [[0.0; MAX_JOINTS]; 4];
+    for (stroke, scales) in trajectory.strokes().iter().zip(scales) {
+        for (beside, scale) in beside.iter_mut().zip(scales.iter().skip(1)) {
+            add_magnitude(beside, &stroke.delta_rad, width_s * scale);
+        }
+    }
+    beside
 }
 
 fn limit_of(limits: &JointLimits, quantity: Quantity) -> f64 {
@@ -479,37 +508,6 @@ fn fourth(n: u32, s: f64) -> f64 {
     let (a, b, c) = (m - 1.0, m - 2.0, m - 3.0);
     let inner = 24.0 * u * u * u - a * x * (816.0 * u * u - b * x * (1152.0 * u - 256.0 * c * x));
     m * power(u, n.saturating_sub(4)) * inner
-}
-
-/// A bound of |phi^(order)| on [0, 1]: the sum of the peaks of its terms.
-///
-/// phi^(k) = - sum over j of n!/(n-j)! b(k, j) s^(4j-k) u^(n-j) with b(k+1, j) = (4j - k) b(k, j) - 4 b(k, j-1),
-/// b(0, 0) = 1; the rows below are b, and s^a (1 - s^4)^b peaks at s^4 = a/(a + 4b).
-fn derivative_bound(order: usize, n: u32) -> f64 {
-    const ROWS: [[f64; 5]; 6] = [
-        [0.0; 5],
-        [4.0, 0.0, 0.0, 0.0, 0.0],
-        [12.0, 16.0, 0.0, 0.0, 0.0],
-        [24.0, 144.0, 64.0, 0.0, 0.0],
-        [24.0, 816.0, 1152.0, 256.0, 0.0],
-        [0.0, 3360.0, 12480.0, 7680.0, 1024.0],
-    ];
-    let Some(row) = ROWS.get(order).filter(|_| order > 0) else { return 1.0 };
-    let n = f64::from(n);
-    let (mut sum, mut falling, mut j) = (0.0, 1.0, 0.0);
-    #[expect(clippy::cast_precision_loss, reason = "at most 5")]
-    let k = order as f64;
-    for coefficient in row {
-        j += 1.0;
-        falling *= n - j + 1.0;
-        let (a, b) = (4.0 * j - k, n - j);
-        if *coefficient == 0.0 || falling <= 0.0 {
-            continue;
-        }
-        let x = a / (a + 4.0 * b);
-        sum += coefficient * falling * libm::pow(x, 0.25 * a) * libm::pow(1.0 - x, b);
-    }
-    sum
 }
 
 fn add_scaled(sum: &mut JointArray, value: &JointArray, factor: f64) {
