@@ -25,6 +25,7 @@ pub mod target;
 pub mod text;
 pub mod tip_goal;
 pub mod trajectory;
+pub mod way_points;
 
 pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
@@ -42,4 +43,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 5;
+pub const LAYOUT_VERSION: u32 = 6;

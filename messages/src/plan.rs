@@ -1,5 +1,6 @@
 //! Replan requests to the planner and its answers (request-response).
 use crate::tip_goal::{TipGoal, TipGoalWire};
+use crate::way_points::{Blend, WAY_POINTS_MAX, WayPointsWire};
 use crate::{LAYOUT_VERSION, Receipt, Text};
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -11,7 +12,8 @@ pub enum When {
     AtOnce,
     /// Plan from the end of the running motion, and start when it has ended. Replaces what waits for that.
     AfterCurrent,
-    /// Plan from the end of everything that was accepted, and start when it has ended.
+    /// Go on from the end of everything that was accepted: round the corner there while that is possible, else start when it
+    /// has ended.
     Queue,
     /// Bring the running motion to rest as soon as its limits allow, and drop what waits. The goal means nothing.
     Cancel,
@@ -31,6 +33,7 @@ pub struct PlanRequest {
     sender_pid: u32,
     reserved: u32,
     tip: TipGoalWire,
+    way_points: WayPointsWire,
 }
 
 impl PlanRequest {
@@ -48,6 +51,10 @@ pub struct CheckedPlanRequest {
     pub joints: usize,
     /// Where to go, unless the tip has a goal.
     pub goal_rad: JointArray,
+    /// Poses to pass before it, in their order; at most [`WAY_POINTS_MAX`].
+    pub via_rad: Vec<JointArray>,
+    /// How far from corners the motion may pass.
+    pub blend: Blend,
     /// Where the tip shall end, instead.
     pub tip: Option<TipGoal>,
     /// When to replace it.
@@ -58,6 +65,22 @@ pub struct CheckedPlanRequest {
     pub seed: u64,
     /// Name of a planner; empty for the default.
     pub planner: String,
+}
+
+impl CheckedPlanRequest {
+    /// A request for a pose of the joints: at once, within the planner's own time, by its default.
+    #[must_use]
+    pub fn to_pose(joints: usize, goal_rad: JointArray) -> Self {
+        let (via_rad, blend, tip, when) = (Vec::new(), Blend::default(), None, When::AtOnce);
+        let (deadline_ms, seed, planner) = (0, 1, String::new());
+        Self { joints, goal_rad, via_rad, blend, tip, when, deadline_ms, seed, planner }
+    }
+
+    /// The way points, and the goal behind them.
+    #[must_use]
+    pub fn points_rad(&self) -> Vec<JointArray> {
+        self.via_rad.iter().chain(std::iter::once(&self.goal_rad)).copied().collect()
+    }
 }
 
 /// Why a request is refused before planning.
@@ -82,6 +105,34 @@ pub enum PlanRequestError {
         joint: usize,
         /// The value in the message.
         value_rad: f64,
+    },
+    /// More than fit into a message.
+    #[error("{got} way points; a request takes at most {WAY_POINTS_MAX}, send the others with --queue")]
+    WayPoints {
+        /// The count in the message.
+        got: u32,
+    },
+    /// A way point is not finite.
+    #[error("way point {}: joint {} is {value_rad}; it must be finite (rad)", point + 1, joint + 1)]
+    WayPoint {
+        /// Zero-based index of the way point.
+        point: usize,
+        /// Zero-based index of the joint.
+        joint: usize,
+        /// The value in the message.
+        value_rad: f64,
+    },
+    /// The blend is no distance.
+    #[error("the blend is {value}; it must be finite, and 0 or more")]
+    Blend {
+        /// The value in the message.
+        value: f64,
+    },
+    /// No kind of blend.
+    #[error("unknown kind of blend {got}; the sender is of another release, or no sender of this project")]
+    BlendKind {
+        /// The code in the message.
+        got: u32,
     },
     /// A number of the tip's goal.
     #[error("the tip's {what} is {value}, which makes no sense")]
@@ -123,6 +174,7 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             sender_pid: std::process::id(),
             reserved: 0,
             tip: TipGoalWire::from(r.tip.as_ref()),
+            way_points: WayPointsWire::new(&r.via_rad, r.blend),
         }
     }
 }
@@ -150,9 +202,12 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
                 return Err(PlanRequestError::Goal { joint, value_rad });
             }
         }
+        let (via_rad, blend) = r.way_points.read(joints)?;
         Ok(Self {
             joints,
             goal_rad: r.goal_rad,
+            via_rad,
+            blend,
             tip: r.tip.read()?,
             when,
             deadline_ms: r.deadline_ms,
@@ -291,5 +346,5 @@ impl PlanReply {
     }
 }
 
-const _: () = assert!(size_of::<PlanRequest>() == 464);
+const _: () = assert!(size_of::<PlanRequest>() == 464 + 16 + 1024);
 const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248);

@@ -14,12 +14,13 @@ use taustream_messages::target::{
 };
 use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::trajectory::{Corrupted, MessageError};
+use taustream_messages::way_points::{Blend, WAY_POINTS_MAX};
 use taustream_messages::{
     CheckedSceneRequest, CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome,
     Phase, PlanReply, PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply, SceneRequest,
     TargetReply, TargetRequest, Text, TrajectoryMessage,
 };
-use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
 /// Makes a message of arbitrary bytes, as a hostile sender can.
 #[expect(unsafe_code, reason = "a test of arbitrary bits has to write arbitrary bits")]
@@ -247,13 +248,9 @@ fn goals_of_the_tip_survive_the_wire_and_numbers_that_make_no_sense_are_refused(
         line: Some(TipLine { linear_m_s: 0.1, angular_rad_s: 1.0, off_m_max: 1e-3 }),
     };
     let request = |tip: TipGoal| CheckedPlanRequest {
-        joints: 6,
-        goal_rad: [0.0; MAX_JOINTS],
         tip: Some(tip),
-        when: When::AtOnce,
         deadline_ms: 100,
-        seed: 1,
-        planner: String::new(),
+        ..CheckedPlanRequest::to_pose(6, [0.0; MAX_JOINTS])
     };
     let sent = |tip: TipGoal| CheckedPlanRequest::try_from(&PlanRequest::from(&request(tip)));
     for tip in [
@@ -295,13 +292,11 @@ fn plan_request_and_answer_survive_the_wire() {
     let mut goal_rad = [0.0; MAX_JOINTS];
     goal_rad[5] = -1.25;
     let request = CheckedPlanRequest {
-        joints: 6,
-        goal_rad,
-        tip: None,
         when: When::AfterCurrent,
         deadline_ms: 1500,
         seed: 42,
         planner: "rrt-connect".into(),
+        ..CheckedPlanRequest::to_pose(6, goal_rad)
     };
     assert_eq!(CheckedPlanRequest::try_from(&PlanRequest::from(&request)), Ok(request));
     let outcomes = [
@@ -319,6 +314,37 @@ fn plan_request_and_answer_survive_the_wire() {
     ];
     for outcome in outcomes {
         assert_eq!(PlanReply::new(&outcome).outcome(), outcome);
+    }
+}
+
+#[test]
+fn way_points_survive_the_wire_and_those_that_make_no_sense_are_refused() {
+    let pose = |value_rad: f64| std::array::from_fn(|joint| if joint < 6 { value_rad } else { 0.0 });
+    let with = |via_rad: Vec<JointArray>, blend| CheckedPlanRequest {
+        via_rad,
+        blend,
+        ..CheckedPlanRequest::to_pose(6, pose(0.5))
+    };
+    let sent = |request: &CheckedPlanRequest| CheckedPlanRequest::try_from(&PlanRequest::from(request));
+    for good in [
+        with(Vec::new(), Blend::Clearance),
+        with(vec![pose(0.1), pose(-0.2)], Blend::Radians(0.0)),
+        with(vec![pose(0.3); WAY_POINTS_MAX], Blend::Metres(0.05)),
+    ] {
+        assert_eq!(sent(&good), Ok(good));
+    }
+    let mut seventh = pose(0.1);
+    seventh[6] = 0.1;
+    for bad in [
+        with(vec![pose(0.3); WAY_POINTS_MAX + 1], Blend::Clearance),
+        with(vec![pose(0.3), pose(f64::NAN)], Blend::Clearance),
+        with(vec![pose(f64::INFINITY)], Blend::Clearance),
+        with(vec![seventh], Blend::Clearance),
+        with(vec![pose(0.3)], Blend::Radians(f64::NAN)),
+        with(vec![pose(0.3)], Blend::Radians(-1e-3)),
+        with(vec![pose(0.3)], Blend::Metres(f64::INFINITY)),
+    ] {
+        assert!(sent(&bad).is_err(), "{bad:?}");
     }
 }
 

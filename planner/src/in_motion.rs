@@ -3,13 +3,17 @@
 //! A replacement repeats the strokes that have begun before its cut and is verified from the cut on, for limits and for
 //! distances: the sum of kept and new strokes is new geometry. Three ways, from the quickest: strokes that carry the arm from
 //! its state at the cut to the goal; a taper to rest, and an ordinary plan from there; or the end of the motion, and an
-//! ordinary plan from there. The last one always exists. Of those that are proven the shortest is taken.
+//! ordinary plan from there. The last one always exists. Of those that are proven the shortest is taken. Way points before the
+//! goal, and the end of a motion that is gone on from, are corners: they are rounded where that is proven, else the arm stops at them.
 use crate::budget::Budget;
+use crate::pipeline::blends_rad;
 use crate::plan::{
-    Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_until,
+    Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_through_until,
+    plan_until,
 };
 use crate::replacement::{replacement, to_rest};
 use crate::timing::Path;
+use crate::timing::onward::Onward;
 use crate::verify::{Proof, Stretch, Violation, verify_stretches};
 use crate::world::World;
 use std::sync::atomic::AtomicBool;
@@ -90,6 +94,12 @@ pub enum NoReplacement {
     /// Nothing could be planned from where the arm comes to rest.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// Between two motions the arm has to stop.
+    #[error("no strokes were found that round the corner at {at_s:.3} s within the blend")]
+    NoCorner {
+        /// Trajectory time of the end of the first motion.
+        at_s: f64,
+    },
     /// It is not proven.
     #[error("the replacement is not proven: {0}")]
     Unproven(#[from] Violation),
@@ -135,22 +145,14 @@ impl Surroundings<'_> {
     /// When there is no taper, no plan, or one of them is not proven.
     pub fn rest_first(
         &self,
-        (cut, goal_rad): (&CutPoint, &JointArray),
+        (cut, points_rad): (&CutPoint, &[JointArray]),
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
         let tapered = self.taper_strokes(cut)?;
         let proof = self.prove(&tapered, cut, options)?;
-        let plan = self.plan(&tapered.end_rad(), goal_rad, options)?;
-        let rest_s = tapered.duration_s();
-        let trajectory = continued(tapered.base_rad(), tapered.strokes(), (&plan.trajectory, rest_s))?;
-        let clearance_m = proof.clearance_m.min(plan.proof.clearance_m);
-        Ok(Replacement {
-            trajectory,
-            clearance_m,
-            how: format!("to rest at {rest_s:.3} s, then {}", plan.how),
-            planned_ns: now_ns(),
-            replaces: cut.replaces(),
-        })
+        let plan = self.plan(&tapered.end_rad(), points_rad, options)?;
+        let how = format!("to rest at {:.3} s, then {}", tapered.duration_s(), plan.how);
+        stopping((&tapered, proof.clearance_m), &plan, (cut, how))
     }
 
     /// What runs goes on to its end, and an ordinary plan leads on from there.
@@ -159,54 +161,93 @@ impl Surroundings<'_> {
     /// When there is no plan, or strokes that must be kept are not known.
     pub fn after_end(
         &self,
-        (cut, goal_rad): (&CutPoint, &JointArray),
+        (cut, points_rad): (&CutPoint, &[JointArray]),
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
-        let plan = self.plan(&cut.end_rad, goal_rad, options)?;
-        // At its end every stroke of a motion that runs is folded; of one that waits, all are kept.
-        let trajectory = match &cut.trajectory {
-            Some(trajectory) => {
-                let kept = kept(trajectory, cut.at_s, cut.from_s);
-                continued(&kept.base_rad, kept.strokes, (&plan.trajectory, cut.end_s))?
-            }
-            None if cut.from_s >= cut.end_s => continued(&cut.end_rad, &[], (&plan.trajectory, cut.end_s))?,
-            None => return Err(NoReplacement::Unknown),
-        };
-        let Plan { how, proof, .. } = plan;
-        Ok(Replacement {
-            trajectory,
-            clearance_m: proof.clearance_m,
-            how: format!("after {:.3} s: {how}", cut.end_s),
-            planned_ns: now_ns(),
-            replaces: cut.replaces(),
-        })
+        let plan = self.plan(&cut.end_rad, points_rad, options)?;
+        after(cut, &plan)
     }
 
-    /// Strokes that carry the arm from its state at the cut to the goal, as soon as its limits allow.
+    /// What runs goes on past its end by an ordinary plan from there, without a stop where the corner can be rounded.
+    ///
+    /// # Errors
+    /// When there is no plan, or strokes that must be kept are not known.
+    pub fn past_end(
+        &self,
+        [cut, end]: [&CutPoint; 2],
+        points_rad: &[JointArray],
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let plan = self.plan(&end.end_rad, points_rad, options)?;
+        let rounded = cut.folded().and_then(|first| self.rounded(cut, (&first, &plan), options));
+        rounded.or_else(|_| after(end, &plan))
+    }
+
+    /// Two motions without a stop between them.
+    fn rounded(
+        &self,
+        cut: &CutPoint,
+        (first, plan): (&Trajectory, &Plan),
+        options: &PlanOptions,
+    ) -> Result<Replacement, NoReplacement> {
+        let (limits, world) = (self.robot.limits(), self.world()?);
+        let onward = Onward { first, then: &plan.trajectory, from_s: cut.at_s, limits: &limits };
+        let end_s = first.duration_s();
+        let mut why = NoReplacement::NoCorner { at_s: end_s };
+        for blend_rad in blends_rad(options.blend, &world) {
+            // What is not found in a wide tube is not found in a narrow one.
+            let Some(timed) = onward.rounded(blend_rad) else { break };
+            let planned_ns = now_ns();
+            match self.prove(&timed.trajectory, cut, options) {
+                Ok(proof) => {
+                    let (off_rad, how) = (timed.deviation_rad, &plan.how);
+                    return Ok(Replacement {
+                        trajectory: timed.trajectory,
+                        clearance_m: proof.clearance_m,
+                        how: format!("on past {end_s:.3} s, rounded by at most {off_rad:.3} rad: {how}"),
+                        planned_ns,
+                        replaces: cut.replaces(),
+                    });
+                }
+                Err(unproven) => why = unproven,
+            }
+        }
+        Err(why)
+    }
+
+    /// Strokes that carry the arm from its state at the cut through the points before the goal to the goal, as soon as its limits allow.
     ///
     /// # Errors
     /// When none are found, or they are not proven.
     pub fn direct(
         &self,
-        (cut, goal_rad): (&CutPoint, &JointArray),
+        (cut, points_rad): (&CutPoint, &[JointArray]),
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
-        check_pose(self.robot, PoseOf::Goal, goal_rad)?;
-        let goal_rad = nearest_inside(self.robot, goal_rad);
-        let made = replacement(&cut.folded()?, cut.at_s, &goal_rad, &self.robot.limits());
+        let Some((first_rad, others_rad)) = points_rad.split_first() else {
+            return Err(NoReplacement::NoStrokes { at_s: cut.at_s });
+        };
+        let which = if others_rad.is_empty() { PoseOf::Goal } else { PoseOf::Via(0) };
+        check_pose(self.robot, which, first_rad)?;
+        let first_rad = nearest_inside(self.robot, first_rad);
+        let made = replacement(&cut.folded()?, cut.at_s, &first_rad, &self.robot.limits());
         let trajectory = made.ok_or(NoReplacement::NoStrokes { at_s: cut.at_s })?;
-        let planned_ns = now_ns();
-        let proof = self.prove(&trajectory, cut, options)?;
-        Ok(Replacement {
-            trajectory,
-            clearance_m: proof.clearance_m,
-            how: "straight on from the motion".to_owned(),
-            planned_ns,
-            replaces: cut.replaces(),
+        let how = "straight on from the motion";
+        if others_rad.is_empty() {
+            let planned_ns = now_ns();
+            let clearance_m = self.prove(&trajectory, cut, options)?.clearance_m;
+            let (how, replaces) = (how.to_owned(), cut.replaces());
+            return Ok(Replacement { trajectory, clearance_m, how, planned_ns, replaces });
+        }
+        let plan = self.plan(&first_rad, others_rad, options)?;
+        self.rounded(cut, (&trajectory, &plan), options).or_else(|_| {
+            let proof = self.prove(&trajectory, cut, options)?;
+            let how = format!("{how}, at {:.3} s at rest; {}", trajectory.duration_s(), plan.how);
+            stopping((&trajectory, proof.clearance_m), &plan, (cut, how))
         })
     }
 
-    /// The shortest proven way to the goal that needs no search: straight on from the cut, or, where even a straight line from
+    /// The shortest proven way to the goal that needs no search: straight on from the cut, or, where even straight lines from
     /// there would be over earlier, on from the end of the motion.
     ///
     /// # Errors
@@ -214,19 +255,19 @@ impl Surroundings<'_> {
     pub fn direct_or_after_end(
         &self,
         [cut, end]: [&CutPoint; 2],
-        goal_rad: &JointArray,
+        points_rad: &[JointArray],
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
-        let direct = self.direct((cut, goal_rad), options)?;
+        let direct = self.direct((cut, points_rad), options)?;
         let limits = self.robot.limits();
-        let goal_rad = &nearest_inside(self.robot, goal_rad);
-        let path =
-            Path { corners_rad: &[end.end_rad, *goal_rad], joints: self.robot.joints.len(), limits: &limits };
+        let points = points_rad.iter().map(|point_rad| nearest_inside(self.robot, point_rad));
+        let corners_rad: Vec<JointArray> = std::iter::once(end.end_rad).chain(points).collect();
+        let path = Path { corners_rad: &corners_rad, joints: self.robot.joints.len(), limits: &limits };
         let straight_s = path.stopping().map_or(f64::INFINITY, |timed| timed.trajectory.duration_s());
         if end.end_s + straight_s >= direct.trajectory.duration_s() {
             return Ok(direct);
         }
-        shorter(Ok(direct), self.after_end((end, goal_rad), options))
+        shorter(Ok(direct), self.after_end((end, points_rad), options))
     }
 
     /// The shorter one of two ways round what is in the way: to rest and on, or on from the end of the motion.
@@ -236,12 +277,12 @@ impl Surroundings<'_> {
     pub fn rest_first_or_after_end(
         &self,
         [cut, end]: [&CutPoint; 2],
-        goal_rad: &JointArray,
+        points_rad: &[JointArray],
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
         let (from_rest, from_end) = thread::scope(|scope| {
-            let from_end = scope.spawn(|| self.after_end((end, goal_rad), options));
-            let from_rest = self.rest_first((cut, goal_rad), options);
+            let from_end = scope.spawn(|| self.after_end((end, points_rad), options));
+            let from_rest = self.rest_first((cut, points_rad), options);
             (from_rest, from_end.join().unwrap_or(Err(NoReplacement::Panicked)))
         });
         shorter(from_rest, from_end)
@@ -252,15 +293,24 @@ impl Surroundings<'_> {
         tapered.ok_or(NoReplacement::NoStrokes { at_s: cut.at_s })
     }
 
+    /// An ordinary plan from a pose at rest to the last of some points, through the others.
     fn plan(
         &self,
         start_rad: &JointArray,
-        goal_rad: &JointArray,
+        points_rad: &[JointArray],
         options: &PlanOptions,
     ) -> Result<Plan, NoReplacement> {
         let (robot, scene, margin) = (self.robot, self.scene, StartMargin::AsItStands);
-        let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad, margin };
-        Ok(plan_until(&task, options, Some(self.cancel))?)
+        if let [goal_rad] = points_rad {
+            let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad, margin };
+            return Ok(plan_until(&task, options, Some(self.cancel))?);
+        }
+        let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(points_rad).copied().collect();
+        Ok(plan_through_until((robot, scene), &all_rad, options, Some(self.cancel))?)
+    }
+
+    fn world(&self) -> Result<World<'_>, NoReplacement> {
+        World::new(self.robot, self.scene).map_err(|name| NoReplacement::Shape { name })
     }
 
     /// Proves limits and distances from the cut on.
@@ -270,7 +320,7 @@ impl Surroundings<'_> {
         cut: &CutPoint,
         options: &PlanOptions,
     ) -> Result<Proof, NoReplacement> {
-        let world = World::new(self.robot, self.scene).map_err(|name| NoReplacement::Shape { name })?;
+        let world = self.world()?;
         let budget = Budget::until(options.deadline, Some(self.cancel));
         let span_s = [cut.at_s, trajectory.duration_s().max(cut.at_s)];
         Ok(verify_stretches(&[Stretch { world: &world, span_s }], trajectory, &budget)?)
@@ -287,6 +337,37 @@ fn shorter(
         (Ok(only), Err(_)) | (Err(_), Ok(only)) => Ok(only),
         (Err(why), Err(_)) => Err(why),
     }
+}
+
+/// A plan that begins when the motion that is cut has ended.
+fn after(cut: &CutPoint, plan: &Plan) -> Result<Replacement, NoReplacement> {
+    // At its end every stroke of a motion that runs is folded; of one that waits, all are kept.
+    let trajectory = match &cut.trajectory {
+        Some(trajectory) => {
+            let kept = kept(trajectory, cut.at_s, cut.from_s);
+            continued(&kept.base_rad, kept.strokes, (&plan.trajectory, cut.end_s))?
+        }
+        None if cut.from_s >= cut.end_s => continued(&cut.end_rad, &[], (&plan.trajectory, cut.end_s))?,
+        None => return Err(NoReplacement::Unknown),
+    };
+    Ok(Replacement {
+        trajectory,
+        clearance_m: plan.proof.clearance_m,
+        how: format!("after {:.3} s: {}", cut.end_s, plan.how),
+        planned_ns: now_ns(),
+        replaces: cut.replaces(),
+    })
+}
+
+/// A motion from the cut to rest, whose clearance is proven, and a plan that begins when it has ended.
+fn stopping(
+    (first, clearance_m): (&Trajectory, f64),
+    plan: &Plan,
+    (cut, how): (&CutPoint, String),
+) -> Result<Replacement, NoReplacement> {
+    let trajectory = continued(first.base_rad(), first.strokes(), (&plan.trajectory, first.duration_s()))?;
+    let clearance_m = clearance_m.min(plan.proof.clearance_m);
+    Ok(Replacement { trajectory, clearance_m, how, planned_ns: now_ns(), replaces: cut.replaces() })
 }
 
 /// Kept strokes, and a motion from rest to rest that begins at `from_s`, where they have ended.

@@ -39,7 +39,9 @@ pub mod world;
 pub use taustream_arm::rng;
 
 pub use goals::{Finder, GoalError, Orientation, Reached, Situation, TipTarget, plan_to_any, plan_to_tip};
+pub use taustream_messages::way_points::Blend;
+
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
-pub use plan::{Blend, Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
+pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
 pub use verify::{Contact, Proof, Violation, verify};

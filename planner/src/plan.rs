@@ -12,6 +12,7 @@ use crate::world::World;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
+use taustream_messages::way_points::Blend;
 use taustream_motion::digits::{Amount, OutsideRange};
 use taustream_motion::range::INSIDE_RAD;
 use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
@@ -19,18 +20,6 @@ use taustream_optimizers::Reading;
 
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
 pub(crate) const CUT_SHORT: &str = ", cut short by the deadline";
-
-/// How far from its path a motion may be where it rounds corners.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Blend {
-    /// As far as the scene's margins allow, up to 0.4 rad.
-    #[default]
-    Clearance,
-    /// The length of the difference of all joints, rad; 0 stops at each corner.
-    Radians(f64),
-    /// How far any point of the arm may be from where it would be on the path, m; 0 stops at each corner.
-    Metres(f64),
-}
 
 /// How to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -294,9 +283,32 @@ pub fn plan_through(
     poses_rad: &[JointArray],
     options: &PlanOptions,
 ) -> Result<Plan, PlanError> {
-    let budget = Budget::until(options.clock(), None);
+    plan_through_until((robot, scene), poses_rad, options, None)
+}
+
+/// Like [`plan_through`], and given up as soon as `cancel` is set.
+///
+/// # Errors
+/// What is wrong with a pose, or what was tried in vain.
+pub fn plan_through_until(
+    (robot, scene): (&Robot, &Scene),
+    poses_rad: &[JointArray],
+    options: &PlanOptions,
+    cancel: Option<&AtomicBool>,
+) -> Result<Plan, PlanError> {
+    let budget = Budget::until(options.clock(), cancel);
     let evaluator = Evaluator::new(options.objective, robot)?;
     let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
+    let inside_rad = clear_poses(&world, poses_rad)?;
+    Pipeline::new(&world, &budget, options, &evaluator).run_through(&inside_rad)
+}
+
+/// Poses of a motion, each inside the limits and clear of everything.
+///
+/// # Errors
+/// Which pose is not, and why.
+pub(crate) fn clear_poses(world: &World, poses_rad: &[JointArray]) -> Result<Vec<JointArray>, PlanError> {
+    let robot = world.robot();
     let last = poses_rad.len().saturating_sub(1);
     let mut inside_rad = Vec::with_capacity(poses_rad.len());
     for (i, pose_rad) in poses_rad.iter().enumerate() {
@@ -314,7 +326,7 @@ pub fn plan_through(
         }
         inside_rad.push(pose_rad);
     }
-    Pipeline::new(&world, &budget, options, &evaluator).run_through(&inside_rad)
+    Ok(inside_rad)
 }
 
 /// What to plan.

@@ -13,7 +13,7 @@ mod tip;
 
 use crate::kind::PlannerKind;
 use crate::live_scene::LiveScene;
-use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_until};
+use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_through_until, plan_until};
 use crate::send::{Outbox, RECEIPT_TAKES, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
 use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
@@ -117,6 +117,7 @@ pub struct Service<'a> {
     received_ns: u64,
     seen: Seen,
     latency: Latency,
+    corner_latency: Latency,
     targets: TargetServer,
     stream: Stream,
     promise: Promise,
@@ -168,6 +169,7 @@ impl<'a> Service<'a> {
             received_ns: 0,
             seen: Seen::default(),
             latency: Latency::default(),
+            corner_latency: Latency::default(),
             targets: wire.target_server()?,
             stream: Stream::new(robot),
             promise,
@@ -258,6 +260,9 @@ impl<'a> Service<'a> {
     ) -> Result<PlanOutcome, String> {
         let rests = phase == Phase::Holding && report.energised == 1;
         match &tip.line {
+            Some(_) if !requested.via_rad.is_empty() => {
+                Err("a straight line of the tip passes no way points".to_owned())
+            }
             Some(line) if rests => {
                 let plan = self.plan_straight(request, report.command_rad, (tip, line, options))?;
                 Ok(self.send(request, &plan))
@@ -266,10 +271,11 @@ impl<'a> Service<'a> {
                 Err("a straight line of the tip begins at rest; wait until the motion has ended".to_owned())
             }
             None if rests || moving::runs(phase) => {
-                let near_rad = match requested.when {
+                let from_rad = match requested.when {
                     When::AfterCurrent | When::Queue if !rests => report.end_rad,
                     When::AtOnce | When::AfterCurrent | When::Queue | When::Cancel => report.command_rad,
                 };
+                let near_rad = requested.via_rad.last().copied().unwrap_or(from_rad);
                 self.answer_tip(request, (requested, options), (tip, near_rad))
             }
             Some(_) | None => Err(not_ready(phase)),
@@ -283,12 +289,18 @@ impl<'a> Service<'a> {
         start_rad: JointArray,
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
     ) -> Result<Plan, String> {
-        // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let (revision, goal_rad) = (self.revision(), requested.goal_rad);
         let (robot, scene) = (&*revision.robot, &*revision.scene);
+        // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
-        let planned =
-            self.work(request, options.deadline, |cancel| plan_until(&task, options, Some(cancel)))?;
+        let points_rad = requested.points_rad();
+        let planned = self.work(request, options.deadline, |cancel| {
+            if requested.via_rad.is_empty() {
+                return plan_until(&task, options, Some(cancel));
+            }
+            let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(points_rad).collect();
+            plan_through_until((robot, scene), &all_rad, options, Some(cancel))
+        })?;
         let plan = planned.map_err(|e: PlanError| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)
@@ -462,7 +474,8 @@ fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {
         0 => (default.deadline, false),
         ms => (Duration::from_millis(ms.into()).min(DEADLINE_MAX), true),
     };
-    Ok(PlanOptions { seed: requested.seed, deadline, planner, spends_deadline, ..default })
+    let (seed, blend) = (requested.seed, requested.blend);
+    Ok(PlanOptions { seed, deadline, planner, blend, spends_deadline, ..default })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use taustream_arm::rng::SeededRng;
 use taustream_arm::{Obstacle, Robot, Scene, runtime};
 use taustream_messages::clock::now_ns;
-use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome};
 use taustream_messages::scene::{FixedTo, ObjectPose, ObjectShape, SceneChange};
 use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
 use taustream_messages::service::Wire;
@@ -257,15 +257,7 @@ impl Asker {
 
     fn go(&self, goal_rad: JointArray) -> PlanOutcome {
         let client = self.wire.plan_client().expect("port");
-        let request = CheckedPlanRequest {
-            joints: 6,
-            goal_rad,
-            tip: None,
-            when: When::AtOnce,
-            deadline_ms: 0,
-            seed: 1,
-            planner: String::new(),
-        };
+        let request = CheckedPlanRequest::to_pose(6, goal_rad);
         let pending = client.send_copy(PlanRequest::from(&request)).expect("sent");
         let since = Instant::now();
         loop {

@@ -176,13 +176,11 @@ fn with_service_of(
 
 fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanRequest {
     CheckedPlanRequest {
-        joints: 6,
-        goal_rad,
-        tip: None,
         when,
         deadline_ms: 1_000,
         seed: 3,
         planner: planner.to_owned(),
+        ..CheckedPlanRequest::to_pose(6, goal_rad)
     }
 }
 
@@ -296,6 +294,16 @@ fn service_goals_of_the_tip_are_planned_at_rest_and_in_motion_and_lines_at_rest_
             let PlanOutcome::Planned { how, .. } = outcome else { panic!() };
             assert!(how.contains(words), "{how}");
         }
+        let via = CheckedPlanRequest {
+            via_rad: vec![pose([0.5, -1.2, 1.3, -1.57, -1.57, 0.3])],
+            ..request(When::Queue, "", pose(THERE))
+        };
+        let outcome = ask(arm, &via, || ());
+        assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+        let PlanOutcome::Planned { how, .. } = outcome else { panic!() };
+        assert!(how.contains("through 3 poses, 1 corners rounded"), "{how}");
+        let outside = CheckedPlanRequest { via_rad: vec![pose([9.0; 6])], ..via };
+        assert!(reason_of(&ask(arm, &outside, || ())).contains("way point 1"));
         let far = ask(arm, &at([3.0, 0.0, 0.0], None, None), || ());
         assert!(reason_of(&far).contains("out of reach"), "{far:?}");
         played.show(Phase::Moving);

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-use taustream_messages::plan::{CheckedPlanRequest, When};
+use taustream_messages::plan::CheckedPlanRequest;
 use taustream_messages::service::Wire;
 use taustream_messages::{Command, CommandRequest, FaultReason, PauseReason, Phase, PlanRequest};
 use taustream_motion::MAX_JOINTS;
@@ -158,15 +158,8 @@ fn floods(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     let motion = set_off(bench, goals, 0, 0.1)?;
     let wire = Wire::join(&bench.settings.name, "flood", &taustream_arm::runtime::directory()?)?;
     let (commands, plans) = (wire.command_client()?, wire.plan_client()?);
-    let malformed = PlanRequest::from(&CheckedPlanRequest {
-        joints: bench.settings.robot.joints.len(),
-        goal_rad: [f64::NAN; MAX_JOINTS],
-        tip: None,
-        when: When::AtOnce,
-        deadline_ms: 1,
-        seed: 1,
-        planner: String::new(),
-    });
+    let joints = bench.settings.robot.joints.len();
+    let malformed = PlanRequest::from(&CheckedPlanRequest::to_pose(joints, [f64::NAN; MAX_JOINTS]));
     let before = bench.report()?.0;
     for _ in 0..FLOOD {
         // Nobody waits for the answers; more than the service holds are dropped.

@@ -1,6 +1,7 @@
 //! Arguments of the commands that talk to the running streamer and planner.
 use super::goal::GoalArgs;
 use super::offline::{TrajectoryArg, planner_kind};
+use super::via::ViaArgs;
 use clap::Args;
 use std::path::PathBuf;
 use taustream_drivers::link::LinkChoice;
@@ -77,13 +78,15 @@ Examples:
   taustream replan --to-pose 0.4,-0.3,0.35,3.1416,0,0 --tolerance-rad 0.01,0.01,free
   taustream replan --to-position 0.4,-0.3,0.25 --linear --tip-speed-m-s 0.1 --wait
   taustream replan --to-named home
+  taustream replan --via \"0.4,-1.2,1.2,-1.6,-1.57,0\" --via \"0.8,-1,1,-1.6,-1.57,0\" --goal \"..\" --blend-rad 0.1
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
   taustream replan --goal \"..\" && taustream replan --goal \"..\" --queue && taustream replan --goal \"..\" --queue
 
 At rest the motion starts at the commanded pose. An arm that moves, or is paused, gets a replacement of its motion: the planner
 cuts the motion a little ahead of the arm, or lets it end, leads on to the goal, verifies everything from the cut on, and sends
 it. The arm does not jump, and a pause stays a pause. What was rejected changes nothing. The receipt of the streamer states
-whether, and from when, it runs. Exit code 0 means: accepted (with --wait: executed).";
+whether, and from when, it runs. A motion that goes on from another one, or passes poses, rounds the corners within the blend
+while that is still possible; what planned it says so. Exit code 0 means: accepted (with --wait: executed).";
 
 /// `taustream replan`
 #[derive(Args, Debug)]
@@ -92,13 +95,18 @@ pub(crate) struct ReplanArgs {
     /// Where to go.
     #[command(flatten)]
     pub(crate) goal: GoalArgs,
+    /// What to pass on the way.
+    #[command(flatten)]
+    pub(crate) via: ViaArgs,
     /// Leave the running motion as soon as the new one is planned (the default).
     #[arg(long, conflicts_with_all = ["after_current", "queue"])]
     at_once: bool,
     /// Start when the running motion has ended; what was to follow it is dropped.
     #[arg(long, conflicts_with = "queue")]
     after_current: bool,
-    /// Start when every motion that was accepted has ended: several goals in a row.
+    /// Go on from the end of every motion that was accepted: several goals in a row.
+    ///
+    /// The corner there is rounded within the blend while that is still possible; else the arm stops at it. The answer says which.
     #[arg(long)]
     queue: bool,
     /// Deadline of planning, ms, which is spent on shorter motions. Without it the answer comes after a few searches and

@@ -11,6 +11,7 @@ mod planners;
 mod scene;
 mod stream;
 mod timing;
+mod via;
 
 pub(crate) use goal::Goal;
 pub(crate) use import::ImportArgs;

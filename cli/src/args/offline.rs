@@ -1,5 +1,6 @@
 //! Arguments of the commands that need no running process.
 use super::goal::GoalArgs;
+use super::via::ViaArgs;
 use crate::angles::{Angles, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use taustream_drivers::link::LinkChoice;
 use taustream_optimizers::{METHODS, Method, Reading};
-use taustream_planner::{Blend, Objective, PlannerKind};
+use taustream_planner::{Objective, PlannerKind};
 
 const PLAN_HELP: &str = "\
 Examples:
@@ -46,19 +47,9 @@ pub(crate) struct PlanArgs {
     /// Where to go.
     #[command(flatten)]
     pub(crate) goal: GoalArgs,
-    /// Pose to pass on the way, rad; give it once for each pose, in their order.
-    ///
-    /// The motion keeps within the blend of the straight lines that join the poses.
-    #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, conflicts_with_all = ["to_position", "to_pose"])]
-    pub(crate) via: Vec<Angles>,
-    /// How far from its path the motion may be at corners: length of the difference of all joints, rad; 0 stops at each.
-    ///
-    /// Without it, corners are rounded as far as the scene's margins allow, up to 0.4 rad.
-    #[arg(long, value_name = "RAD", allow_negative_numbers = true, conflicts_with = "linear", value_parser = blend_amount)]
-    blend_rad: Option<f64>,
-    /// The same as a distance by which any point of the arm may be off, m.
-    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with_all = ["blend_rad", "linear"], value_parser = blend_amount)]
-    blend_m: Option<f64>,
+    /// What to pass on the way.
+    #[command(flatten)]
+    pub(crate) via: ViaArgs,
     /// Search poses for --to-position by a swarm (an optimiser by name) instead of inverse kinematics.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg", "to_pose", "linear"], value_parser = method())]
     pub(crate) reach_with: Option<&'static Method>,
@@ -91,12 +82,6 @@ impl PlanArgs {
             (Some(angles), _) => (angles, "--start"),
             (None, None) => (Angles::NONE, "--start"),
         }
-    }
-
-    /// How far from its corners the motion may pass.
-    pub(crate) fn blend(&self) -> Blend {
-        let in_metres = self.blend_m.map(Blend::Metres);
-        self.blend_rad.map(Blend::Radians).or(in_metres).unwrap_or_default()
     }
 }
 
@@ -402,13 +387,6 @@ fn measuring_s(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if s == 0.0 || (0.1..=3_600.0).contains(&s) => Ok(s),
         _ => Err("expected 0, or seconds from 0.1 to 3600".to_owned()),
-    }
-}
-
-fn blend_amount(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(amount) if (0.0..=10.0).contains(&amount) => Ok(amount),
-        _ => Err("expected a number from 0 to 10".to_owned()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The end of the demo: the tip goes to a pose, along a straight line, and to a goal while an obstacle appears in its way.
 use super::file::ChangingScene;
-use super::session::{Session, request};
+use super::session::Session;
 use super::summary::Move;
 use crate::failure::Failure;
 use crate::live::follow::follow;
@@ -35,10 +35,13 @@ impl Session<'_> {
         let straight = TipLine { linear_m_s, angular_rad_s, off_m_max };
         for (position_m, line) in [(change.tip_m, None), (change.line_to_m, Some(straight))] {
             let tip = TipGoal { position_m, tolerance_m: 1e-3, orientation, line };
-            let request = CheckedPlanRequest { tip: Some(tip), ..request([0.0; MAX_JOINTS], joints) };
+            let request = CheckedPlanRequest {
+                tip: Some(tip),
+                ..CheckedPlanRequest::to_pose(joints, [0.0; MAX_JOINTS])
+            };
             self.repeat(|session, number| session.go(&request, number))?;
         }
-        let request = request(change.goal_rad, joints);
+        let request = CheckedPlanRequest::to_pose(joints, change.goal_rad);
         self.repeat(|session, number| session.go_while_it_appears(change, &request, number))
     }
 

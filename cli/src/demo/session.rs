@@ -16,9 +16,9 @@ use crate::words::{fault_sentence, pause_sentence};
 use std::cell::RefCell;
 use std::thread;
 use std::time::Duration;
-use taustream_messages::plan::{CheckedPlanRequest, When};
+use taustream_messages::plan::CheckedPlanRequest;
 use taustream_messages::{Command, PauseReason, Phase, Report};
-use taustream_motion::{JointArray, Setpoint};
+use taustream_motion::Setpoint;
 
 /// Deadline of each plan; the shipped goals need a fraction of it.
 const DEADLINE_MS: u32 = 4000;
@@ -87,7 +87,10 @@ impl<'a> Session<'a> {
         execute(&self.client, self.arm, Command::Speed { percent: 100.0 }, 0.0)?;
         let joints = demo.settings.robot.joints.len();
         for goal_rad in &demo.goals_rad {
-            let request = CheckedPlanRequest { deadline_ms: DEADLINE_MS, ..request(*goal_rad, joints) };
+            let request = CheckedPlanRequest {
+                deadline_ms: DEADLINE_MS,
+                ..CheckedPlanRequest::to_pose(joints, *goal_rad)
+            };
             self.repeat(|session, number| session.go(&request, number))?;
         }
         match &demo.changing_scene {
@@ -268,19 +271,6 @@ impl<'a> Session<'a> {
         let paused = self.seen.borrow().last.as_ref().and_then(pause_sentence);
         let why = paused.map_or_else(String::new, |why| format!("; the arm is {why}"));
         Err(Failure::Failed(format!("the demo takes longer than --limit-s allows{why}")))
-    }
-}
-
-/// A request for a pose of the joints.
-pub(super) fn request(goal_rad: JointArray, joints: usize) -> CheckedPlanRequest {
-    CheckedPlanRequest {
-        joints,
-        goal_rad,
-        tip: None,
-        when: When::AtOnce,
-        deadline_ms: 0,
-        seed: 1,
-        planner: "auto".to_owned(),
     }
 }
 

@@ -8,7 +8,6 @@ use crate::output::Form;
 use std::path::Path;
 use taustream_messages::plan::{CheckedPlanRequest, When};
 use taustream_motion::MAX_JOINTS;
-use taustream_planner::PlannerKind;
 
 /// How long the planner may take, ms.
 const DEADLINE_MS: u32 = 1_000;
@@ -18,13 +17,9 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &CancelArgs) -> Res
     let settings = arm::settings_to_talk(settings)?;
     let client = Client::join(&settings.name)?;
     let request = CheckedPlanRequest {
-        joints: settings.robot.joints.len(),
-        goal_rad: [0.0; MAX_JOINTS],
-        tip: None,
         when: When::Cancel,
         deadline_ms: DEADLINE_MS,
-        seed: 1,
-        planner: PlannerKind::default().name().to_owned(),
+        ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), [0.0; MAX_JOINTS])
     };
     go(form, (&client, &settings), &request, args.wait)
 }

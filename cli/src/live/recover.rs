@@ -8,8 +8,7 @@ use crate::output::Form;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
-use taustream_messages::plan::{CheckedPlanRequest, When};
-use taustream_planner::PlannerKind;
+use taustream_messages::plan::CheckedPlanRequest;
 use taustream_planner::enter::Entry;
 
 /// Nothing had to be done.
@@ -35,13 +34,8 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Re
         return form.print(&Inside { arm: arm.name, accepted: false });
     };
     let request = CheckedPlanRequest {
-        joints: settings.robot.joints.len(),
-        goal_rad: entry.pose_rad,
-        tip: None,
-        when: When::AtOnce,
         deadline_ms: args.deadline_ms,
-        seed: 1,
-        planner: PlannerKind::default().name().to_owned(),
+        ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), entry.pose_rad)
     };
     go(form, (&client, &settings), &request, args.wait)
 }

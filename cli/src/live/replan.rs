@@ -20,7 +20,7 @@ use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::{Outcome, Phase, PlanRequest, Receipt, Report};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::goals::TipSpeed;
-use taustream_planner::{PlanOptions, PlannerKind, TipTarget};
+use taustream_planner::{PlanOptions, TipTarget};
 
 /// What a planner may take beyond its deadline: verification, sending, and the streamer's receipt.
 const ANSWER_S: f64 = 5.0;
@@ -133,16 +133,6 @@ pub(crate) fn from_words(from_s: f64, tick: u64) -> String {
     }
 }
 
-/// What to ask the planner for.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Wanted {
-    pub(crate) when: When,
-    /// 0 for the planner's own.
-    pub(crate) deadline_ms: u32,
-    pub(crate) seed: u64,
-    pub(crate) planner: PlannerKind,
-}
-
 /// Asks, prints the receipt, and waits for the end of the motion if requested.
 pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Result<(), Failure> {
     let settings = arm::settings_to_talk(settings)?;
@@ -161,20 +151,21 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     };
     let (goal_rad, tip) =
         goal_rad(&if args.goal.needs_start() { start_rad(&client)? } else { [0.0; MAX_JOINTS] })?;
-    let wanted = Wanted {
+    if args.goal.linear
+        && let Some(option) = args.via.given()
+    {
+        let why = format!("{option}: a straight line of the tip has no corners and passes no poses");
+        return Err(Failure::Usage(why));
+    }
+    let request = CheckedPlanRequest {
+        tip,
+        via_rad: args.via.poses_of(&settings.robot)?,
+        blend: args.via.blend(),
         when: args.when(),
         deadline_ms: args.deadline_ms.unwrap_or(0),
         seed: args.seed,
-        planner: args.planner,
-    };
-    let request = CheckedPlanRequest {
-        joints: settings.robot.joints.len(),
-        goal_rad,
-        tip,
-        when: wanted.when,
-        deadline_ms: wanted.deadline_ms,
-        seed: wanted.seed,
-        planner: wanted.planner.name().to_owned(),
+        planner: args.planner.name().to_owned(),
+        ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), goal_rad)
     };
     go(form, (&client, &settings), &request, args.wait).map_err(|failure| {
         let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(&settings.robot));

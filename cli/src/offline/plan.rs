@@ -103,11 +103,16 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         planner: args.planner,
         reading: args.reading,
         objective: args.objective,
-        blend: args.blend(),
+        blend: args.via.blend(),
         ..default
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
     let found = match args.goal.of(&robot, &start_rad)? {
+        Goal::Tip(_) if args.via.given().is_some_and(|option| args.goal.linear || option == "--via") => {
+            let option = args.via.given().unwrap_or_default();
+            let why = "a straight line of the tip has no corners, and way points need a goal of the joints";
+            return Err(Failure::Usage(format!("{option}: {why}")));
+        }
         Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args)
             .map_err(|error| Failure::Refused(format!("no plan: {error}")))
             .map(Ok)?,
@@ -160,12 +165,12 @@ fn to_poses(
     (args, options): (&PlanArgs, &PlanOptions),
 ) -> Result<Result<Planned, GoalError>, Failure> {
     let Situation { robot, scene, start_rad, .. } = *situation;
-    let plan = if args.via.is_empty() {
+    let via_rad = args.via.poses_of(robot)?;
+    let plan = if via_rad.is_empty() {
         plan_to_any(situation, goals_rad, options, None).map(|(plan, _)| plan)
     } else if let [goal_rad] = goals_rad {
-        let via = args.via.iter().map(|via| via.pose_of(robot, "--via")).collect::<Result<Vec<_>, _>>()?;
         let all_rad: Vec<JointArray> =
-            std::iter::once(start_rad).chain(via).chain(std::iter::once(*goal_rad)).collect();
+            std::iter::once(start_rad).chain(via_rad).chain(std::iter::once(*goal_rad)).collect();
         plan_through(robot, scene, &all_rad, options).map_err(GoalError::Plan)
     } else {
         return Err(Failure::Usage("--via needs one goal; several were given".to_owned()));

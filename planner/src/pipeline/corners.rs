@@ -2,9 +2,10 @@
 use super::Pipeline;
 use crate::lanes::Lanes;
 use crate::objective::Objective;
-use crate::plan::Blend;
 use crate::timing::{Timed, distance};
 use crate::tree::Space;
+use crate::world::World;
+use taustream_messages::way_points::Blend;
 use taustream_motion::{JointArray, Trajectory};
 
 /// How far from its corners a motion may pass, widest first (rad, length of the difference of all joints).
@@ -81,7 +82,7 @@ impl Pipeline<'_> {
 
     /// True when a rounded motion is proven.
     fn round_whole(&mut self, whole: &[JointArray], source: &str, lanes: &Lanes) -> bool {
-        let widths_rad = self.blends_rad();
+        let widths_rad = blends_rad(self.options.blend, self.space.world);
         let corners = whole.len().saturating_sub(2);
         if widths_rad.is_empty() || corners == 0 {
             return false;
@@ -144,22 +145,22 @@ impl Pipeline<'_> {
         let by_time = self.best.as_ref().filter(|_| self.evaluator.objective == Objective::Time);
         by_time.map_or(f64::INFINITY, |best| best.proof.duration_s)
     }
+}
 
-    /// How far from its corners a motion may pass, widest first (rad); empty when it has to stop at them.
-    fn blends_rad(&self) -> Vec<f64> {
-        let most_rad = match self.options.blend {
-            Blend::Clearance => BLENDS_RAD[0],
-            Blend::Radians(most_rad) => most_rad,
-            Blend::Metres(most_m) => {
-                // No point goes farther than each joint's change times its longest lever, all added up.
-                let levers_m = self.space.world.reach_m().iter().map(|lever| lever * lever).sum::<f64>();
-                most_m / levers_m.sqrt()
-            }
-        };
-        let is_usable = most_rad.is_finite() && most_rad > 0.0;
-        let shares = BLENDS_RAD.iter().map(|blend_rad| blend_rad / BLENDS_RAD[0]);
-        if is_usable { shares.map(|share| share * most_rad).collect() } else { Vec::new() }
-    }
+/// How far from its corners a motion may pass, widest first (rad); empty when it has to stop at them.
+pub(crate) fn blends_rad(blend: Blend, world: &World) -> Vec<f64> {
+    let most_rad = match blend {
+        Blend::Clearance => BLENDS_RAD[0],
+        Blend::Radians(most_rad) => most_rad,
+        Blend::Metres(most_m) => {
+            // No point goes farther than each joint's change times its longest lever, all added up.
+            let levers_m = world.reach_m().iter().map(|lever| lever * lever).sum::<f64>();
+            most_m / levers_m.sqrt()
+        }
+    };
+    let is_usable = most_rad.is_finite() && most_rad > 0.0;
+    let shares = BLENDS_RAD.iter().map(|blend_rad| blend_rad / BLENDS_RAD[0]);
+    if is_usable { shares.map(|share| share * most_rad).collect() } else { Vec::new() }
 }
 
 /// Poses of a corner that is rounded by a blend, about as a motion does: on a parabola through both of its segments.

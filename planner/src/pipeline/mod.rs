@@ -7,6 +7,8 @@ mod corners;
 mod quick;
 mod through;
 
+pub(crate) use corners::blends_rad;
+
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
 use crate::kind::{Improvement, PlannerKind};

@@ -243,7 +243,7 @@ impl<'a> Attempt<'a> {
 }
 
 /// Moves the last rounding errors into one stroke, so that the sum in the order of the strokes ends at the goal.
-fn end_at(base_rad: &JointArray, strokes: &mut [Stroke], into: usize, goal_rad: &JointArray) {
+pub(crate) fn end_at(base_rad: &JointArray, strokes: &mut [Stroke], into: usize, goal_rad: &JointArray) {
     for _ in 0..2 {
         let mut off_rad = *goal_rad;
         let mut end_rad = *base_rad;

@@ -64,6 +64,8 @@ enum Way {
     Direct,
     /// To rest, and on to the goal; from the end of the motion where that is shorter.
     RestFirst,
+    /// On to the goal past the end of the motion, its corner rounded; from rest there where that is not possible.
+    PastEnd,
     /// On to the goal from where the motion ends.
     End,
 }
@@ -95,7 +97,8 @@ impl Service<'_> {
             When::AtOnce if is_free_choice(options.planner) => &[Way::Direct, Way::RestFirst, Way::End],
             // Whoever names a searcher wants its path.
             When::AtOnce => &[Way::RestFirst, Way::End],
-            When::AfterCurrent | When::Queue => &[Way::End],
+            When::AfterCurrent => &[Way::End],
+            When::Queue => &[Way::PastEnd, Way::End],
             When::Cancel => &[Way::Taper],
         };
         let mut why = String::new();
@@ -140,7 +143,9 @@ impl Service<'_> {
         let begun = Instant::now();
         let search_s =
             if way == Way::RestFirst { SEARCH_S_MAX.min(options.deadline.as_secs_f64()) } else { 0.0 };
-        let latency_s = (self.latency.quantile_s() + REQUEST_MARGIN_S + search_s) * f64::from(1 << number);
+        // Rounding a corner takes longer, and is to make no other cut later.
+        let latency = if way == Way::PastEnd { &self.corner_latency } else { &self.latency };
+        let latency_s = (latency.quantile_s() + REQUEST_MARGIN_S + search_s) * f64::from(1 << number);
         let cut = self.cut(report, (requested.when, way), latency_s);
         let end = self.cut(report, (requested.when, Way::End), latency_s);
         if way != Way::End && cut.at_s > cut.end_s - NEAR_END_S {
@@ -151,16 +156,17 @@ impl Service<'_> {
         }
         let limited = match way {
             Way::RestFirst => PlanOptions { deadline: Duration::from_secs_f64(search_s), ..*options },
-            Way::Taper | Way::Direct | Way::End => *options,
+            Way::Taper | Way::Direct | Way::PastEnd | Way::End => *options,
         };
-        let (revision, goal_rad) = (self.revision(), requested.goal_rad);
+        let (revision, points_rad) = (self.revision(), requested.points_rad());
         let made = self.work(request, limited.deadline, |cancel| {
             let surroundings = Surroundings { robot: &revision.robot, scene: &revision.scene, cancel };
             match way {
                 Way::Taper => surroundings.taper(&cut, &limited),
-                Way::Direct => surroundings.direct_or_after_end([&cut, &end], &goal_rad, &limited),
-                Way::RestFirst => surroundings.rest_first_or_after_end([&cut, &end], &goal_rad, &limited),
-                Way::End => surroundings.after_end((&end, &goal_rad), &limited),
+                Way::Direct => surroundings.direct_or_after_end([&cut, &end], &points_rad, &limited),
+                Way::RestFirst => surroundings.rest_first_or_after_end([&cut, &end], &points_rad, &limited),
+                Way::PastEnd => surroundings.past_end([&cut, &end], &points_rad, &limited),
+                Way::End => surroundings.after_end((&end, &points_rad), &limited),
             }
         })?;
         let made = match made {
@@ -183,7 +189,8 @@ impl Service<'_> {
             .send_after(self.robot, report, (&made.trajectory, made.replaces), super::RECEIPT_WITHIN)
             .map_err(|e| e.to_string())?;
         // What came too late counts as well: the next one is aimed further ahead.
-        self.latency.note((begun.elapsed().as_secs_f64() - search_s).max(0.0));
+        let latency = if way == Way::PastEnd { &mut self.corner_latency } else { &mut self.latency };
+        latency.note((begun.elapsed().as_secs_f64() - search_s).max(0.0));
         if let Some(Outcome::Rejected(rejection)) = sent.receipt.and_then(|receipt| receipt.outcome())
             && is_too_late(&rejection, made.replaces != end.replaces() && cut.from_s < cut.at_s)
         {
@@ -205,8 +212,8 @@ impl Service<'_> {
         // `AfterCurrent` replaces what waits, and `Queue` comes after it.
         let running_known = self.outbox.known(report.trajectory_id);
         let end_of_running = when == When::AfterCurrent && (!waits || running_known.is_some());
-        let takes_waiting =
-            waits && !end_of_running && (way == Way::End || ahead_s >= report.successor_from_s);
+        let at_its_end = matches!(way, Way::PastEnd | Way::End);
+        let takes_waiting = waits && !end_of_running && (at_its_end || ahead_s >= report.successor_from_s);
         let (trajectory_id, trajectory) = if takes_waiting {
             (report.successor_id, self.outbox.known(report.successor_id))
         } else {
@@ -214,7 +221,12 @@ impl Service<'_> {
         };
         let known_end = trajectory.as_ref().map(|known| (known.duration_s(), known.end_rad()));
         let (end_s, end_rad) = known_end.unwrap_or((report.end_s, report.end_rad));
-        let at_s = if way == Way::End { end_s } else { ahead_s.min(end_s) };
+        let at_s = match way {
+            Way::End => end_s,
+            // What waits cannot be cut before it begins.
+            Way::PastEnd if takes_waiting => ahead_s.max(report.successor_from_s).min(end_s),
+            Way::PastEnd | Way::Taper | Way::Direct | Way::RestFirst => ahead_s.min(end_s),
+        };
         let from_s = if takes_waiting { report.successor_from_s } else { at_s };
         CutPoint { trajectory_id, trajectory, at_s, from_s, end_s, end_rad }
     }

@@ -185,9 +185,9 @@ impl Service<'_> {
             let options = PlanOptions { deadline, ..PlanOptions::default() };
             let goal_rad = cut.end_rad;
             let made = if search_s > 0.0 {
-                surroundings.rest_first((&cut, &goal_rad), &options)
+                surroundings.rest_first((&cut, &[goal_rad]), &options)
             } else {
-                surroundings.direct((&cut, &goal_rad), &options)
+                surroundings.direct((&cut, &[goal_rad]), &options)
             };
             if let Some(sent) = self.send_reroute(&report, (&cut, made)) {
                 return Some(sent);

@@ -245,6 +245,13 @@ impl Part {
         }
     }
 
+    /// By how much the motion exceeds its bounds at most, in inverse weights; negative when it keeps them.
+    pub(super) fn beyond(&self, bounds: &Bounds) -> f64 {
+        let limits = bounds.low.iter().zip(&bounds.high);
+        let most = self.is.iter().zip(limits).map(|(is, (low, high))| (is - high).max(low - is));
+        most.fold(f64::NEG_INFINITY, f64::max) * bounds.weight
+    }
+
     /// Targets within bounds.
     pub(super) fn clamp(&mut self, bounds: &Bounds) {
         let bounds = bounds.low.iter().zip(&bounds.high);

@@ -8,6 +8,7 @@
 pub mod fit;
 mod law;
 pub mod line;
+pub mod onward;
 mod rough;
 mod scale;
 #[cfg(test)]

@@ -52,10 +52,10 @@ pub(super) fn through(path: &Path, deviations_rad: &[f64], most_s: f64) -> Optio
 }
 
 /// What is allowed around a path.
-struct Tube<'a> {
-    corners_rad: &'a [JointArray],
+pub(super) struct Tube<'a> {
+    pub(super) corners_rad: &'a [JointArray],
     /// At each corner, the ends included; in between it changes evenly.
-    radii_rad: Vec<f64>,
+    pub(super) radii_rad: Vec<f64>,
 }
 
 impl<'a> Tube<'a> {
@@ -73,14 +73,21 @@ impl<'a> Tube<'a> {
             along += (to - from) * (pose - from);
             square += (to - from) * (to - from);
         }
-        let share = (along / square).clamp(0.0, 1.0);
+        let share = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
         let point = std::array::from_fn(|j| from[j] + share * (to[j] - from[j]));
         let radius_rad = (1.0 - share) * self.radii_rad[segment] + share * self.radii_rad[segment + 1];
         (point, radius_rad)
     }
 
+    /// The segment that is nearest to a pose.
+    pub(super) fn nearest_segment(&self, pose_rad: &JointArray) -> usize {
+        let off_rad = |segment: &usize| distance(&self.nearest(*segment, pose_rad).0, pose_rad);
+        let segments = 0..self.corners_rad.len().saturating_sub(1);
+        segments.min_by(|a, b| off_rad(a).total_cmp(&off_rad(b))).unwrap_or(0)
+    }
+
     /// The pose in the tube, narrower by a factor, that is nearest to a pose, near a segment.
-    fn project(&self, segment: usize, pose_rad: &JointArray, factor: f64) -> JointArray {
+    pub(super) fn project(&self, segment: usize, pose_rad: &JointArray, factor: f64) -> JointArray {
         let near = segment.saturating_sub(1)..(segment + 2).min(self.corners_rad.len() - 1);
         let each = near.map(|k| {
             let (point, radius_rad) = self.nearest(k, pose_rad);
@@ -97,7 +104,7 @@ impl<'a> Tube<'a> {
     }
 
     /// How far a pose is from the path near a segment, and which share of the tube's radius that is.
-    fn off(&self, segment: usize, pose_rad: &JointArray) -> [f64; 2] {
+    pub(super) fn off(&self, segment: usize, pose_rad: &JointArray) -> [f64; 2] {
         let near = segment.saturating_sub(1)..(segment + 2).min(self.corners_rad.len() - 1);
         near.fold([f64::INFINITY; 2], |least, k| {
             let (point, radius_rad) = self.nearest(k, pose_rad);
