@@ -104,6 +104,16 @@ pub struct World<'a> {
     extent_m: f64,
 }
 
+/// Which link bodies some pairs are about.
+#[derive(Clone, Debug, Default)]
+pub struct Concerned(Vec<bool>);
+
+impl Concerned {
+    fn bodies(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().enumerate().filter(|(_, is_concerned)| **is_concerned).map(|(body, _)| body)
+    }
+}
+
 /// The bodies of the links in one pose of the arm.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
@@ -299,11 +309,45 @@ impl<'a> World<'a> {
         distance_m > pair.required_m + extra_m
     }
 
-    /// Places the links' bodies.
-    pub fn place(&self, position_rad: &JointArray, snapshot: &mut Snapshot) {
+    /// Every link body.
+    #[must_use]
+    pub fn every_body(&self) -> Concerned {
+        Concerned(vec![true; self.links.len()])
+    }
+
+    /// The link bodies that pairs are about.
+    pub fn concerned<'p>(&self, pairs: impl Iterator<Item = &'p Pair>, concerned: &mut Concerned) {
+        concerned.0.clear();
+        concerned.0.resize(self.links.len(), false);
+        for pair in pairs {
+            concerned.0[pair.link] = true;
+            if let Other::Link(other) = pair.other {
+                concerned.0[other] = true;
+            }
+        }
+    }
+
+    /// Places these bodies only: what others have in the snapshot belongs to another pose, and must not be asked for.
+    pub fn place_concerned(&self, position_rad: &JointArray, concerned: &Concerned, snapshot: &mut Snapshot) {
+        if snapshot.at.len() != self.links.len() {
+            return self.place(position_rad, snapshot);
+        }
+        self.place_frames(position_rad, snapshot);
+        for body in concerned.bodies() {
+            let link = &self.links[body];
+            snapshot.at[body] = link.body.placed(&snapshot.frames[link.frame]);
+        }
+    }
+
+    fn place_frames(&self, position_rad: &JointArray, snapshot: &mut Snapshot) {
         let frames = self.robot.chain.frames(position_rad);
         snapshot.frames.clear();
         snapshot.frames.extend(frames.iter().take(self.joints() + 1).map(to_parry));
+    }
+
+    /// Places the links' bodies.
+    pub fn place(&self, position_rad: &JointArray, snapshot: &mut Snapshot) {
+        self.place_frames(position_rad, snapshot);
         snapshot.at.clear();
         snapshot.at.extend(self.links.iter().map(|l| l.body.placed(&snapshot.frames[l.frame])));
     }
@@ -412,24 +456,33 @@ impl<'a> World<'a> {
     /// Turn the joints one after the other, base first: joint j then turns everything beyond it rigidly, in the
     /// snapshot's shape, about an axis that the joints before it have only carried along. So a point moves by at
     /// most the sum over j of turn j times its distance to axis j *in the snapshot*: no larger lever can occur on the way. In a
-    /// pair of links, the joints before the lower link move both and drop out.
+    /// pair of links, the joints before the lower link move both and drop out. Bodies that are not concerned have no bound.
     pub fn moves_m(
         &self,
-        snapshot: &Snapshot,
+        (snapshot, concerned): (&Snapshot, &Concerned),
         turn_rad: &JointArray,
         moves_m: &mut Vec<[f64; MAX_JOINTS + 1]>,
     ) {
+        let axis = |(axis, frame): (&Axis, &Pose)| Axis {
+            point: frame.transform_point(axis.point),
+            direction: frame.rotation * axis.direction,
+        };
+        let mut axes = [Axis { point: Vector::ZERO, direction: Vector::ZERO }; MAX_JOINTS];
+        for (placed, of_joint) in axes.iter_mut().zip(self.axes.iter().zip(&snapshot.frames)) {
+            *placed = axis(of_joint);
+        }
         moves_m.clear();
-        for (body, at) in self.links.iter().zip(&snapshot.at) {
+        moves_m.resize(self.links.len(), [f64::INFINITY; MAX_JOINTS + 1]);
+        for index in concerned.bodies() {
+            let (link, at) = (&self.links[index], &snapshot.at[index]);
             let mut sums = [0.0; MAX_JOINTS + 1];
-            for joint in (0..body.frame).rev() {
-                let (axis, frame) = (&self.axes[joint], &snapshot.frames[joint]);
-                let (point, direction) = (frame.transform_point(axis.point), frame.rotation * axis.direction);
+            for joint in (0..link.frame).rev() {
+                let Axis { point, direction } = axes[joint];
                 let lever_m =
-                    if turn_rad[joint] > 0.0 { body.body.lever_m(at, point, direction) } else { 0.0 };
+                    if turn_rad[joint] > 0.0 { link.body.lever_m(at, point, direction) } else { 0.0 };
                 sums[joint] = sums[joint + 1] + turn_rad[joint] * lever_m;
             }
-            moves_m.push(sums);
+            moves_m[index] = sums;
         }
     }
 
@@ -482,6 +535,7 @@ mod tests {
         let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
         let world = World::new(&robot, &scene).expect("builds");
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
+        let all = world.every_body();
         let mut broken_when_shrunk = 0;
         for seed in 0..5_000 {
             let mut rng = SeededRng::new(seed, 0);
@@ -494,7 +548,7 @@ mod tests {
                 there[j] = q[j] + turn[j] * if rng.unit() < 0.5 { 1.0 } else { rng.within(-1.0, 1.0) };
             }
             world.place(&q, &mut snapshot);
-            world.moves_m(&snapshot, &turn, &mut moves_m);
+            world.moves_m((&snapshot, &all), &turn, &mut moves_m);
             let moving = |(body, _): &(usize, &[f64; MAX_JOINTS + 1])| world.links[*body].frame > 0;
             for (body, bounds_m) in moves_m.iter().enumerate().filter(moving) {
                 for (before, after) in ends_m(&world, &q, body).iter().zip(ends_m(&world, &there, body)) {
@@ -526,6 +580,7 @@ mod tests {
         let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
         let world = World::new(&robot, &scene).expect("builds");
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
+        let all = world.every_body();
         for seed in 0..2_000 {
             let mut rng = SeededRng::new(seed, 1);
             let q = std::array::from_fn(|j| if j < 6 { rng.within(-3.1, 3.1) } else { 0.0 });
@@ -533,7 +588,7 @@ mod tests {
             for joint in 0..6 {
                 let mut turn = [0.0; MAX_JOINTS];
                 turn[joint] = 1.0;
-                world.moves_m(&snapshot, &turn, &mut moves_m);
+                world.moves_m((&snapshot, &all), &turn, &mut moves_m);
                 let lever_m = moves_m.iter().map(|m| m[0]).fold(0.0, f64::max);
                 assert!(lever_m <= world.reach_m()[joint], "seed {seed}, joint {joint}: {lever_m}");
             }

@@ -155,7 +155,7 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
             there[j] = q[j] + turn[j] * if rng.unit() < 0.5 { 1.0 } else { rng.within(-1.0, 1.0) };
         }
         world.place(&q, &mut snapshot);
-        world.moves_m(&snapshot, &turn, &mut moves_m);
+        world.moves_m((&snapshot, &world.every_body()), &turn, &mut moves_m);
         let (before, after) = (robot.chain.frames(&q), robot.chain.frames(&there));
         assert_pairs_move_no_further(&world, &moves_m, (&before, &after), &mut rng);
         for (body, shape) in robot.shapes.iter().enumerate() {

@@ -4,7 +4,7 @@
 //! the interval's ends ([`World::moves_m`]). A pair whose distance is larger is settled for the whole interval; the
 //! others are handed to the two halves. Nothing that happens between samples can be missed.
 use crate::budget::Budget;
-use crate::world::{Pair, Snapshot, World};
+use crate::world::{Concerned, Pair, Snapshot, World};
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 
 /// A motion over a parameter.
@@ -134,6 +134,7 @@ pub fn sweep(
         rules,
         budget,
         snapshot: Snapshot::default(),
+        concerned: Concerned::default(),
         moves_m: Vec::new(),
         active: (0..world.pairs().len()).collect(),
         found: Clearance {
@@ -158,6 +159,7 @@ struct State<'a> {
     rules: &'a SweepRules,
     budget: &'a Budget<'a>,
     snapshot: Snapshot,
+    concerned: Concerned,
     moves_m: Vec<[f64; MAX_JOINTS + 1]>,
     /// A stack of the pairs that are not settled, one range an open interval.
     active: Vec<usize>,
@@ -191,8 +193,10 @@ impl State<'_> {
     fn settle(&mut self, [from, middle, to]: [f64; 3], open: std::ops::Range<usize>) -> Settled {
         let (before, after) = (self.motion.travel_rad(from, middle), self.motion.travel_rad(middle, to));
         let turn_rad: JointArray = std::array::from_fn(|j| before[j].max(after[j]));
-        self.world.place(&self.motion.at(middle), &mut self.snapshot);
-        self.world.moves_m(&self.snapshot, &turn_rad, &mut self.moves_m);
+        let pairs = self.active[open.clone()].iter().map(|index| &self.world.pairs()[*index]);
+        self.world.concerned(pairs, &mut self.concerned);
+        self.world.place_concerned(&self.motion.at(middle), &self.concerned, &mut self.snapshot);
+        self.world.moves_m((&self.snapshot, &self.concerned), &turn_rad, &mut self.moves_m);
         let mut settled = Settled { start: self.active.len(), moves_m: 0.0 };
         for slot in open {
             let index = self.active[slot];
