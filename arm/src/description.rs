@@ -19,6 +19,8 @@ use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
 pub(crate) struct Joint {
     pub(crate) name: String,
     pub(crate) limits: JointLimits,
+    /// Nm.
+    pub(crate) torque_nm_max: Option<f64>,
 }
 
 /// Where links and joints are.
@@ -60,6 +62,7 @@ const POSITION_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
 const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
 const ACCELERATION_RAD_S2: Bounds = Bounds::above(0.0, 1e4, "rad/s^2");
 const JERK_RAD_S3: Bounds = Bounds::above(0.0, 1e7, "rad/s^3");
+const TORQUE_NM: Bounds = Bounds::above(0.0, 1e6, "Nm");
 
 /// Stop limits where the file gives none, as multiples of the motion limits.
 const STOP_ACCELERATION_RATIO: f64 = 2.0;
@@ -162,8 +165,10 @@ fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
         let name = table.name("name");
         let row = rows::read(&mut table);
         let limits = read_limits(&mut table, &Known::Nothing, notices);
+        let torque = read_torque(&mut table, &Known::Nothing, notices);
         table.done();
-        read.push(name.zip(limits).zip(row).map(|((name, limits), row)| (Joint { name, limits }, row)));
+        let joint = |((name, limits), torque_nm_max)| Joint { name, limits, torque_nm_max };
+        read.push(name.zip(limits).zip(torque).map(joint).zip(row));
     }
     check_names(
         top.fault_list(),
@@ -183,7 +188,8 @@ fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
 fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) -> Read {
     let arm = UrdfArm::read(top, listed);
     let joint_info = arm.as_ref().map(UrdfArm::joints);
-    let mut limits: Vec<Option<JointLimits>> = vec![None; joint_info.as_ref().map_or(0, Vec::len)];
+    let mut limits: Vec<Option<(JointLimits, Option<f64>)>> =
+        vec![None; joint_info.as_ref().map_or(0, Vec::len)];
     let mut names: Vec<Option<String>> = Vec::new();
     for mut table in top.tables("joint") {
         let name = table.text("name", "the name of a joint of the URDF");
@@ -204,6 +210,7 @@ fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) 
             None => Known::Something,
         };
         let read = read_limits(&mut table, &known, notices);
+        let read = read.zip(read_torque(&mut table, &known, notices));
         table.done();
         if let Some(slot) = at.and_then(|at| limits.get_mut(at)) {
             *slot = read;
@@ -223,7 +230,10 @@ fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) 
     let joints: Option<Vec<Joint>> = joint_info
         .into_iter()
         .zip(limits)
-        .map(|(joint_info, limits)| Some(Joint { name: joint_info.name, limits: limits? }))
+        .map(|(joint_info, limits)| {
+            let (limits, torque_nm_max) = limits?;
+            Some(Joint { name: joint_info.name, limits, torque_nm_max })
+        })
         .collect();
     Read { links, whole: joints.map(|joints| (joints, Geometry::Urdf(Box::new(arm)))) }
 }
@@ -251,6 +261,22 @@ fn read_limits(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<Strin
         limit_notices::of_stop(joint_info, stop, notices);
     }
     Some(JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? })
+}
+
+/// The greatest torque, from the table or else from the URDF; the outer `None` is a fault.
+fn read_torque(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<Option<f64>> {
+    const KEY: &str = "torque_nm_max";
+    let stated = if let Known::Urdf(joint_info) = known { joint_info.limits.effort } else { None };
+    if !table.has(KEY) {
+        table.take(KEY);
+        return Some(stated);
+    }
+    let given = table.number(KEY, &TORQUE_NM)?;
+    if let (Known::Urdf(joint_info), Some(stated)) = (known, stated.filter(|stated| given > *stated)) {
+        let name = shown(&joint_info.name);
+        notices.push(format!("joint {name}: {KEY} = {given} is above the URDF's effort of {stated} Nm"));
+    }
+    Some(Some(given))
 }
 
 /// A URDF's range is where the mechanics end, so a file may narrow it and never widen it.

@@ -28,6 +28,7 @@ pub mod link_margin;
 pub mod log;
 pub mod lookup;
 pub mod mass;
+mod mass_doubt;
 mod mesh;
 mod modelled;
 pub mod motion_table;

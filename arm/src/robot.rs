@@ -22,6 +22,9 @@ pub struct RobotJoint {
     pub name: String,
     /// What it may do.
     pub limits: JointLimits,
+    /// The greatest torque of its drive at the joint, Nm: `torque_nm_max`, or else the URDF's `effort`; `None` when neither
+    /// is stated.
+    pub torque_nm_max: Option<f64>,
 }
 
 /// One collision shape, rigid with a frame of the chain.
@@ -155,7 +158,13 @@ impl Robot {
         Some(Self {
             name: description.name.clone(),
             file: fault_list.file().to_owned(),
-            joints: joints.map(|j| RobotJoint { name: j.name.clone(), limits: j.limits }).collect(),
+            joints: joints
+                .map(|j| RobotJoint {
+                    name: j.name.clone(),
+                    limits: j.limits,
+                    torque_nm_max: j.torque_nm_max,
+                })
+                .collect(),
             links: parts.links,
             shapes: parts.shapes,
             masses: parts.masses.into_iter().chain(payload).collect(),

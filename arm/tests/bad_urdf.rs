@@ -147,6 +147,7 @@ const CASES: &[Case] = &[
         "",
         &["joint[0].motion.acceleration_rad_s2 = missing, and the URDF states no limit.acceleration"],
     ),
+    ("two.urdf", "effort=\"9\"", "effort=\"much\"", &["joint one.limit.effort = \"much\""]),
     ("two.urdf", "effort=\"9\"", "jerk=\"-1\"", &["joint one.limit.jerk = -1.0"]),
     ("two.urdf", "effort=\"9\"", "deceleration=\"fast\"", &["joint one.limit.deceleration = \"fast\""]),
     (

@@ -37,6 +37,23 @@ fn nasty_urdf_gives_the_joints_between_base_and_tip_in_its_own_order() {
     assert_eq!(robot.joints[0].limits.stop.acceleration_rad_s2.to_bits(), 25.0_f64.to_bits());
 }
 
+/// Goal: the URDF's effort is the joint's torque, 0 is none, and the robot file may state another; what a link weighs nothing
+/// beside others that do is said.
+#[test]
+fn efforts_are_torques_and_links_without_mass_beside_others_are_named() {
+    let nasty = load("nasty.toml");
+    let torques: Vec<Option<f64>> = nasty.joints.iter().map(|joint| joint.torque_nm_max).collect();
+    assert_eq!(torques, [Some(50.0), None, Some(10.0), Some(10.0)]);
+    let mut balls = load("ur5_balls.toml");
+    assert!(balls.joints.iter().all(|joint| joint.torque_nm_max == Some(150.0)));
+    assert_eq!(balls.mass_doubt(), None);
+    balls.masses.retain(|mass| mass.frame == balls.joints.len());
+    let doubt = balls.mass_doubt().unwrap();
+    assert!(doubt.contains("INCOMPLETE") && doubt.contains("upper_arm_link"), "{doubt}");
+    balls.masses.clear();
+    assert_eq!(balls.mass_doubt(), None, "nothing is computed from no masses");
+}
+
 /// The chain written out by hand, one origin after the other.
 #[test]
 fn nasty_tip_stands_where_its_origins_and_axes_say() {

@@ -32,6 +32,7 @@ pub mod stop_ahead;
 pub mod stream;
 pub mod stream_cut;
 pub mod timing;
+pub mod torque;
 pub mod tree;
 pub mod verify;
 pub mod world;

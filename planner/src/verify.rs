@@ -4,6 +4,7 @@
 //! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
 use crate::budget::Budget;
 use crate::collide::{Blocked, SweepRules, sweep};
+use crate::torque::{Overload, TorqueLimits};
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::Trajectory;
@@ -119,6 +120,9 @@ pub enum Violation {
         /// What touches what, and by how much.
         contact: Contact,
     },
+    /// A drive cannot bear it.
+    #[error(transparent)]
+    Torque(#[from] Overload),
     /// The proof ran out of work; nothing is known to be wrong.
     #[error("not proven: {checks} checks did not settle t = {at_s:.3} s; keep more distance there")]
     Unresolved {
@@ -129,13 +133,18 @@ pub enum Violation {
     },
 }
 
-/// Proves that a trajectory keeps the motion limits, the position ranges and the distance to everything.
+/// Proves that a trajectory keeps the motion limits, the position ranges and the distance to everything, and, where masses and
+/// torques are known, that the drives can bear it.
 ///
 /// # Errors
 /// The first violation, with joint or pair, time and amount.
 pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<Proof, Violation> {
     let world = World::new(robot, scene).map_err(|name| Violation::Shape { name })?;
-    verify_in(&world, trajectory, &Budget::unbounded())
+    let proof = verify_in(&world, trajectory, &Budget::unbounded())?;
+    if let Ok(limits) = TorqueLimits::of(robot) {
+        limits.prove(trajectory)?;
+    }
+    Ok(proof)
 }
 
 /// Like [`verify`], in a world that exists already and with a clock that may cut the proof short.

@@ -110,6 +110,8 @@ pub(crate) struct StatedLimits {
     pub(crate) acceleration: Option<f64>,
     /// rad/s^3 or m/s^3 (URDF 1.2).
     pub(crate) jerk: Option<f64>,
+    /// Nm or N, above 0: the greatest torque or force.
+    pub(crate) effort: Option<f64>,
 }
 
 /// Another joint decides where this one is.
@@ -139,6 +141,8 @@ const AXIS: Bounds = Bounds::within(-1e6, 1e6, "");
 const POSITION: Bounds = Bounds::within(-1e9, 1e9, "rad or m");
 const VELOCITY: Bounds = Bounds::within(0.0, 1e9, "rad/s or m/s");
 const ACCELERATION: Bounds = Bounds::within(0.0, 1e9, "rad/s^2 or m/s^2");
+/// Nm or N; less than nothing is taken for nothing.
+const EFFORT: Bounds = Bounds::within(-1e9, 1e9, "Nm or N");
 const JERK: Bounds = Bounds::within(0.0, 1e12, "rad/s^3 or m/s^3");
 
 impl Model {
@@ -383,9 +387,12 @@ fn read_limits(element: &Element<'_, '_, '_>) -> Option<StatedLimits> {
     let acceleration = read("acceleration", &ACCELERATION);
     let deceleration = read("deceleration", &ACCELERATION);
     let jerk = read("jerk", &JERK);
+    let effort = read("effort", &EFFORT);
     let slower = match (acceleration?, deceleration?) {
         (Some(up), Some(down)) => Some(up.min(down)),
         (up, down) => up.or(down),
     };
-    Some(StatedLimits { velocity: velocity?, acceleration: slower, jerk: jerk? })
+    // Generators write 0, and some -1, when they know none.
+    let effort = effort?.filter(|effort| *effort > 0.0);
+    Some(StatedLimits { velocity: velocity?, acceleration: slower, jerk: jerk?, effort })
 }

@@ -4,6 +4,7 @@ use std::fmt;
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, Shape};
 use taustream_motion::stopping::StopRules;
+use taustream_planner::torque::TorqueLimits;
 
 /// One joint's limits.
 #[derive(Debug, Serialize)]
@@ -15,6 +16,8 @@ struct JointLine {
     jerk_rad_s3: f64,
     stop_acceleration_rad_s2: f64,
     stop_jerk_rad_s3: f64,
+    /// Of the file, or the effort of the URDF; null when neither states one.
+    torque_nm_max: Option<f64>,
 }
 
 /// A pair of links with a margin of its own.
@@ -103,6 +106,10 @@ pub(super) struct CheckedRobot {
     notices: Vec<String>,
     /// Of the links that state a mass, and of the payload; null when none does.
     mass_kg: Option<f64>,
+    /// Why energies and torques by these masses are too low; null where they may be right.
+    mass_doubt: Option<String>,
+    /// Why the torques of motions are not checked; null where they are.
+    torque_unchecked: Option<String>,
     may_touch_by_rule: Vec<[String; 2]>,
     may_touch_by_file: Vec<[String; 2]>,
     may_touch_by_srdf: Vec<[String; 2]>,
@@ -134,6 +141,7 @@ impl CheckedRobot {
                 jerk_rad_s3: motion.jerk_rad_s3,
                 stop_acceleration_rad_s2: stop.acceleration_rad_s2,
                 stop_jerk_rad_s3: stop.jerk_rad_s3,
+                torque_nm_max: joint.torque_nm_max,
             }
         });
         Self {
@@ -150,6 +158,8 @@ impl CheckedRobot {
             refused_links: robot.unlisted_links.clone(),
             notices: robot.notices.clone(),
             mass_kg: (!robot.masses.is_empty()).then(|| robot.masses.iter().map(|mass| mass.mass_kg).sum()),
+            mass_doubt: robot.mass_doubt(),
+            torque_unchecked: TorqueLimits::of(robot).err().map(|why| why.to_string()),
             may_touch_by_rule: names(&robot.allowed_by_rule),
             may_touch_by_file: names(&robot.allowed_by_file),
             may_touch_by_srdf: names(&robot.allowed_by_srdf),
@@ -227,6 +237,23 @@ impl fmt::Display for CheckedRobot {
 }
 
 impl CheckedRobot {
+    /// What the drives can bear, and whether motions are held to it.
+    fn torques(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let stated = self.joints.iter().filter_map(|j| Some(format!("{} {} Nm", j.name, j.torque_nm_max?)));
+        let stated: Vec<String> = stated.collect();
+        if !stated.is_empty() {
+            writeln!(f, "  torques of the drives at most {}", stated.join(", "))?;
+        }
+        match &self.torque_unchecked {
+            Some(_) if stated.is_empty() => Ok(()),
+            Some(_) if self.mass_doubt.is_some() => writeln!(f, "  torques are not checked with such masses"),
+            Some(why) => writeln!(f, "  {why}"),
+            None => {
+                writeln!(f, "  motions beyond them are refused by verify and run, and timed slower by plan")
+            }
+        }
+    }
+
     /// What links keep from each other.
     fn margins(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "  other links keep more than {} m from each other (link_margin_m)", self.link_margin_m)?;
@@ -247,8 +274,15 @@ impl CheckedRobot {
             writeln!(f, "  base link {base}, tip link {tip}")?;
         }
         if let Some(mass_kg) = self.mass_kg {
-            writeln!(f, "  {mass_kg:.3} kg by the links that state a mass (for the energy of motions)")?;
+            writeln!(
+                f,
+                "  {mass_kg:.3} kg by the links that state a mass (for torques and energies of motions)"
+            )?;
         }
+        if let Some(doubt) = &self.mass_doubt {
+            writeln!(f, "  WARNING: {doubt}")?;
+        }
+        self.torques(f)?;
         for link in &self.links {
             match &link.moved_by {
                 Some(joint) => writeln!(f, "  {:<26} moves with {joint}: {}", link.name, link.shapes)?,

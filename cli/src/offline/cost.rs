@@ -20,6 +20,8 @@ struct Answer {
     /// Left out for a robot that states no masses.
     #[serde(rename = "energy_J", skip_serializing_if = "Option::is_none")]
     energy_j: Option<f64>,
+    /// Why that energy is too low; null where the masses may be right.
+    mass_doubt: Option<String>,
     poses: usize,
     waypoints_per_segment: usize,
     expansion_m: f64,
@@ -35,6 +37,9 @@ impl fmt::Display for Answer {
         writeln!(f, "cost              {}", self.cost)?;
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy_J          {energy_j}")?;
+        }
+        if let Some(doubt) = &self.mass_doubt {
+            writeln!(f, "WARNING           {doubt}")?;
         }
         write!(
             f,
@@ -67,6 +72,7 @@ pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
         collision: u8::from(cost.collision),
         cost: cost.cost,
         energy_j: Dynamics::new(&robot).ok().map(|dynamics| dynamics.spent_j(&file.trajectory)),
+        mass_doubt: robot.mass_doubt(),
         poses: cost.poses,
         waypoints_per_segment: model.waypoints_per_segment,
         expansion_m: model.expansion_m,

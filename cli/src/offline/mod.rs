@@ -20,4 +20,5 @@ mod protocol_line;
 pub(crate) mod sample;
 mod stops_bench;
 mod timing_bench;
+mod torque_use;
 pub(crate) mod verify;

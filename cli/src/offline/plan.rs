@@ -1,4 +1,5 @@
 //! `taustream plan`: from a pose to a goal, as a verified trajectory file.
+use super::torque_use::Torques;
 use super::verify::{PeakTable, PeakUse, Unmodelled, clearance_words, peak_use};
 use crate::args::{Goal, PlanArgs};
 use crate::arm;
@@ -37,6 +38,8 @@ struct Summary {
     unmodelled_links: Vec<String>,
     clearance_required_m: f64,
     peak_use: Vec<PeakUse>,
+    #[serde(flatten)]
+    torques: Torques,
     goal_rad: Vec<f64>,
     /// Where the tip was to go, when a position was requested.
     target_m: Option<[f64; 3]>,
@@ -59,6 +62,7 @@ impl fmt::Display for Summary {
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
         }
+        write!(f, "{}", self.torques)?;
         let [a, b] = &self.clearance_between;
         writeln!(
             f,
@@ -222,6 +226,7 @@ fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &
         unmodelled_links: robot.unmodelled_links.clone(),
         clearance_required_m: found.proof.clearance_required_m,
         peak_use: peak_use(robot, &found.proof.peaks),
+        torques: Torques::of(robot, &found.trajectory),
         goal_rad,
         target_m: tip.map(|(target, _)| target.position_m),
         position_error_m: tip.map(|(_, error)| error.position_m),

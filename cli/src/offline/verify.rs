@@ -1,4 +1,5 @@
 //! `taustream verify`: the proof that a motion keeps limits and clearance, or the first violation.
+use super::torque_use::Torques;
 use crate::args::MotionArgs;
 use crate::arm;
 use crate::failure::Failure;
@@ -30,6 +31,8 @@ struct Answer {
     clearance_required_m: f64,
     continuity: &'static str,
     peak_use: Vec<PeakUse>,
+    #[serde(flatten)]
+    torques: Torques,
 }
 
 impl fmt::Display for Answer {
@@ -44,6 +47,7 @@ impl fmt::Display for Answer {
         )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         writeln!(f, "continuity    {}", self.continuity)?;
+        write!(f, "{}", self.torques)?;
         write!(f, "{}", PeakTable(&self.peak_use))
     }
 }
@@ -73,6 +77,7 @@ pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
         clearance_required_m: proof.clearance_required_m,
         continuity: CONTINUITY,
         peak_use: peak_use(&robot, &proof.peaks),
+        torques: Torques::of(&robot, &file.trajectory),
     })
 }
 

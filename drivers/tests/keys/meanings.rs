@@ -53,6 +53,11 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Radius of the capsule between this frame's origin and the previous one; 0: no shape. Or `link_capsules`.",
     ),
     (
+        "Robot files: joint[].torque_nm_max",
+        "The greatest torque of the drive at the joint; with a URDF without it its effort. Where masses are known, motions that need more \
+         are refused by `verify` and timed slower by `plan`.",
+    ),
+    (
         "Robot files: joint[].link_mass_kg",
         "Mass of the link behind the joint, kg: for every link or for none.",
     ),

@@ -20,6 +20,7 @@ use crate::rng::SeededRng;
 use crate::search::Searcher;
 use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
+use crate::torque::{Load, Overload, TorqueLimits};
 use crate::tree::Space;
 use crate::verify::{Proof, Stretch, Violation, prove_candidate, verify_in};
 use crate::world::World;
@@ -45,6 +46,8 @@ const SHORTCUTS: usize = 120;
 /// A motion that misses a limit is made slower by this factor, a few times.
 const SLOWER: f64 = 1.002;
 const SLOWER_TRIES: usize = 6;
+/// Durations that differ by a smaller share are one.
+const SAME_SHARE: f64 = 1e-12;
 /// Poses of sampled edges granted a millisecond, where the clock does not end the work: about what a small controller checks.
 const SAMPLED_A_MS: usize = 2_000;
 /// Evaluations of a refinement's first round; each later one has twice as many.
@@ -125,6 +128,14 @@ pub struct Pipeline<'a> {
     evaluator: &'a Evaluator<'a>,
     stage_budgets: StageBudgets,
     limits: [JointLimits; MAX_JOINTS],
+    /// What the drives can bear, where that is known.
+    torque_limits: Option<TorqueLimits<'a>>,
+    /// The time of the best motion by time, once motions of less energy are looked for: none of them is faster.
+    least_s: Option<f64>,
+    /// Optimisers look for less energy.
+    refines_by_energy: bool,
+    /// The least duration of all proven motions.
+    shortest_s: f64,
     /// What was done, as text.
     tried: Vec<String>,
     best: Option<Best>,
@@ -155,6 +166,10 @@ impl<'a> Pipeline<'a> {
             evaluator,
             stage_budgets: StageBudgets::of(options),
             limits: world.robot().limits(),
+            torque_limits: TorqueLimits::of(world.robot()).ok(),
+            least_s: None,
+            refines_by_energy: false,
+            shortest_s: f64::INFINITY,
             tried: Vec::new(),
             best: None,
             began_s: processor_s(),
@@ -195,6 +210,7 @@ impl<'a> Pipeline<'a> {
                     self.around(&line);
                 } else if self.evaluator.objective != Objective::Time {
                     // Nothing is shorter in time than the line; by another measure something may be better.
+                    self.turn_to_energy();
                     self.by_objective(&[(&line, LINE)]);
                 }
             }
@@ -208,8 +224,14 @@ impl<'a> Pipeline<'a> {
                 let evaluations = self.stage_budgets.refinements;
                 let setup = Setup { reading: self.options.reading, evaluations: Some(evaluations) };
                 let optimizer = (method.make)(setup);
-                if let Some(refined) = self.refine(&line, &*optimizer, evaluations, LINE) {
-                    self.round(&refined, &optimizer.name().to_uppercase(), None);
+                let refine_line = |pipeline: &mut Self| {
+                    if let Some(refined) = pipeline.refine(&line, &*optimizer, evaluations, LINE) {
+                        pipeline.round(&refined, &optimizer.name().to_uppercase(), None);
+                    }
+                };
+                refine_line(&mut self);
+                if self.turn_to_energy() {
+                    refine_line(&mut self);
                 }
             }
         }
@@ -224,18 +246,36 @@ impl<'a> Pipeline<'a> {
     /// A path round what blocks the straight line: searched, and improved.
     fn around(&mut self, line: &[JointArray]) {
         let Some(path) = self.quick(line, self.stage_budgets.sampled_checks) else { return };
+        let starts = [(path.as_slice(), "that"), (line, LINE)];
+        if self.evaluator.objective == Objective::Cost {
+            self.by_objective(&starts);
+            return;
+        }
+        // What a plan by time does, a plan by energy does too, so that its choice holds that plan.
         match self.options.improvement {
-            _ if self.evaluator.objective != Objective::Time => {
-                self.by_objective(&[(&path, "that"), (line, LINE)]);
-            }
             _ if !self.options.spends_deadline => {}
             Improvement::Nothing => {}
             Improvement::Searches => {
                 let more = SEARCHES..SEARCHES + MORE_SEARCHES;
                 self.search(Searcher::RrtConnect, line, more, self.stage_budgets.refinements * refine::POSES);
             }
-            Improvement::Method(method) => self.refine_around(method, &[(&path, "that"), (line, LINE)]),
+            Improvement::Method(method) => self.refine_around(method, &starts),
         }
+        if self.turn_to_energy() {
+            self.by_objective(&starts);
+        }
+    }
+
+    /// Where energy counts: from here on optimisers look for less of it, and a motion that would be faster than the best by
+    /// time is slowed down to that one, which takes less work still. So a plan by energy takes no more work than the plan by
+    /// time of the same call, and no less time.
+    fn turn_to_energy(&mut self) -> bool {
+        let counts = self.evaluator.objective == Objective::Energy;
+        if counts {
+            self.refines_by_energy = true;
+            self.least_s = Some(self.shortest_s).filter(|s| s.is_finite());
+        }
+        counts
     }
 
     /// Looks for motions that are better by another measure than time.
@@ -279,7 +319,7 @@ impl<'a> Pipeline<'a> {
         let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
         match verify_in(self.space.world, &trajectory, self.space.budget) {
             Ok(proof) => self.keep(trajectory, proof, "already there".to_owned()),
-            Err(violation) => self.violation = Some(violation),
+            Err(violation) => self.blame(violation),
         }
     }
 
@@ -402,7 +442,8 @@ impl<'a> Pipeline<'a> {
     ) -> Option<Vec<JointArray>> {
         let name = optimizer.name().to_uppercase();
         let [Some(start), Some(goal)] = [path.first(), path.last()] else { return None };
-        let problem = PathProblem::new(&self.space, *start, *goal).by_energy(self.evaluator.energy());
+        let problem = PathProblem::new(&self.space, *start, *goal)
+            .by_energy(self.evaluator.energy().filter(|_| self.refines_by_energy));
         let refined = refine(&problem, path, optimizer, evaluations_max, self.options.seed);
         let (mut corners, found) = match refined {
             Ok(refined) => refined?,
@@ -444,6 +485,7 @@ impl<'a> Pipeline<'a> {
     /// Keeps a verified motion if it is better than what there is.
     fn keep(&mut self, trajectory: Trajectory, proof: Proof, how: String) {
         let score = self.evaluator.score(&trajectory, &proof);
+        self.shortest_s = self.shortest_s.min(proof.duration_s);
         if self.best.is_none() {
             self.first_s = processor_s() - self.began_s;
         }
@@ -461,6 +503,18 @@ impl<'a> Pipeline<'a> {
             let left_s = stretches.first().map(|s| s.span_s[1]);
             match prove_candidate(&stretches, &timed.trajectory, self.space.budget) {
                 Ok(proof) => {
+                    match self.slowdown(&timed.trajectory, &proof) {
+                        Ok(None) => {}
+                        Ok(Some(factor)) => {
+                            let Some(slower) = timed.slower(factor) else { return false };
+                            timed = slower;
+                            continue;
+                        }
+                        Err(overload) => {
+                            self.blame(overload.into());
+                            return false;
+                        }
+                    }
                     let note = self.margin_exit.as_ref().and_then(|l| l.note.as_ref());
                     let note = note.map_or_else(String::new, |n| format!("{}; ", n.words(left_s)));
                     self.keep(timed.trajectory, proof, format!("{note}{how}"));
@@ -470,13 +524,37 @@ impl<'a> Pipeline<'a> {
                     // Slower, a position limit stays in the way.
                     let limit = matches!(&violation, Violation::Limit { violation, .. }
                         if violation.quantity != Quantity::Position);
-                    self.violation = Some(violation);
+                    self.blame(violation);
                     let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else { return false };
                     timed = slower;
                 }
             }
         }
         false
+    }
+
+    /// By what factor a proven motion must be slower: for its drives, or not to be faster than the best by time. None for one
+    /// that is not kept anyway.
+    fn slowdown(&self, motion: &Trajectory, proof: &Proof) -> Result<Option<f64>, Overload> {
+        let is_beaten = self.evaluator.objective == Objective::Time
+            && self.best.as_ref().is_some_and(|best| best.score <= proof.duration_s);
+        if is_beaten {
+            return Ok(None);
+        }
+        match self.torque_limits.as_ref().map_or(Load::Borne, |limits| limits.load(motion)) {
+            Load::Slower(factor, _) => return Ok(Some(factor)),
+            Load::Unbearable(overload) => return Err(overload),
+            Load::Borne => {}
+        }
+        let behind = self.least_s.map(|least_s| least_s / proof.duration_s);
+        Ok(behind.filter(|factor| *factor > 1.0 + SAME_SHARE).map(|factor| factor + SAME_SHARE))
+    }
+
+    /// Notes why a motion was not proven; that its drives cannot bear it says more than what came of the paths round that.
+    fn blame(&mut self, violation: Violation) {
+        if !matches!(self.violation, Some(Violation::Torque(_))) {
+            self.violation = Some(violation);
+        }
     }
 
     fn finish(self) -> Result<Plan, PlanError> {
