@@ -1,4 +1,4 @@
-//! Experiments that check the claims of five papers (docs/papers.md) and show our numbers beside the printed ones.
+//! Experiments that check the claims of five papers (papers.md) and show our numbers beside the printed ones.
 //!
 //! An [`Experiment`] runs the planner's methods on the papers' problems ([`taustream_optimizers::papers`]) and answers
 //! with tables, pictures and claims. The papers' own values are the only constants in them ([`Cell::Paper`]);
@@ -6,12 +6,14 @@
 //! it. One seed gives one answer on any number of threads. Nothing here plans for a real arm, and no time is measured
 //! but as a ratio.
 //!
-//! `taustream bench papers` runs them; docs/papers.md holds what a full run said.
+//! `taustream bench papers` runs them; papers.md holds what a full run said.
 #![forbid(unsafe_code)]
 
 pub mod chart;
 mod claim;
+mod effect;
 mod figure;
+mod index;
 mod number;
 mod paper_000;
 mod paper_001;
@@ -25,12 +27,14 @@ mod run_context;
 pub mod statistics;
 mod table;
 mod trial;
+mod wrap;
 
-pub use claim::{Claim, Verdict, agrees, better};
+pub use claim::{Claim, Verdict, agrees};
+pub use effect::{Claimed, Effect};
 pub use figure::Figure;
 pub use number::figures;
 pub use registry::{EXPERIMENTS, Experiment, Outcome, PAPERS, Paper};
-pub use report::{Chapter, Report, run};
+pub use report::{Chapter, Report, Selection, run};
 pub use run_context::{Effort, RunContext, Stop};
 pub use table::{Cell, Row, Table};
 pub use trial::{Sample, Trial, convergence, minimise};

@@ -1,7 +1,33 @@
 //! All experiments of some papers, one after another, as text, Markdown and data.
-use crate::registry::{EXPERIMENTS, Outcome, PAPERS};
+use crate::claim::{Claim, Verdict};
+use crate::index;
+use crate::registry::{EXPERIMENTS, Experiment, Outcome, PAPERS, Paper};
 use crate::run_context::{Effort, RunContext, Stop};
-use std::fmt;
+use crate::wrap::wrapped;
+use rustix::time::{ClockId, clock_gettime};
+use std::fmt::{self, Write};
+
+/// What a quick run says of itself, wherever it says something.
+const QUICK: &str = "A quick run: it shows that the experiments work, and proves nothing.";
+/// What a reader of the page needs to know first.
+const GUIDE: &str = "\
+# The five papers: which of their claims hold
+
+How to read the rows:
+
+- A verdict has four words. *Holds*: the interval of the effect lies on the claimed side. *Does not hold*: it lies below the margin, or a \
+  calculation or a counterexample refutes the claim. *Not told apart*: neither. *Cannot be checked*: the paper does not give what a check \
+  needs.
+- An effect stands with its 95 % interval in brackets and, where it is a test, with p and the number of pairs; the margin stands in the rule, \
+  and was stated before anything was measured. Medians stand beside means.
+- *Printed* follows the paper to the letter. *Corrected* replaces an error of print by what must have been meant; the files of \
+  `optimizers/src` and `optimizers/src/papers` say what. The papers' own values are the only constants.
+- Methods are compared run by run with the same random numbers, at equal evaluations where that is said. Costs and numbers of evaluations do \
+  not depend on the machine; times are ratios.
+
+";
+/// Width of a page that no terminal states.
+const COLUMNS: usize = 120;
 
 /// One experiment's outcome.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -17,28 +43,85 @@ pub struct Chapter {
     pub outcome: Outcome,
 }
 
+/// What to run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Number of the paper; all five without.
+    pub paper: Option<u8>,
+    /// What the experiment's name contains; all without.
+    pub only: Option<String>,
+    /// Further master seeds whose verdicts stand beside.
+    pub other_seeds: u64,
+}
+
+impl Selection {
+    /// The experiments, in the order of the papers.
+    pub fn experiments(&self) -> impl Iterator<Item = &'static Experiment> + '_ {
+        let is_paper = |e: &Experiment| self.paper.is_none_or(|paper| paper == e.paper);
+        let is_named = |e: &Experiment| self.only.as_ref().is_none_or(|only| e.name.contains(only.as_str()));
+        EXPERIMENTS.iter().filter(move |e| is_paper(e) && is_named(e))
+    }
+}
+
 /// Everything.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
     /// How much work it was.
     pub effort: Effort,
+    /// What the experiments' names contain; none for all.
+    pub only: Option<String>,
+    /// Further master seeds whose verdicts stand beside.
+    pub other_seeds: Vec<u64>,
+    /// Processor time of all of it (s).
+    pub took_s: f64,
     /// Experiment by experiment.
     pub chapters: Vec<Chapter>,
 }
 
-/// Runs the experiments of a paper, or of all five.
+/// Runs the selected experiments.
 ///
 /// # Errors
 /// When the user ended it, or an experiment was refused.
-pub fn run(run_context: &RunContext, effort: Effort, paper: Option<u8>) -> Result<Report, Stop> {
+pub fn run(run_context: &RunContext, effort: Effort, selection: &Selection) -> Result<Report, Stop> {
+    let began_s = processor_s();
+    let mut chapters = chapters(run_context, effort, selection)?;
+    let other_seeds: Vec<u64> = (1..=selection.other_seeds).map(|i| effort.seed.wrapping_add(i)).collect();
+    for seed in &other_seeds {
+        run_context.say(&format!("master seed {seed} .."));
+        let effort = Effort { seed: *seed, ..effort };
+        let others = self::chapters(&run_context.with(effort), effort, selection)?;
+        for (chapter, other) in chapters.iter_mut().zip(others) {
+            for (claim, again) in chapter.outcome.claims.iter_mut().zip(other.outcome.claims) {
+                claim.other_seeds.push(again.verdict);
+            }
+        }
+    }
+    let took_s = processor_s() - began_s;
+    Ok(Report { effort, only: selection.only.clone(), other_seeds, took_s, chapters })
+}
+
+/// Processor time of the process so far, s.
+fn processor_s() -> f64 {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
+fn chapters(run_context: &RunContext, effort: Effort, selection: &Selection) -> Result<Vec<Chapter>, Stop> {
     let mut chapters = Vec::new();
-    for experiment in EXPERIMENTS.iter().filter(|e| paper.is_none_or(|p| p == e.paper)) {
-        let file = PAPERS.iter().find(|p| p.number == experiment.paper).map_or("", |p| p.file);
+    for experiment in selection.experiments() {
+        let file = paper(experiment.paper).map_or("", |p| p.file);
         run_context.say(&format!("paper {:03}: {} ..", experiment.paper, experiment.name));
-        let outcome = (experiment.run)(run_context)?;
+        let mut outcome = (experiment.run)(run_context)?;
+        if effort.quick {
+            outcome.claims.iter_mut().for_each(Claim::unproven);
+        }
         chapters.push(Chapter { paper: experiment.paper, file, name: experiment.name, outcome });
     }
-    Ok(Report { effort, chapters })
+    Ok(chapters)
+}
+
+fn paper(number: u8) -> Option<&'static Paper> {
+    PAPERS.iter().find(|p| p.number == number)
 }
 
 impl Report {
@@ -49,82 +132,171 @@ impl Report {
         let mut command = format!("taustream bench papers --seed {seed}");
         let first = self.chapters.first().map(|c| c.paper);
         if let Some(paper) = first.filter(|p| self.chapters.iter().all(|c| c.paper == *p)) {
-            command += &format!(" --paper {paper}");
+            let _ = write!(command, " --paper {paper}");
+        }
+        if let Some(only) = &self.only {
+            let _ = write!(command, " --only \"{only}\"");
+        }
+        if !self.other_seeds.is_empty() {
+            let _ = write!(command, " --seeds {}", self.other_seeds.len() + 1);
         }
         if let Some(runs) = runs {
-            command += &format!(" --runs {runs}");
+            let _ = write!(command, " --runs {runs}");
         }
         command + if quick { " --quick" } else { "" }
+    }
+
+    /// Where it comes from: command, time, and how far the words depend on the seed.
+    fn origin(&self) -> String {
+        let mut text = format!("Made by `{}` in {:.0} s of one processor.", self.command(), self.took_s);
+        let claims: Vec<&Claim> = self.chapters.iter().flat_map(|c| &c.outcome.claims).collect();
+        if !self.other_seeds.is_empty() {
+            let same =
+                |seed: usize| claims.iter().filter(|c| c.other_seeds.get(seed) == Some(&c.verdict)).count();
+            let each = self.other_seeds.iter().enumerate().map(|(i, seed)| {
+                format!("master seed {seed} gives the same word in {} of {} rows", same(i), claims.len())
+            });
+            text += &format!(" {}.", each.collect::<Vec<_>>().join("; "));
+        }
+        text
+    }
+
+    /// Rows whose word depends on the master seed, with the words.
+    fn wavering(&self) -> Vec<String> {
+        let claims =
+            self.chapters.iter().flat_map(|c| c.outcome.claims.iter().map(move |claim| (c.paper, claim)));
+        let is_other = |claim: &Claim| claim.other_seeds.iter().any(|other| *other != claim.verdict);
+        let words = |(paper, claim): (u8, &Claim)| {
+            let others: Vec<String> = claim.other_seeds.iter().map(Verdict::to_string).collect();
+            format!("{paper:03}, {}: {}, then {}", claim.says, claim.verdict, others.join(", "))
+        };
+        claims.filter(|(_, claim)| is_other(claim)).map(words).collect()
     }
 
     /// As Markdown; pictures are referred to by their file names.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut text = format!("Made by `{}`.\n", self.command());
+        let mut text = format!("{GUIDE}{}\n", self.origin());
         if self.effort.quick {
-            text += "\nA quick run: it shows that the experiments work, and proves nothing.\n";
+            let _ = write!(text, "\n{QUICK}\n");
         }
+        let wavering = self.wavering();
+        if !wavering.is_empty() {
+            text += "\nRows whose word depends on the master seed:\n\n";
+            wavering.iter().for_each(|row| text += &format!("- {row}\n"));
+        }
+        let mut last = None;
         for chapter in &self.chapters {
-            text += &chapter.markdown();
+            if last.replace(chapter.paper) != Some(chapter.paper)
+                && let Some(paper) = paper(chapter.paper)
+            {
+                text += &opening(paper);
+            }
+            text += &chapter.markdown(self.effort.quick);
         }
         text
     }
+
+    /// As text for a terminal of so many columns; 120 at most.
+    #[must_use]
+    pub fn text(&self, columns: usize) -> String {
+        let columns = columns.clamp(40, COLUMNS);
+        let mut text = String::new();
+        for chapter in &self.chapters {
+            text += &chapter.text(columns, self.effort.quick);
+        }
+        for row in self.wavering() {
+            text += &wrapped(&format!("depends on the seed: {row}"), columns, "  ");
+        }
+        text += &wrapped(&self.origin(), columns, "");
+        if self.effort.quick {
+            text += &wrapped(QUICK, columns, "");
+        }
+        text.trim_end().to_owned()
+    }
+}
+
+/// Title, source, what the paper did, and where each of its systems, tables and figures is checked.
+fn opening(paper: &Paper) -> String {
+    let Paper { number, about, source, did, .. } = paper;
+    let mut text = format!("\n## {number:03}: {about}\n\n{source}\n\n{did}\n");
+    text += "\n| system, table or figure | row, or the reason for none |\n|---|---|\n";
+    for (what, row) in index::of(*number) {
+        let _ = writeln!(text, "| {what} | {row} |");
+    }
+    text
 }
 
 impl Chapter {
-    fn markdown(&self) -> String {
+    fn markdown(&self, is_quick: bool) -> String {
         let outcome = &self.outcome;
-        let mut text = format!("\n## {:03}: {}\n", self.paper, self.name);
+        let mut text = format!("\n### {:03}: {}\n", self.paper, self.name);
+        if is_quick {
+            let _ = write!(text, "\n{QUICK}\n");
+        }
         if !outcome.ours.is_empty() {
-            text += &format!("\nNot in the paper, ours: {}.\n", outcome.ours.join("; "));
+            let _ = write!(text, "\nNot in the paper, ours: {}.\n", outcome.ours.join("; "));
         }
         if !outcome.claims.is_empty() {
-            text += "\n| the paper says | verdict | rule | numbers |\n|---|---|---|---|\n";
+            text += "\n| the paper says | verdict | other seeds | rule | numbers |\n|---|---|---|---|---|\n";
         }
         for claim in &outcome.claims {
-            let [says, rule, numbers] =
-                [&claim.says, &claim.rule, &claim.numbers].map(|t| t.replace('|', "\\|"));
-            text += &format!("| {says} | **{}** | {rule} | {numbers} |\n", claim.verdict);
+            let evidence = claim.evidence();
+            let [says, rule, numbers] = [&claim.says, &claim.rule, &evidence].map(|t| t.replace('|', "\\|"));
+            let seeds = claim.agreement().map_or("-".to_owned(), |[same, of]| format!("{same} of {of}"));
+            let _ = writeln!(text, "| {says} | **{}** | {seeds} | {rule} | {numbers} |", claim.verdict);
         }
         for table in &outcome.tables {
-            text += &format!("\n{}", table.markdown());
+            let _ = write!(text, "\n{}", table.markdown());
         }
         for figure in &outcome.figures {
-            text += &format!("\n![{}]({})\n", figure.title, figure.file);
+            let _ = write!(text, "\n![{}]({})\n", figure.title, figure.file);
         }
+        text
+    }
+
+    fn text(&self, columns: usize, is_quick: bool) -> String {
+        let outcome = &self.outcome;
+        let title = format!("paper {:03} ({}): {}", self.paper, self.file, self.name);
+        let mut text = wrapped(&title, columns, "  ");
+        if is_quick {
+            text += &wrapped(QUICK, columns, "");
+        }
+        if !outcome.ours.is_empty() {
+            text += &wrapped(&format!("not in the paper, ours: {}", outcome.ours.join("; ")), columns, "  ");
+        }
+        for table in &outcome.tables {
+            let _ = write!(text, "\n{}", table.text(columns));
+        }
+        text.push('\n');
+        if !outcome.claims.is_empty() {
+            text += "claims:\n";
+        }
+        for claim in &outcome.claims {
+            text += &wrapped(
+                &format!("{}: {}", claim.verdict.to_string().to_uppercase(), claim.says),
+                columns,
+                "  ",
+            );
+            let lines =
+                [Some(format!("rule: {}", claim.rule)), Some(claim.evidence()).filter(|t| !t.is_empty())];
+            for line in lines.into_iter().flatten() {
+                text += &wrapped(&format!("    {line}"), columns, "      ");
+            }
+        }
+        text.push('\n');
         text
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for chapter in &self.chapters {
-            write!(f, "{chapter}")?;
-        }
-        let verdicts = self.chapters.iter().flat_map(|c| &c.outcome.claims).map(|c| c.verdict.to_string());
-        let mut counts = std::collections::BTreeMap::new();
-        for verdict in verdicts {
-            *counts.entry(verdict).or_insert(0) += 1;
-        }
-        let counts: Vec<String> = counts.into_iter().map(|(v, n)| format!("{n} {v}")).collect();
-        write!(f, "claims: {}", counts.join(", "))
+        f.write_str(&self.text(COLUMNS))
     }
 }
 
 impl fmt::Display for Chapter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let outcome = &self.outcome;
-        writeln!(f, "== paper {:03}, {} ==\n", self.paper, self.name)?;
-        for ours in &outcome.ours {
-            writeln!(f, "not in the paper, ours: {ours}")?;
-        }
-        for table in &outcome.tables {
-            writeln!(f, "\n{table}")?;
-        }
-        for claim in &outcome.claims {
-            writeln!(f, "{:>17}: {}", claim.verdict.to_string().to_uppercase(), claim.says)?;
-            writeln!(f, "{:>19}rule: {}\n{:>19}{}", "", claim.rule, "", claim.numbers)?;
-        }
-        writeln!(f)
+        f.write_str(&self.text(COLUMNS, false))
     }
 }

@@ -63,6 +63,12 @@ impl<'a> RunContext<'a> {
         Self { effort, say, is_over }
     }
 
+    /// The same with another effort.
+    #[must_use]
+    pub fn with(&self, effort: Effort) -> Self {
+        Self { effort, ..*self }
+    }
+
     /// True when few and short runs are requested.
     #[must_use]
     pub fn is_quick(&self) -> bool {

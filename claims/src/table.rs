@@ -1,6 +1,8 @@
 //! Tables: the paper's values beside ours.
+use crate::effect::rounded;
 use crate::number::figures;
-use crate::statistics::{Paired, Summary};
+use crate::statistics::{Estimate, Paired, Summary};
+use crate::wrap::wrapped;
 use std::fmt;
 
 /// One field.
@@ -26,6 +28,8 @@ pub enum Cell {
     },
     /// A paired comparison.
     Test(Paired),
+    /// An effect with its 95 % interval.
+    Effect(Estimate),
     /// Words.
     Words(String),
 }
@@ -43,6 +47,12 @@ impl Cell {
         value.map_or(Self::None, Self::number)
     }
 
+    /// An effect, or nothing when there is none.
+    #[must_use]
+    pub fn estimate(estimate: Estimate) -> Self {
+        if estimate.value.is_finite() { Self::Effect(estimate) } else { Self::None }
+    }
+
     /// Words.
     #[must_use]
     pub fn words(text: impl Into<String>) -> Self {
@@ -53,6 +63,7 @@ impl Cell {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         match self {
+            Self::Effect(e) => e.value.is_finite(),
             Self::None | Self::Share { .. } | Self::Words(_) => true,
             Self::Paper(value) | Self::Number(value) => value.is_finite(),
             Self::Mean(s) | Self::Median(s) => {
@@ -71,6 +82,9 @@ impl fmt::Display for Cell {
             Self::Mean(s) => write!(f, "{} ± {}", figures(s.mean), figures(s.sd)),
             Self::Median(s) => write!(f, "{} [{}, {}]", figures(s.median), figures(s.q1), figures(s.q3)),
             Self::Share { count, of } => write!(f, "{count}/{of}"),
+            Self::Effect(Estimate { value, interval: [low, high] }) => {
+                write!(f, "{} [{}, {}]", rounded(*value), rounded(*low), rounded(*high))
+            }
             Self::Test(t) => write!(f, "{}:{}, p = {}", t.less, t.more, figures(t.p)),
             Self::Words(text) => f.write_str(text),
         }
@@ -148,25 +162,72 @@ impl Table {
     }
 }
 
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.title())?;
+impl Table {
+    /// As text of so many columns: a wide table continues below, with its labels repeated.
+    #[must_use]
+    pub fn text(&self, columns: usize) -> String {
+        let mut text = wrapped(&self.title(), columns, "  ");
         if !self.note.is_empty() {
-            writeln!(f, "  {}", self.note)?;
+            text += &wrapped(&format!("  {}", self.note), columns, "  ");
         }
         let lines = self.lines();
         let width = |column: usize| {
             lines.iter().filter_map(|l| l.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        for line in &lines {
-            let mut text = String::new();
-            for (column, (cell, &width)) in line.iter().zip(&widths).enumerate() {
-                // Labels to the left, figures to the right.
-                text += &if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
+        let most = columns.saturating_sub(2);
+        // Headings are broken into lines as narrow as the fields below allow.
+        let body = |column: usize| {
+            lines.iter().skip(1).filter_map(|l| l.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
+        };
+        let label_width = width(0).min(most / 3);
+        let widths: Vec<usize> =
+            (1..self.columns.len()).map(|c| body(c).max(HEADING.min(width(c)))).collect();
+        let mut from = 0;
+        while from < widths.len() {
+            let mut used = label_width;
+            let fits = widths[from..].iter().take_while(|w| {
+                used += *w + 2;
+                used <= most
+            });
+            let to = from + fits.count().max(1);
+            for line in &lines {
+                text += &fields(line, label_width, (from, &widths[from..to]));
             }
-            writeln!(f, "  {}", text.trim_end())?;
+            from = to;
         }
-        Ok(())
+        text
     }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text(COLUMNS))
+    }
+}
+
+/// Columns where no terminal states them.
+const COLUMNS: usize = 120;
+/// Most columns of a heading whose fields are narrow.
+const HEADING: usize = 16;
+
+/// A line whose fields may take several: labels to the left, figures to the right.
+fn fields(line: &[String], label_width: usize, (from, widths): (usize, &[usize])) -> String {
+    let parts = |text: &str, width: usize| -> Vec<String> {
+        wrapped(text, width.max(1), "").lines().map(str::to_owned).collect()
+    };
+    let label = parts(line.first().map_or("", String::as_str), label_width);
+    let fields = line.iter().skip(1 + from).zip(widths).map(|(field, width)| parts(field, *width));
+    let fields: Vec<Vec<String>> = fields.collect();
+    let high = fields.iter().map(Vec::len).chain([label.len()]).max().unwrap_or(1);
+    let mut text = String::new();
+    for i in 0..high {
+        let part = |parts: &[String]| parts.get(i).cloned().unwrap_or_default();
+        let mut out = format!("  {:<label_width$}", part(&label));
+        for (field, width) in fields.iter().zip(widths) {
+            out += &format!("  {:>width$}", part(field));
+        }
+        text += out.trim_end();
+        text.push('\n');
+    }
+    text
 }

@@ -1,11 +1,14 @@
 //! All experiments, quickly: every table is there, has finite numbers, and comes from the run and its seed alone.
 use std::sync::OnceLock;
-use taustream_claims::{Cell, EXPERIMENTS, Effort, PAPERS, Report, RunContext, Stop, Table, Verdict, run};
+use taustream_claims::{
+    Cell, EXPERIMENTS, Effort, PAPERS, Report, RunContext, Selection, Stop, Table, Verdict, run,
+};
 
 #[expect(clippy::unwrap_used, reason = "a helper of tests, outside of any #[test] function")]
 fn report(seed: u64, jobs: usize, paper: Option<u8>) -> Report {
     let effort = Effort { runs: None, quick: true, seed, jobs };
-    run(&RunContext::new(effort, &|_| (), &|| false), effort, paper).unwrap()
+    run(&RunContext::new(effort, &|_| (), &|| false), effort, &Selection { paper, ..Selection::default() })
+        .unwrap()
 }
 
 /// One run for all tests: it is what takes the time.
@@ -76,7 +79,7 @@ fn every_claim_has_its_rule_and_its_numbers_and_pictures_are_drawn() {
         for claim in &chapter.outcome.claims {
             let place = format!("{}: {}", chapter.name, claim.says);
             assert!(!claim.rule.is_empty(), "{place}: no rule");
-            assert!(!claim.numbers.is_empty() || claim.verdict == Verdict::Holds, "{place}: no numbers");
+            assert!(!claim.evidence().is_empty() || claim.verdict == Verdict::Holds, "{place}: no numbers");
         }
         for figure in &chapter.outcome.figures {
             assert!(figure.svg.contains("</svg>"), "{} is not drawn", figure.file);
@@ -102,11 +105,68 @@ fn markdown_names_command_and_every_claim() {
     assert!(data["chapters"][0]["tables"][0]["rows"][0]["cells"].is_array());
 }
 
+/// Goal: a quick run proves nothing: nothing that a run decides is decided, and every chapter says why.
+#[test]
+fn quick_run_judges_calculations_only_and_every_chapter_says_so() {
+    const SAYS: &str = "A quick run: it shows that the experiments work, and proves nothing.";
+    let [text, markdown] = [first().text(120), first().markdown()];
+    assert_eq!(markdown.matches(SAYS).count(), first().chapters.len() + 1);
+    assert_eq!(text.matches(SAYS).count(), first().chapters.len() + 1);
+    let (mut calculated, mut random) = (0, 0);
+    for claim in first().chapters.iter().flat_map(|c| &c.outcome.claims) {
+        let is_decided = claim.verdict != Verdict::CannotBeChecked;
+        assert!(!is_decided || claim.is_exact, "{} is decided by a quick run", claim.says);
+        *(if claim.is_exact { &mut calculated } else { &mut random }) += 1;
+    }
+    assert!(calculated > 15 && random > 30, "{calculated} calculations, {random} others");
+}
+
+#[test]
+fn text_fits_into_any_terminal() {
+    for columns in [60, 80, 120, 500] {
+        for line in first().text(columns).lines() {
+            assert!(line.chars().count() <= columns.min(120), "{columns}: {line}");
+        }
+    }
+}
+
+#[test]
+fn page_opens_each_paper_with_source_and_index() {
+    let text = first().markdown();
+    for paper in &PAPERS {
+        assert!(text.contains(paper.source) && text.contains(paper.did), "{}", paper.number);
+    }
+    // The index has two columns, the claims have five.
+    let index: Vec<&str> =
+        text.lines().filter(|l| l.starts_with("| ") && l.matches('|').count() == 3).collect();
+    for experiment in EXPERIMENTS {
+        assert!(index.iter().any(|line| line.contains(experiment.name)), "{}", experiment.name);
+    }
+}
+
+#[test]
+fn selection_by_name_runs_that_experiment_and_other_seeds_stand_beside() {
+    let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };
+    let selection = Selection { only: Some("own rows".to_owned()), other_seeds: 2, ..Selection::default() };
+    let report = run(&RunContext::new(effort, &|_| (), &|| false), effort, &selection).unwrap();
+    assert_eq!(report.chapters.len(), 1);
+    assert_eq!(report.other_seeds, [2, 3]);
+    let command = "taustream bench papers --seed 1 --paper 3 --only \"own rows\" --seeds 3 --quick";
+    assert_eq!(report.command(), command);
+    for claim in &report.chapters[0].outcome.claims {
+        assert_eq!(claim.agreement(), Some([2, 2]), "{}: a calculation depends on the seed", claim.says);
+    }
+}
+
 #[test]
 fn experiments_end_when_the_user_ends_them() {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };
     for paper in PAPERS.iter().filter(|p| EXPERIMENTS.iter().any(|e| e.paper == p.number)) {
-        let ended = run(&RunContext::new(effort, &|_| (), &|| true), effort, Some(paper.number));
+        let ended = run(
+            &RunContext::new(effort, &|_| (), &|| true),
+            effort,
+            &Selection { paper: Some(paper.number), ..Selection::default() },
+        );
         assert_eq!(ended, Err(Stop::Interrupted), "paper {}", paper.number);
     }
 }

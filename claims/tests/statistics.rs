@@ -1,5 +1,7 @@
 //! The tests of significance against scipy (oracles/statistics.py prints the numbers).
-use taustream_claims::statistics::{Moments, Summary, mann_whitney, welch, wilcoxon};
+use taustream_claims::statistics::{
+    Moments, Summary, mann_whitney, median, share, shift, spread, welch, wilcoxon,
+};
 
 const A: [f64; 12] = [0.31, 1.42, -0.77, 2.05, 0.11, 0.93, -1.18, 0.46, 1.71, -0.29, 0.64, 1.09];
 const B: [f64; 12] = [0.52, 0.37, -0.91, 1.14, 0.83, -0.46, -1.97, 0.05, 0.22, -0.33, 1.51, -0.72];
@@ -73,4 +75,37 @@ fn samples_that_say_nothing_have_no_difference() {
     assert_eq!(welch(single, single), None);
     let still = |mean| Moments { n: 5, mean, sd: 0.0 };
     assert_eq!((welch(still(1.0), still(1.0)), welch(still(1.0), still(2.0))), (Some(1.0), Some(0.0)));
+}
+
+#[test]
+fn shifts_shares_medians_and_spreads_have_the_intervals_of_scipy() {
+    let differences: Vec<f64> = A.iter().zip(&B).map(|(a, b)| a - b).collect();
+    let (long_one, _) = long();
+    let cases = [
+        ("shift", shift(&differences), [0.535, -0.035, 1.11]),
+        ("share of none", share(0, 30), [0.0, 0.0, 0.113_513_393_173_968_75]),
+        ("share of half", share(52, 100), [0.52, 0.423_165_777_652_239_56, 0.615_354_482_419_480_9]),
+        ("median", median(&A), [0.55, -0.29, 1.42]),
+        (
+            "median of many",
+            median(&long_one),
+            [0.159_340_449_430_604_9, -0.233_765_540_975_684_03, 0.621_778_283_385_981],
+        ),
+        (
+            "spread",
+            spread(&A, &B).0,
+            [0.030_235_162_374_020_02, -0.621_794_598_573_129_4, 0.682_264_923_321_169_1],
+        ),
+    ];
+    for (what, ours, [value, low, high]) in cases {
+        for (ours, scipy) in [(ours.value, value), (ours.interval[0], low), (ours.interval[1], high)] {
+            assert!((ours - scipy).abs() <= 1e-9, "{what}: {ours} against {scipy}");
+        }
+    }
+    near(spread(&A, &B).1, 0.924_250_774_621_126_3, NORMAL);
+    // Too few for any interval.
+    for ours in [shift(&differences[..5]), median(&A[..5])] {
+        assert!(ours.interval.iter().all(|end| end.is_infinite()), "{ours:?}");
+    }
+    assert!(shift(&[]).value.is_nan() && share(0, 0).value.is_nan());
 }

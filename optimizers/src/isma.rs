@@ -29,6 +29,60 @@ pub struct Isma {
     pub crossover: f64,
     /// Centre μ and width λ of the crossover's shares.
     pub laplace: [f64; 2],
+    /// What is left out, to see what it is good for; none in the paper.
+    pub left_out: Option<Addition>,
+}
+
+/// What ISMA adds to SMA.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Addition {
+    /// The first population from a chaotic map.
+    Chaos,
+    /// The feedback factor; without it SMA's bound.
+    Feedback,
+    /// The crossover with the best.
+    Crossover,
+    /// The bees' search.
+    Bees,
+    /// The vertices of parabolas.
+    Parabolas,
+}
+
+impl Addition {
+    /// All five, in the order of the paper.
+    pub const ALL: [Self; 5] = [Self::Chaos, Self::Feedback, Self::Crossover, Self::Bees, Self::Parabolas];
+
+    /// In a row of a table.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Chaos => "chaotic start",
+            Self::Feedback => "feedback factor",
+            Self::Crossover => "crossover",
+            Self::Bees => "bees' search",
+            Self::Parabolas => "quadratic interpolation",
+        }
+    }
+
+    /// At the start of a sentence.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Chaos => "A chaotic first population",
+            Self::Feedback => "The feedback factor",
+            Self::Crossover => "The crossover",
+            Self::Bees => "The bees' search",
+            Self::Parabolas => "Quadratic interpolation",
+        }
+    }
+
+    /// Evaluations of a mould in an iteration that it takes.
+    fn evaluations(self) -> usize {
+        match self {
+            Self::Chaos | Self::Feedback => 0,
+            Self::Crossover | Self::Bees | Self::Parabolas => 1,
+        }
+    }
 }
 
 /// Parameter μ of the Bernoulli map.
@@ -47,9 +101,17 @@ impl Isma {
     /// The numbers of Li, Xing and Qin (2025).
     #[must_use]
     pub fn set_up(setup: Setup) -> Self {
+        Self::without(setup, None)
+    }
+
+    /// The same without one of its additions, with more iterations for the same evaluations.
+    #[must_use]
+    pub fn without(setup: Setup, left_out: Option<Addition>) -> Self {
         let [crossover, mu, lambda] = Self::UNPRINTED;
-        let schedule = Gwo::PAPER_001.fitted(setup.evaluations, PER_MOULD * Gwo::PAPER_001.population);
-        Self { sma: Sma { schedule, ..Sma::set_up(setup) }, crossover, laplace: [mu, lambda] }
+        let crossover = if left_out == Some(Addition::Crossover) { 0.0 } else { crossover };
+        let per_mould = PER_MOULD - left_out.map_or(0, Addition::evaluations);
+        let schedule = Gwo::PAPER_001.fitted(setup.evaluations, per_mould * Gwo::PAPER_001.population);
+        Self { sma: Sma { schedule, ..Sma::set_up(setup) }, crossover, laplace: [mu, lambda], left_out }
     }
 }
 
@@ -74,18 +136,27 @@ impl Optimizer for Isma {
 
     fn search(&self, session: &mut Session) -> Result<(), End> {
         let Schedule { population, iterations } = self.sma.schedule;
-        let first = chaotic(session, population);
-        let mut moulds = session.weigh(first)?;
+        let has = |addition: Addition| self.left_out != Some(addition);
+        let mut moulds = if has(Addition::Chaos) {
+            let first = chaotic(session, population);
+            session.weigh(first)?
+        } else {
+            session.scatter(population)?
+        };
         for t in 1..=iterations {
             let moved = self.sma.pulse(session, &mut moulds, self.feedback(t));
             moulds = session.weigh(moved)?;
             self.cross(session, &mut moulds)?;
-            let bees = (0..moulds.len()).map(|i| bee(session, &moulds, i)).collect();
-            let bees = session.weigh(bees)?;
-            keep_better(&mut moulds, bees);
-            let vertices = moulds.iter().map(|_| self.vertex(session, &moulds)).collect();
-            let vertices = session.weigh(vertices)?;
-            keep_better(&mut moulds, vertices);
+            if has(Addition::Bees) {
+                let bees = (0..moulds.len()).map(|i| bee(session, &moulds, i)).collect();
+                let bees = session.weigh(bees)?;
+                keep_better(&mut moulds, bees);
+            }
+            if has(Addition::Parabolas) {
+                let vertices = moulds.iter().map(|_| self.vertex(session, &moulds)).collect();
+                let vertices = session.weigh(vertices)?;
+                keep_better(&mut moulds, vertices);
+            }
             session.iterated(costs(&moulds));
         }
         Ok(())
@@ -120,6 +191,7 @@ impl Isma {
         let share = if all > 1.0 { (all - t) / (all - 1.0) } else { 0.0 };
         let factor = (share.exp_m1() / 1.0_f64.exp_m1()).powi(FEEDBACK);
         let shrink = match self.sma.reading {
+            _ if self.left_out == Some(Addition::Feedback) => Shrink::Within(1.0 - t / all),
             Reading::Corrected => Shrink::Within(factor),
             Reading::Printed => Shrink::By(factor),
         };

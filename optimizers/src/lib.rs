@@ -40,7 +40,7 @@ pub use ga::Ga;
 pub use gwo::Gwo;
 pub use ibfoa::Ibfoa;
 pub use iepso::{Exchange, Iepso};
-pub use isma::Isma;
+pub use isma::{Addition, Isma};
 pub use iwo::Iwo;
 pub use problem::{Parallel, Problem, Refusal};
 pub use pso::{Constants, Pso};

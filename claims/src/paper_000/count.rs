@@ -2,6 +2,7 @@
 use super::contenders::GREEDY;
 use super::{Unit, case, ours, refused, ur5};
 use crate::claim::Claim;
+use crate::effect::{Claimed, Effect};
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
@@ -10,7 +11,7 @@ use crate::table::{Cell, Table};
 use taustream_optimizers::papers::control_point_count::{Chosen, Growth};
 use taustream_optimizers::{End, Parameters, Progress, Reading, Run};
 
-const RUNS: usize = 60;
+const RUNS: usize = 40;
 const QUICK_EVALUATIONS: usize = 40;
 /// Fixed numbers of control points; the paper's is 3.
 const FIXED: std::ops::RangeInclusive<usize> = 1..=6;
@@ -50,23 +51,24 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let evaluations = Summary::of(&scenes.iter().map(|s| s.chosen.evaluations as f64).collect::<Vec<_>>());
     let counts = Summary::of(&scenes.iter().map(|s| s.chosen.control_points as f64).collect::<Vec<_>>());
     table.row("criterion", row(Cell::Median(counts), &criterion, Cell::None, Cell::Mean(evaluations)));
-    let (mut never_worse, mut words) = (true, Vec::new());
+    let mut effects = Vec::new();
     for (i, count) in FIXED.enumerate() {
         let fixed: Vec<Brought> = scenes.iter().filter_map(|s| s.fixed.get(i).copied()).collect();
         let test = wilcoxon(&costs(&criterion), &costs(&fixed));
-        let worse = wilcoxon(&costs(&fixed), &costs(&criterion)).is_less();
-        never_worse &= !worse;
-        words.push(format!("M = {count}: {} less, {} more, p = {}", test.less, test.more, figures(test.p)));
+        let free = criterion.iter().zip(&fixed).filter(|((_, a), (_, b))| !a && !b);
+        let (ours, theirs): (Vec<f64>, Vec<f64>) = free.map(|((a, _), (b, _))| (*a, *b)).unzip();
+        let name = format!("M = {count}");
+        let effect = Effect::ratio((&name, &theirs), ("the criterion", &ours), f64::MIN_POSITIVE);
+        effects.push(effect.claimed(Claimed::Nothing));
         table.row(
             format!("fixed, M = {count}"),
             row(Cell::Number(count as f64), &fixed, Cell::Test(test), Cell::Mean(evaluations)),
         );
     }
     outcome.tables.push(table);
-    let rule =
-        "no fixed number from 1 to 6 is better by the signed-rank test at 5 %, at the same evaluations";
+    let rule = "no fixed number from 1 to 6 saves 1 % at the same evaluations, in scenes that both leave without collision";
     let says = "Section 6 asks for it: a criterion finds the best number of control points (ours: grow while it pays)";
-    outcome.claims.push(Claim::decided(says, rule, never_worse, words.join("; ")));
+    outcome.claims.push(Claim::tested(says, rule, effects));
     Ok(outcome)
 }
 

@@ -50,6 +50,17 @@ impl Course {
         before.or(self.states.first()).map_or(self.found.cost, |s| s.best)
     }
 
+    /// Population's best when a share of the iterations is done.
+    pub(super) fn after(&self, share: f64) -> Option<f64> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to the last index"
+        )]
+        let at = (share.clamp(0.0, 1.0) * self.states.len().saturating_sub(1) as f64).round() as usize;
+        self.states.get(at).map(|state| state.current)
+    }
+
     /// Iterations after which the population's best was worse than before.
     pub(super) fn rises(&self) -> usize {
         self.pairs().filter(|[before, after]| after > before).count()

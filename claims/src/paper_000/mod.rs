@@ -9,6 +9,7 @@ mod path;
 mod pictures;
 pub(crate) mod planners;
 pub(crate) mod profiles;
+mod verdicts;
 
 use crate::run_context::{RunContext, Stop};
 use std::fmt::Display;

@@ -2,11 +2,12 @@
 use super::{SEGMENT_S, refused};
 use crate::run_context::Stop;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
 use taustream_motion::profile::Profile;
+use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::cost::ControlPointCost;
 use taustream_optimizers::cost::{CostModel, PaperCost};
 use taustream_optimizers::papers::control_points::CONTROL_POINTS;
+use taustream_planner::dynamics::Dynamics;
 
 /// The clearance is found to this (m), from none to this.
 const CLEARANCE_M: [f64; 2] = [1e-4, 1.0];
@@ -109,6 +110,35 @@ impl TipPath {
             from_s += time_s;
         }
         points
+    }
+}
+
+impl TipPath {
+    /// Torques of the joints over time, and what every joint has to bear at most (Nm).
+    pub(super) fn torques(
+        &self,
+        robot: &Robot,
+        dynamics: &Dynamics<'_>,
+    ) -> (Vec<(f64, JointArray)>, JointArray) {
+        let joints = robot.joints.len();
+        let curves: Vec<[Vec<(f64, f64)>; 3]> =
+            (0..joints).map(|joint| [0, 1, 2].map(|order| self.curve(joint, order))).collect();
+        let count = curves.first().map_or(0, |c| c[0].len());
+        let mut highest = [0.0; MAX_JOINTS];
+        let mut over_time = Vec::with_capacity(count);
+        for i in 0..count {
+            let of = |order: usize| -> JointArray {
+                let value =
+                    |joint: usize| curves.get(joint).and_then(|c| c[order].get(i)).map_or(0.0, |p| p.1);
+                std::array::from_fn(value)
+            };
+            let torques = dynamics.torques_nm(&of(0), &of(1), &of(2));
+            for (highest, torque) in highest.iter_mut().zip(torques) {
+                *highest = f64::max(*highest, torque.abs());
+            }
+            over_time.push((curves.first().and_then(|c| c[0].get(i)).map_or(0.0, |p| p.0), torques));
+        }
+        (over_time, highest)
     }
 }
 

@@ -24,6 +24,9 @@ pub(super) fn views(robot: &Robot, scene: &Scene, paths: &[(&str, Vec<JointArray
         }
         for (name, corners) in paths {
             let tip = tip_path(robot, corners);
+            if let [first, .., last] = tip.as_slice() {
+                panel.ends((first[i], first[j]), (last[i], last[j]));
+            }
             panel.line(name, tip.into_iter().map(|p| (p[i], p[j])).collect());
         }
         panel

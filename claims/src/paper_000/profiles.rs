@@ -224,7 +224,7 @@ fn claims(distances: &[Construction]) -> Result<Vec<Claim>, Stop> {
         Construction::Through(..) => false,
     };
     Ok(vec![
-        Claim::decided(
+        Claim::exact(
             "Tau-J* has zero jerk at the start and at the end",
             "both are less than 1e-9 of its peak, at the paper's k = 0.1",
             both(star, true),
@@ -234,31 +234,31 @@ fn claims(distances: &[Construction]) -> Result<Vec<Claim>, Stop> {
                 if up_to { "requires" } else { "does not require" }
             ),
         ),
-        Claim::decided(
+        Claim::exact(
             "Tau-J has non-zero jerk at the start and at the end",
             "neither is less than 1e-9 of its peak",
             both(tau_j, false),
             shown(tau_j),
         ),
-        Claim::decided(
+        Claim::exact(
             "The quintic's jerk is not zero at start and end",
             "neither is less than 1e-9 of its peak",
             both(quintic, false),
             shown(quintic),
         ),
-        Claim::decided(
+        Claim::exact(
             "The cubic spline's acceleration is not zero at start and end",
             "neither is zero with either end condition",
             ends.iter().flatten().all(|a| a.abs() > 1e-6),
             format!("clamped {:?}, not-a-knot {:?} m/s²", ends[0].map(figures), ends[1].map(figures)),
         ),
-        Claim::decided(
+        Claim::exact(
             "Tau-J*, Tau-J and the quintic stop at every knot, the spline does not",
             "velocity and acceleration are zero at both ends of their segments; the spline's velocity at an inner knot is not",
             [star, tau_j, quintic].into_iter().all(rests) && spline.at(KNOTS[1].0)[1].abs() > 1e-6,
             format!("the clamped spline passes the second knot at {} m/s", figures(spline.at(KNOTS[1].0)[1])),
         ),
-        Claim::decided(
+        Claim::exact(
             "Tau-J* guides the more compliant motion",
             "its peak jerk on figure 1 is less than Tau-J's and the quintic's (at its ends it is: see above)",
             peak(star) < peak(tau_j) && peak(star) < peak(quintic),

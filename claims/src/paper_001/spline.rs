@@ -44,9 +44,30 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
         PIECE_S[1],
         0.5 * (PIECE_S[0] + PIECE_S[1])
     ));
+    outcome.claims.extend(table_4());
     rank_of_conditions(&mut outcome)?;
     times(run_context, &mut outcome)?;
     Ok(outcome)
+}
+
+/// What table 4 says of itself: an arm's joint turns by less than one revolution to a side.
+fn table_4() -> [Claim; 2] {
+    let farthest = NODES_DEGREES.iter().flatten().fold(0.0_f64, |m, q| m.max(q.abs()));
+    let first = NODES_DEGREES[0];
+    [
+        Claim::exact(
+            "Table 4's joint angles are radians, as its head says",
+            "none is beyond one revolution, 6.283",
+            farthest <= std::f64::consts::TAU,
+            format!("the farthest is {}: these are degrees", figures(farthest)),
+        ),
+        Claim::exact(
+            "Table 4's first node has six angles of its own",
+            "joint 6 does not repeat the digits of joint 1",
+            (first[5] - first[0]).abs() > 1e-9,
+            format!("joint 1 {}, joint 6 {}: a slip of copying", figures(first[0]), figures(first[5])),
+        ),
+    ]
 }
 
 /// How many independent rows a matrix has: elimination with the largest pivot there is, rows scaled to one.
@@ -92,7 +113,7 @@ fn rank_of_conditions(outcome: &mut Outcome) -> Result<(), Stop> {
     }
     outcome.tables.push(table);
     if let [(papers, numbers), (_, ours)] = is_enough.as_slice() {
-        outcome.claims.push(Claim::decided(
+        outcome.claims.push(Claim::exact(
             "Interpolation with velocity and acceleration at both ends determines the spline of degree seven",
             "as many independent equations as unknowns",
             *papers,
@@ -208,7 +229,7 @@ fn smooth(nodes: &[Vec<f64>], shown: &[(&str, Vec<f64>)]) -> Result<Claim, Stop>
             }
         }
     }
-    Ok(Claim::decided(
+    Ok(Claim::exact(
         "Velocity, acceleration and jerk have no sudden change",
         "at the joins of the spline with ISMA's times none of them jumps by more than 1e-6",
         largest <= 1e-6,

@@ -1,14 +1,14 @@
 //! Every scene and every method: who arrives, in how many steps, with how many virtual obstacles.
 use super::{Method, arrived, has_arrived, ours, pictures, scenes, virtuals};
-use crate::claim::Claim;
+use crate::claim::{Claim, Verdict};
+use crate::effect::Effect;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Summary, quantile};
+use crate::statistics::quantile;
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::planar::{Journey, Numbers};
 
-/// Printed numbers of virtual obstacles in the L and in the U.
-const VIRTUAL_L: f64 = 3.0;
+/// Printed number of virtual obstacles in the U.
 const VIRTUAL_U: f64 = 9.0;
 /// Printed times with a moving obstacle and with three (s).
 const TIME_MOVING_S: f64 = 11.86;
@@ -24,10 +24,6 @@ impl Visit {
     fn of(&self, method: Method) -> &[Journey] {
         let i = Method::ALL.iter().position(|w| *w == method);
         i.and_then(|i| self.journeys.get(i)).map_or(&[], Vec::as_slice)
-    }
-
-    fn share(&self, method: Method) -> String {
-        format!("{} {}/{}", method.name(), arrived(self.of(method)), self.of(method).len())
     }
 }
 
@@ -80,76 +76,76 @@ fn claims(visits: &[Visit]) -> Vec<Claim> {
     let named = |name: &str| visits.iter().find(|v| v.scene.name == name);
     let mut claims = Vec::new();
     let traps: Vec<&Visit> = ["l", "u", "wide-u"].into_iter().filter_map(named).collect();
-    let shares = |visits: &[&Visit], methods: &[Method]| {
-        let one = |v: &&Visit| {
-            format!(
-                "{}: {}",
-                v.scene.name,
-                methods.iter().map(|w| v.share(*w)).collect::<Vec<_>>().join(", ")
+    let lost = |v: &&Visit, method: Method| v.of(method).len() - arrived(v.of(method));
+    let never_lost = |method: Method| {
+        move |v: &&Visit| {
+            Effect::never(
+                &format!("{}: {} lost", v.scene.name, method.name()),
+                lost(v, method),
+                v.of(method).len(),
             )
-        };
-        visits.iter().map(one).collect::<Vec<_>>().join("; ")
+        }
     };
-    let all = |visits: &[&Visit], method: Method| {
-        visits.iter().all(|v| arrived(v.of(method)) == v.of(method).len())
+    let stuck = |v: &&Visit| {
+        let journeys = v.of(Method::Plain);
+        Effect::never(&format!("{}: BFO arrives", v.scene.name), arrived(journeys), journeys.len())
     };
-    let none = |visits: &[&Visit], method: Method| visits.iter().all(|v| arrived(v.of(method)) == 0);
-
-    claims.push(Claim::decided(
+    let out = traps.iter().map(never_lost(Method::Robust)).chain(traps.iter().map(stuck));
+    claims.push(Claim::tested(
         "RBF gets out of L and U traps and reaches the goal, BFO gets stuck in them",
-        "in the L and both U's every run of RBF (virtual obstacle at the trap) arrives and none of BFO",
-        all(&traps, Method::Robust) && none(&traps, Method::Plain),
-        shares(&traps, &[Method::Robust, Method::Plain]),
+        "in the L and both U's every run of RBF (virtual obstacle at the trap) arrives and none of BFO; one refutes it",
+        out.collect(),
     ));
-    claims.push(Claim::decided(
+    claims.push(Claim::tested(
         "The virtual obstacle of eq. 15 as printed, round T(j), frees the robot from L and U traps",
-        "every run of that reading arrives",
-        all(&traps, Method::RobustPrinted),
-        shares(&traps, &[Method::RobustPrinted]),
+        "every run of that reading arrives; one refutes it",
+        traps.iter().map(never_lost(Method::RobustPrinted)).collect(),
     ));
-    let discs: Vec<&Visit> = ["static", "moving", "three"].into_iter().filter_map(named).collect();
-    let touched = |v: &Visit| v.of(Method::Robust).iter().filter(|j| j.nearest_cm <= 0.0).count();
-    claims.push(Claim::decided(
-        "RBF reaches the goal past a static, a moving and three discs without touching them",
-        "every run arrives and keeps more than nothing between itself and the discs",
-        all(&discs, Method::Robust) && discs.iter().all(|v| touched(v) == 0),
-        format!(
-            "{}; touched in {} runs",
-            shares(&discs, &[Method::Robust]),
-            discs.iter().map(|v| format!("{} ({})", touched(v), v.scene.name)).collect::<Vec<_>>().join(", ")
-        ),
+    let discs: Vec<&Visit> = ["static", "three"].into_iter().filter_map(named).collect();
+    let touched = |v: &&Visit| {
+        let journeys = v.of(Method::Robust);
+        let missed = journeys.iter().filter(|j| j.nearest_cm <= 0.0 || !has_arrived(j)).count();
+        Effect::never(&format!("{}: touched or lost", v.scene.name), missed, journeys.len())
+    };
+    claims.push(Claim::tested(
+        "RBF reaches the goal past one and three discs that stand still without touching them",
+        "every run arrives and keeps more than nothing between itself and the discs; one refutes it",
+        discs.iter().map(touched).collect(),
     ));
-    let in_line: Vec<&Visit> = named("static").into_iter().collect();
-    claims.push(Claim::decided(
-        "An obstacle straight ahead traps the potential field, and not the bacteria",
-        "with the disc's centre on the straight way the field does not arrive and every run of BFO does",
-        none(&in_line, Method::Field) && all(&in_line, Method::Plain),
-        shares(&in_line, &[Method::Field, Method::Plain]),
-    ));
-    let two: Vec<&Visit> = named("two-discs").into_iter().collect();
-    let trapped = two.iter().flat_map(|v| v.of(Method::Robust)).filter(|j| !j.virtuals.is_empty()).count();
-    claims.push(Claim::decided(
-        "Two discs beside each other are a local minimum that RBF leaves with a virtual obstacle",
-        "some run of RBF makes a virtual obstacle there (the discs' radii are not printed)",
-        trapped > 0,
-        format!("{trapped} runs did; {}", shares(&two, &[Method::Plain, Method::Robust, Method::Field])),
-    ));
-    claims.push(count(named("l"), "L", VIRTUAL_L));
-    claims.push(count(named("u"), "U", VIRTUAL_U));
+    claims.extend(on_the_line(named("disc on the line"), named("disc 1e-12 cm off the line")));
     claims.push(time(named("moving"), "a moving obstacle", TIME_MOVING_S));
     claims.push(time(named("three"), "three obstacles", TIME_THREE_S));
     claims.extend(limits(named("closed room"), named("start in a trap")));
     claims
 }
 
-/// The number of virtual obstacles: the sizes are not printed, so that only the order of magnitude can be compared.
-fn count(visit: Option<&Visit>, shape: &str, printed: f64) -> Claim {
-    let made = Summary::of(&virtuals(visit.map_or(&[], |v| v.of(Method::Robust))));
-    Claim::decided(
-        &format!("The {shape} takes {printed} virtual obstacles"),
-        "the printed number lies between the least and the most of our runs (the sizes are ours)",
-        made.least <= printed && printed <= made.most,
-        format!("least {}, median {}, most {}", made.least, made.median, made.most),
+/// The line through start and goal exactly through the disc's centre, where the field's push has no side; and a hair off it.
+fn on_the_line(on: Option<&Visit>, off: Option<&Visit>) -> Option<Claim> {
+    let (on, off) = (on?, off?);
+    let bfo = |v: &Visit| {
+        let journeys = v.of(Method::Plain);
+        Effect::never(
+            &format!("{}: BFO lost", v.scene.name),
+            journeys.len() - arrived(journeys),
+            journeys.len(),
+        )
+    };
+    let effects = vec![bfo(on)];
+    let field = if arrived(on.of(Method::Field)) == 0 { Verdict::Holds } else { Verdict::DoesNotHold };
+    let verdict = Verdict::all(effects.iter().map(Effect::verdict).chain([field]));
+    let word = |v: &Visit| if arrived(v.of(Method::Field)) == 0 { "is stuck" } else { "arrives" };
+    Some(
+        Claim::weighed(
+            "An obstacle straight ahead traps the potential field, and not the bacteria",
+            "with the disc's centre exactly on the straight way the field does not arrive and every run of BFO does",
+            verdict,
+            effects,
+        )
+        .beside(format!(
+            "on the line the field {}; 1e-12 cm off it the field {}: no robot stands so exactly",
+            word(on),
+            word(off)
+        )),
     )
 }
 
@@ -168,23 +164,21 @@ fn time(visit: Option<&Visit>, what: &str, printed_s: f64) -> Claim {
 fn limits(room: Option<&Visit>, trap: Option<&Visit>) -> [Claim; 2] {
     let journeys = |v: Option<&Visit>| v.map_or(Vec::new(), |v| v.of(Method::Robust).to_vec());
     let (room, trap) = (journeys(room), journeys(trap));
-    let made = Summary::of(&virtuals(&room));
+    let made = virtuals(&room);
     let freed = arrived(&trap);
     [
-        Claim::decided(
+        Claim::tested(
             "In a closed room virtual obstacles are made without end",
-            "no run arrives, and the median run makes more than the nine of the U",
-            arrived(&room) == 0 && made.median > VIRTUAL_U,
-            format!(
-                "{} virtual obstacles in the median run, {} at most (we cap them)",
-                made.median, made.most
-            ),
+            "no run arrives, and the median run makes more than the nine of the U (we cap them)",
+            vec![
+                Effect::never("closed room: RBF arrives", arrived(&room), room.len()),
+                Effect::above(("virtual obstacles", &made), VIRTUAL_U, "obstacles"),
+            ],
         ),
-        Claim::decided(
+        Claim::tested(
             "A robot that starts in a trap has no trace to go back along and stays",
-            "no run arrives",
-            freed == 0,
-            format!("{freed} of {} runs arrived (ours goes back to its start and on from there)", trap.len()),
+            "no run arrives; one refutes it (ours goes back to its start and on from there)",
+            vec![Effect::never("start in a trap: RBF arrives", freed, trap.len())],
         ),
     ]
 }

@@ -2,6 +2,7 @@
 pub(crate) mod journeys;
 mod pictures;
 pub(crate) mod robots;
+pub(crate) mod sweep;
 
 use crate::run_context::{RunContext, Stop};
 use taustream_optimizers::Reading;
@@ -56,9 +57,31 @@ impl Method {
         scene: &PlanarScene,
         shared: bool,
     ) -> Result<Vec<Journey>, Stop> {
-        let runs = if self == Self::Field { 1 } else { run_context.runs(RUNS, QUICK) };
         let steps_max = run_context.choose(STEPS_MAX, STEPS_QUICK);
-        let numbers = Numbers { steps_max, reading: self.reading(), ..Numbers::OURS };
+        let numbers = Numbers { steps_max, ..Numbers::OURS };
+        self.drive(run_context, (scene, shared), numbers, run_context.runs(RUNS, QUICK))
+    }
+
+    /// The same with other numbers; robots share their virtual obstacles.
+    fn journeys_with(
+        self,
+        run_context: &RunContext,
+        scene: &PlanarScene,
+        numbers: Numbers,
+        runs: usize,
+    ) -> Result<Vec<Journey>, Stop> {
+        self.drive(run_context, (scene, true), numbers, runs)
+    }
+
+    fn drive(
+        self,
+        run_context: &RunContext,
+        (scene, shared): (&PlanarScene, bool),
+        numbers: Numbers,
+        runs: usize,
+    ) -> Result<Vec<Journey>, Stop> {
+        let runs = if self == Self::Field { 1 } else { runs };
+        let numbers = Numbers { reading: self.reading(), ..numbers };
         let go = |seed| Ok(drive(scene, &PlanarDrive { rule: self.rule(), numbers, shared, seed })?);
         run_context.each(runs, |run| go(run_context.seed(run)))
     }
@@ -85,6 +108,13 @@ fn scenes() -> Vec<PlanarScene> {
         obstacles: vec![Obstacle::walls(corners)],
     };
     let mut scenes = PlanarScene::paper_002();
+    let on_the_line = |name, off_cm| PlanarScene {
+        name,
+        robots: vec![[[off_cm, -90.0], [0.0, 90.0]]],
+        obstacles: vec![Obstacle::disc([0.0, 0.0], 9.5)],
+    };
+    scenes.push(on_the_line("disc on the line", 0.0));
+    scenes.push(on_the_line("disc 1e-12 cm off the line", 1e-12));
     scenes.push(alone("start in a trap", [0.0, 0.0], &cup));
     scenes.push(alone("closed room", [0.0, 0.0], &room));
     scenes

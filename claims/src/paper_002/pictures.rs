@@ -10,12 +10,35 @@ use taustream_optimizers::papers::planar::{Journey, Obstacle, PlanarShape};
 const CORNERS: u32 = 48;
 /// Radius at which a virtual obstacle is drawn (cm).
 const VIRTUAL_CM: f64 = 2.0;
+/// Scenes of figure 8, and steps that it shows.
+const TRAPS: [&str; 3] = ["l", "u", "wide-u"];
+const STEPS_SHOWN: usize = 1_200;
 
 /// A picture with a panel for each scene: the first run of each method.
 pub(super) fn figures(visits: &[Visit]) -> Vec<Figure> {
     let panels: Vec<Panel> = visits.iter().map(panel).collect();
     let title = "Paper 002: first run of each way; purple: virtual obstacles of RBF";
-    vec![Figure::of("002-scenes.svg", title, 2, &panels)]
+    let distance: Vec<Panel> =
+        visits.iter().filter(|v| TRAPS.contains(&v.scene.name)).map(distance).collect();
+    let title_8 = "Paper 002, figure 8: distance to the goal, first run of each way";
+    vec![
+        Figure::of("002-scenes.svg", title, 2, &panels),
+        Figure::of("002-distance.svg", title_8, 2, &distance),
+    ]
+}
+
+/// How far a robot is from its goal after every step: virtual obstacles show as spikes.
+fn distance(visit: &Visit) -> Panel {
+    let mut panel = Panel::new(&format!("{}: steps", visit.scene.name), "distance to the goal (cm)");
+    let goal = visit.scene.robots.first().map_or([0.0; 2], |[_, goal]| *goal);
+    for (method, journeys) in Method::ALL.iter().zip(&visit.journeys) {
+        let path = journeys.first().and_then(|j| j.paths_cm.first()).map_or(&[][..], Vec::as_slice);
+        // A robot that is stuck stays where it is.
+        let points = path.iter().take(STEPS_SHOWN).enumerate();
+        let away = |(i, p): (usize, &[f64; 2])| (i as f64, (p[0] - goal[0]).hypot(p[1] - goal[1]));
+        panel.line(method.name(), points.map(away).collect());
+    }
+    panel
 }
 
 fn panel(visit: &Visit) -> Panel {
@@ -23,6 +46,9 @@ fn panel(visit: &Visit) -> Panel {
     panel.is_map = true;
     for obstacle in &visit.scene.obstacles {
         outline(&mut panel, obstacle);
+    }
+    for [start, goal] in &visit.scene.robots {
+        panel.ends((start[0], start[1]), (goal[0], goal[1]));
     }
     for (method, journeys) in Method::ALL.iter().zip(&visit.journeys) {
         if let Some(journey) = journeys.first() {

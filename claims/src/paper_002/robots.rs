@@ -1,11 +1,12 @@
 //! Four robots: whether the escape is needed, and what sharing virtual obstacles saves.
-use super::{Method, arrived, has_arrived, ours, virtuals};
+use super::{Method, arrived, ours, virtuals};
 use crate::claim::Claim;
+use crate::effect::Effect;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Paired, Summary, wilcoxon};
+use crate::statistics::Summary;
 use crate::table::{Cell, Table};
-use taustream_optimizers::papers::planar::{Journey, Numbers, PlanarScene};
+use taustream_optimizers::papers::planar::{Journey, PlanarScene};
 
 /// Printed: robots that plain BFO leaves behind.
 const STUCK: usize = 3;
@@ -83,36 +84,29 @@ fn distance_cm(journey: &Journey) -> f64 {
 }
 
 fn left_behind(plain: &[Journey], robust: &[Journey]) -> Claim {
-    let stuck: Vec<f64> = plain.iter().map(|j| j.arrived.iter().filter(|a| !**a).count() as f64).collect();
-    let median = Summary::of(&stuck).median;
-    Claim::decided(
+    let behind = |j: &Journey| j.arrived.iter().filter(|a| !**a).count();
+    let others = plain.iter().filter(|j| behind(j) != STUCK).count();
+    Claim::tested(
         "Of four robots plain BFO leaves three behind, RBF brings all to their goals",
-        "the median run of BFO leaves three behind and every run of RBF none (the scene is ours)",
-        (median - STUCK as f64).abs() < 0.5 && robust.iter().all(has_arrived),
-        format!(
-            "BFO leaves {median} behind; RBF: {} of {} runs with all there",
-            arrived(robust),
-            robust.len()
-        ),
+        "every run of BFO leaves three behind and every run of RBF none (the scene is ours); one refutes it",
+        vec![
+            Effect::never("BFO leaves more or fewer than three", others, plain.len()),
+            Effect::never("RBF leaves one", robust.len() - arrived(robust), robust.len()),
+        ],
     )
 }
 
 /// Whether sharing saves time: steps of the slowest robot, pair by pair; one that did not arrive took all its steps.
 fn sharing(scene: &str, shared: &[Journey], alone: &[Journey]) -> Claim {
-    let figures = |journeys: &[Journey]| -> Vec<f64> { journeys.iter().map(distance_cm).collect() };
-    let steps = |journeys: &[Journey]| -> Vec<f64> { journeys.iter().map(|j| j.steps as f64).collect() };
-    let [method, slowest] =
-        [figures, steps].map(|f: fn(&[Journey]) -> Vec<f64>| wilcoxon(&f(shared), &f(alone)));
-    let text = |p: Paired| format!("{} less, {} more, p = {}", p.less, p.more, crate::figures(p.p));
-    Claim::decided(
+    let compare = |figure: fn(&Journey) -> f64, what: &str| {
+        let [ours, theirs] = [shared, alone].map(|j| j.iter().map(figure).collect::<Vec<f64>>());
+        let name = format!("{what} with sharing");
+        Effect::ratio((&name, &ours), ("without", &theirs), f64::MIN_POSITIVE)
+    };
+    Claim::tested(
         &format!("Sharing virtual obstacles among the robots saves time and way ({scene})"),
-        "steps of the slowest robot and the way of all are less with sharing, by the signed-rank test at 5 %",
-        method.is_less() && slowest.is_less(),
-        format!(
-            "way: {}; steps of the slowest: {} (steps of {} cm)",
-            text(method),
-            text(slowest),
-            Numbers::OURS.step_cm
-        ),
+        "steps of the slowest robot and the way of all are less with sharing: above 0 (holds), below 1 % (does not hold), or neither",
+        vec![compare(distance_cm, "way"), compare(|j| j.steps as f64, "steps of the slowest")],
     )
+    .beside(format!("all arrive in {} of {} runs with sharing, {} without", arrived(shared), shared.len(), arrived(alone)))
 }

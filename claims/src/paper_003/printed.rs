@@ -94,13 +94,13 @@ pub(crate) fn run(_run_context: &RunContext) -> Result<Outcome, Stop> {
             );
         }
     }
-    outcome.claims.push(Claim::decided(
+    outcome.claims.push(Claim::exact(
         "Table 5's angles bring the tip to the target, within the printed errors",
         "forward kinematics: no row misses by more than its printed error and the rounding of its angles",
         missing.is_empty(),
         format!("missing: {}", missing.join(", ")),
     ));
-    outcome.claims.push(Claim::decided(
+    outcome.claims.push(Claim::exact(
         "Table 5's costs F belong to its angles and errors",
         "within the threshold F is R + S to 0.05; beyond it F lies between R + K/e^5 and R + K, whatever e_max is",
         impossible.is_empty(),
@@ -108,6 +108,7 @@ pub(crate) fn run(_run_context: &RunContext) -> Result<Outcome, Stop> {
     ));
     outcome.claims.push(errors_in_the_text());
     outcome.claims.push(distances(&task));
+    outcome.claims.extend([swept(&task), linear()]);
     outcome.tables.push(table);
     Ok(outcome)
 }
@@ -140,7 +141,7 @@ fn errors_in_the_text() -> Claim {
         away.then(|| format!("{name}: {} in table 5, {} in the text", figures(row.error_mm), figures(*text)))
     };
     let differing: Vec<String> = IN_THE_TEXT_MM.iter().filter_map(differs).collect();
-    Claim::decided(
+    Claim::exact(
         "The errors of GA and DE are those of table 5",
         "table and text print the same numbers",
         differing.is_empty(),
@@ -148,11 +149,51 @@ fn errors_in_the_text() -> Claim {
     )
 }
 
+/// Eq. 12 and 13: the angles of joints 2 to 4 add up to the angle between the upright axis and the target's direction.
+fn swept(task: &Reach) -> Claim {
+    let [x, y, z] = task.target_m;
+    let wanted = (z / (x * x + y * y + z * z).sqrt()).acos().to_degrees();
+    let sums = TABLE_5.iter().map(|row| (row.name, row.angles_rad[1..].iter().sum::<f64>().to_degrees()));
+    let sums: Vec<(&str, f64)> = sums.collect();
+    // Three angles, each off by half a digit.
+    let rounding = (3.0 * ROUNDING_RAD).to_degrees();
+    let text: Vec<String> = sums.iter().map(|(name, sum)| format!("{name} {}", figures(*sum))).collect();
+    Claim::exact(
+        "The angles of table 5 keep the constraint of eq. 12 and 13",
+        "θ2 + θ3 + θ4 is the angle between the upright axis and the target, but for rounding, in every row",
+        sums.iter().all(|(_, sum)| (sum - wanted).abs() <= rounding),
+        format!(
+            "{} degrees asked for; {}; for this arm eq. 12 alone is the definition of the tool's angle, and keeps nothing",
+            figures(wanted),
+            text.join(", ")
+        ),
+    )
+}
+
+/// Table 2's linear function is printed without brackets.
+fn linear() -> Claim {
+    let (a, b) = (0.2, 1.0);
+    let printed = |x: f64| x - a / b - a;
+    let meant = |x: f64| (x - a) / (b - a);
+    Claim::exact(
+        "Table 2's linear function rises from 0 at a to 1 at b",
+        "as printed, x - a/b - a, for a = 0.2 and b = 1",
+        printed(a).abs() < 1e-12 && (printed(b) - 1.0).abs() < 1e-12,
+        format!(
+            "from {} to {}; with brackets from {} to {}; neither table 2 nor the 24 rules of table 1 stand in eq. 15 to 17",
+            figures(printed(a)),
+            figures(printed(b)),
+            figures(meant(a)),
+            figures(meant(b))
+        ),
+    )
+}
+
 fn distances(task: &Reach) -> Claim {
     let from_base = |p: [f64; 3]| 1e3 * p.iter().map(|x| x * x).sum::<f64>().sqrt();
     let ours = [from_base(task.target_m), from_base((task.position_m)(&[0.0; 4]))];
     let is_same = ours.iter().zip(DISTANCES_MM).all(|(a, b)| (a - b).abs() <= 0.5);
-    Claim::decided(
+    Claim::exact(
         "Target and start are 301 and 337 mm from the base (table 4, for the constraint of eq. 14)",
         "the distances of the printed coordinates and of the upright pose agree to half a millimetre",
         is_same,

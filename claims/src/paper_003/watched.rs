@@ -27,6 +27,8 @@ pub(super) struct Reaching {
     pub(super) generation: f64,
     /// Cost and error (mm) of the best point so far, after every generation from 0.
     pub(super) best: Vec<[f64; 2]>,
+    /// Angles of that point.
+    pub(super) angles_rad: Vec<[f64; 4]>,
 }
 
 /// A method and the evaluations of one of its generations.
@@ -43,6 +45,8 @@ struct Watched<'a> {
     first: Cell<Option<usize>>,
     least: Cell<[f64; 2]>,
     best: RefCell<Vec<[f64; 2]>>,
+    least_rad: Cell<[f64; 4]>,
+    angles_rad: RefCell<Vec<[f64; 4]>>,
 }
 
 impl Problem for Watched<'_> {
@@ -64,9 +68,11 @@ impl Problem for Watched<'_> {
         }
         if cost < self.least.get()[0] {
             self.least.set([cost, 1e3 * error_m]);
+            self.least_rad.set(std::array::from_fn(|j| x.get(j).copied().unwrap_or(0.0)));
         }
         if evaluations.is_multiple_of(self.per_generation) {
             self.best.borrow_mut().push(self.least.get());
+            self.angles_rad.borrow_mut().push(self.least_rad.get());
         }
         cost
     }
@@ -88,10 +94,13 @@ pub(super) fn reach(
         first: Cell::new(None),
         least: Cell::new([f64::INFINITY; 2]),
         best: RefCell::default(),
+        least_rad: Cell::new([0.0; 4]),
+        angles_rad: RefCell::default(),
     };
     let trial = minimise(run_context, contender.optimizer.as_ref(), &problem, run_context.seed(run), budget)?;
     let generation =
         problem.first.get().map_or(f64::INFINITY, |first| (first / problem.per_generation) as f64);
     let error_mm = 1e3 * task.error_m(&trial.found.x);
-    Ok(Reaching { trial, error_mm, generation, best: problem.best.take() })
+    let (best, angles_rad) = (problem.best.take(), problem.angles_rad.take());
+    Ok(Reaching { trial, error_mm, generation, best, angles_rad })
 }

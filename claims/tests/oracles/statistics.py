@@ -18,3 +18,16 @@ print("mann-whitney apart", stats.mannwhitneyu([1.0, 2, 3], [4.0, 5, 6], method=
 print("welch", stats.ttest_ind_from_stats(28.9127, 0.0230, 30, 27.9115, 0.89, 12, equal_var=False).pvalue)
 print("welch paper 000", stats.ttest_ind_from_stats(1.96e4, 1.04e4, 300, 2.08e4, 1.12e4, 300, equal_var=False).pvalue)
 print("quartiles", np.quantile(A, [0.25, 0.5, 0.75]), "sd", np.std(A, ddof=1), "mean", np.mean(A))
+
+differences = np.array(A) - np.array(B)
+means = sorted((differences[i] + differences[j]) / 2 for i in range(12) for j in range(i, 12))
+outer = int(12 * 13 / 4 - stats.norm.ppf(0.975) * np.sqrt(12 * 13 * 25 / 24))
+print("shift", np.median(means), means[outer], means[-1 - outer])
+for count, of in [(0, 30), (52, 100)]:
+    print("share", count, of, stats.binomtest(count, of).proportion_ci(method="wilson"))
+for name, sample in [("A", A), ("LONG_A", LONG_A)]:
+    print("median", name, np.median(sample), stats.quantile_test(sample, q=0.5, p=0.5).confidence_interval())
+away_a, away_b = [np.abs(np.array(x) - np.median(x)) for x in (A, B)]
+test = stats.ttest_ind(away_a, away_b, equal_var=False)
+ends = [end / away_b.mean() for end in test.confidence_interval()]
+print("spread", away_a.mean() / away_b.mean() - 1, ends, test.pvalue)

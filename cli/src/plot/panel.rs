@@ -4,10 +4,9 @@ use plotters::prelude::RGBColor;
 use std::path::Path;
 use taustream_arm::RobotJoint;
 use taustream_claims::chart::{Area, COLOURS, Curve, Drawn, LimitLine, Panel, draw_panel};
-use taustream_motion::MAX_JOINTS;
 
 /// One colour a joint.
-pub(super) const JOINT_COLOURS: [RGBColor; MAX_JOINTS] = COLOURS;
+pub(super) const JOINT_COLOURS: [RGBColor; COLOURS.len()] = COLOURS;
 /// Title of each panel, and its quantity's order of derivation.
 pub(super) const PANELS: [&str; 4] =
     ["position (rad)", "velocity (rad/s)", "acceleration (rad/s^2)", "jerk (rad/s^3)"];
