@@ -383,11 +383,11 @@ fn read_limits(element: &Element<'_, '_, '_>) -> Option<StatedLimits> {
     let read = |attribute: &str, bounds: &Bounds| {
         if limit.has(attribute) { limit.number(attribute, bounds).map(Some) } else { Some(None) }
     };
+    let effort = read("effort", &EFFORT);
     let velocity = read("velocity", &VELOCITY);
     let acceleration = read("acceleration", &ACCELERATION);
     let deceleration = read("deceleration", &ACCELERATION);
     let jerk = read("jerk", &JERK);
-    let effort = read("effort", &EFFORT);
     let slower = match (acceleration?, deceleration?) {
         (Some(up), Some(down)) => Some(up.min(down)),
         (up, down) => up.or(down),
