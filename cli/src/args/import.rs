@@ -1,4 +1,5 @@
 //! Arguments of `taustream import`.
+use super::via::BlendArgs;
 use crate::angles::{Angles, Times};
 use clap::{ArgGroup, Args};
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ Examples:
   taustream import --via \"0,-1.57,1.57,-1.57,-1.57,0\" --via \"0.5,-1.4,1.5,-1.6,-1.5,0.2\" \\
       --profile quintic --durations 1.5 --robot ur5 --scene open -o move.json
   taustream import --via .. --via .. --profile tau-j-star --k 1/8 ...     written as strokes without approximation
+  taustream import --via .. --via .. --via .. --blend-rad 0.1 ...         straight lines, corners rounded as by `plan --via`
   taustream import --path eight_points --timed-by isma --seed 1 --robot ur5 --scene open -o move.json
 
 The first line of a table names its columns: t_s, then q1_rad, q2_rad, .. as `sample` writes them; other columns are
@@ -41,7 +43,10 @@ pub(crate) struct ImportArgs {
     /// Scene: a path, or the name of a shipped scene.
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: PathBuf,
-    /// Profile through the points; without it that of the path file.
+    /// How far from the points.
+    #[command(flatten)]
+    pub(crate) blend: BlendArgs,
+    /// Profile through the points; without it that of the path file, or trains of strokes as `plan --via` makes them.
     #[arg(long, value_name = "NAME", conflicts_with = "table", value_parser = clap::builder::PossibleValuesParser::new(ViaProfile::NAMES))]
     pub(crate) profile: Option<String>,
     /// k of tau-j and tau-j-star, below 1/3: a number, or a fraction such as 1/8. Without it 1/10.

@@ -33,6 +33,11 @@ pub(crate) struct ViaArgs {
 }
 
 impl BlendArgs {
+    /// True when one of the options was given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.blend_rad.is_some() || self.blend_m.is_some()
+    }
+
     /// How far from its corners the motion may pass.
     pub(crate) fn blend(&self) -> Blend {
         let in_metres = self.blend_m.map(Blend::Metres);

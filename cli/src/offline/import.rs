@@ -13,8 +13,8 @@ use taustream_arm::{MotionTable, Robot, Scene, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_optimizers::papers::spline_time::SplineCost;
 use taustream_planner::import::{
-    ImportError, Imported, Reference, TimedBy, Via, ViaProfile, fitted_durations_s, import, import_strokes,
-    optimised_durations_s, poses_of,
+    ImportError, Imported, Reference, TimedBy, Via, ViaProfile, fitted_durations_s, import, import_path,
+    import_strokes, optimised_durations_s, poses_of,
 };
 
 /// Speeds at the ends of a table that are worth a word (rad/s).
@@ -136,12 +136,6 @@ fn from_table(
 
 fn from_points(args: &ImportArgs, robot: &Robot, scene: &Scene) -> Result<(Imported, Source), Failure> {
     let path = args.path.as_deref().map(arm::path).transpose()?;
-    let by_file = path.as_ref().and_then(|path| path.profile.clone());
-    let Some(name) = args.profile.clone().or(by_file) else {
-        let names = ViaProfile::NAMES.join(", ");
-        return Err(Failure::Usage(format!("points need a --profile to be moved through with: {names}")));
-    };
-    let profile = ViaProfile::from_name(&name, args.k).map_err(|e| Failure::Usage(e.to_string()))?;
     let points_rad: Vec<JointArray> = match &path {
         Some(path) => poses_of(robot, path).map_err(|e| refused(&e))?,
         None => args.via.iter().map(|angles| angles.pose_of(robot, "--via")).collect::<Result<_, _>>()?,
@@ -151,6 +145,24 @@ fn from_points(args: &ImportArgs, robot: &Robot, scene: &Scene) -> Result<(Impor
         let why = "one --via is no motion; give it once for each of two or more points";
         return Err(Failure::Usage(why.to_owned()));
     }
+    let by_file = path.as_ref().and_then(|path| path.profile.clone()).filter(|_| !args.blend.is_given());
+    let Some(name) = args.profile.clone().or(by_file) else {
+        let of_profiles = args.k.is_some() || args.durations.is_some() || args.timed_by.is_some();
+        if of_profiles {
+            let names = ViaProfile::NAMES.join(", ");
+            return Err(Failure::Usage(format!(
+                "--k, --durations and --timed-by are for a --profile: {names}; without one the points are timed by the limits"
+            )));
+        }
+        let imported = import_path((robot, scene), &points_rad, args.blend.blend());
+        let words = format!("{} along straight lines", counted(points_rad.len(), "point"));
+        return Ok((imported.map_err(|e| refused(&e))?, Source { words, notes: Vec::new() }));
+    };
+    if args.blend.is_given() {
+        let why = "a blend rounds straight lines; a --profile has its own way through the points";
+        return Err(Failure::Usage(why.to_owned()));
+    }
+    let profile = ViaProfile::from_name(&name, args.k).map_err(|e| Failure::Usage(e.to_string()))?;
     let (durations_s, notes) = durations(args, profile, &points_rad, robot)?;
     let via = Via { points_rad: &points_rad, joints, profile, durations_s: &durations_s };
     let imported = if let Some(n) = profile.stroke_n() {
@@ -230,7 +242,7 @@ fn summarise(robot: &Robot, imported: &Imported, source: Source, args: &ImportAr
         digest: robot.digest_hex(),
         file: args.output.as_ref().map(|p| p.display().to_string()),
         source: source.words,
-        exact: imported.kernel.is_none(),
+        exact: imported.kernel.is_none() && deviation.rad == 0.0,
         original_s: imported.original_s,
         duration_s: imported.proof.duration_s,
         time_added_s: imported.proof.duration_s - imported.original_s,

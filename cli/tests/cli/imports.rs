@@ -49,14 +49,16 @@ fn what_is_no_motion_for_the_arm_is_refused_and_nothing_is_written() {
     scratch.write("two.csv", "t_s,q1_rad,q2_rad\n0,0,0\n1,1,1\n");
     scratch.write("back.csv", "t_s,q1_rad\n1,0\n0,1\n");
     let before = scratch.files();
-    let cases: [(&str, i32, &[&str]); 12] = [
+    let cases: [(&str, i32, &[&str]); 14] = [
         ("import", 2, &["--via"]),
         ("import none.csv", 2, &["none.csv", "no such file"]),
         ("import jump.csv", 1, &["joint 1 (shoulder_pan)", "jumps by 1.0000 rad", "t = 0.010 s"]),
         ("import two.csv", 2, &["2 joints, the robot has 6"]),
         ("import back.csv", 2, &["back.csv:3", "t_s = 0"]),
         ("import jump.csv --tolerance-rad 0", 2, &["--tolerance-rad", "1e-9"]),
-        ("import --via HOME --via THERE", 2, &["--profile", "quintic"]),
+        ("import --via HOME --via THERE --k 0.1", 2, &["--profile", "quintic"]),
+        ("import --via HOME --via THERE --profile quintic --blend-rad 0.1", 2, &["blend", "--profile"]),
+        ("import --via HOME --via 9,9,9,9,9,9 --blend-rad 0.1", 1, &["goal", "outside"]),
         ("import --via HOME --profile quintic", 2, &["one --via"]),
         ("import --via HOME --via HOME --profile quintic", 1, &["nothing moves"]),
         ("import --via HOME --via THERE --profile tau-j --k 0.5", 2, &["0.5", "below 1/3"]),
@@ -68,4 +70,31 @@ fn what_is_no_motion_for_the_arm_is_refused_and_nothing_is_written() {
         scratch.run(&words_of(&line)).refused(code, expected);
         assert_eq!(scratch.files(), before, "`{line}` left files behind");
     }
+}
+
+/// Goal: points without a profile become the motion that `plan --via` makes of them: corners rounded within the blend, or a stop
+/// at each.
+#[test]
+fn points_without_a_profile_are_timed_and_rounded_as_by_plan() {
+    let scratch = Scratch::new();
+    let via = "--via HOME --via 0.4,-1.2,1.5,-1.57,-1.57,0.3 --via THERE";
+    let mut durations_s = Vec::new();
+    for blend in ["--blend-rad 0.1", "--blend-rad 0"] {
+        let line = format!("import {via} {blend} --robot ur5 --scene open -o a.json --json");
+        let summary = scratch.run(&words_of(&line)).json();
+        let off_rad = summary["deviation_rad"].as_f64().unwrap();
+        assert!(
+            if blend.ends_with('0') { off_rad == 0.0 } else { off_rad > 0.0 && off_rad <= 0.1 },
+            "{summary}"
+        );
+        durations_s.push(summary["duration_s"].as_f64().unwrap());
+        scratch.run(&words_of("verify --robot ur5 --scene open --trajectory a.json")).done();
+    }
+    assert!(durations_s[0] < 0.95 * durations_s[1], "{durations_s:?}");
+    let line = "plan --robot ur5 --scene open --start HOME --via 0.4,-1.2,1.5,-1.57,-1.57,0.3 --goal THERE --blend-rad 0.1 --json";
+    let planned_s = scratch.run(&words_of(line)).json()["duration_s"].as_f64().unwrap();
+    assert!(
+        (planned_s - durations_s[0]).abs() < 0.05 * planned_s,
+        "{planned_s} s planned, {durations_s:?} s imported"
+    );
 }

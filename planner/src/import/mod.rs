@@ -5,16 +5,19 @@
 //! whose 1/k is a whole number is written down as it is.
 mod deviation;
 mod fit;
+mod path;
 mod places;
 mod profiles;
 mod reference;
 mod rows;
 
 pub use deviation::Deviation;
+pub use path::import_path;
 pub use places::{TimedBy, optimised_durations_s, poses_of};
 pub use profiles::{K_DEFAULT, ProfileError, ViaProfile};
 pub use reference::{Reference, Via, fitted_durations_s};
 
+use crate::plan::PlanError;
 use crate::timing::{SLACK, scale_to_fit};
 use crate::verify::{Proof, Violation, verify};
 use fit::{Candidate, candidates, scaled};
@@ -113,6 +116,9 @@ pub enum ImportError {
         /// The distance that is left.
         off_m: f64,
     },
+    /// A point that the arm cannot be at.
+    #[error(transparent)]
+    Point(#[from] PlanError),
     /// An optimiser that does not start.
     #[error("{why}")]
     Optimiser {

@@ -28,7 +28,8 @@ const MARGIN: f64 = 0.998;
 /// Share of the limits that no checked instant exceeds. The difference to 1 covers what lies between them.
 const CEILING: f64 = 0.9997;
 /// Durations that are tried, over the least one.
-const DURATIONS: [f64; 10] = [1.07, 1.1, 1.15, 1.22, 1.32, 1.5, 1.8, 2.3, 3.2, 5.0];
+const DURATIONS: [f64; 15] =
+    [1.07, 1.1, 1.15, 1.22, 1.27, 1.32, 1.38, 1.44, 1.5, 1.6, 1.8, 2.05, 2.3, 3.2, 5.0];
 /// Width of the widest strokes over the duration.
 const MIDDLE: f64 = 0.18;
 /// Width of the first strokes over that of the kept ones ..
