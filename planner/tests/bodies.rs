@@ -7,13 +7,14 @@ mod common;
 use common::ur5;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
+use std::time::Duration;
 use taustream_arm::body::{Body, to_parry};
 use taustream_arm::scene::Shape;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::budget::Budget;
-use taustream_planner::collide::{StraightEdge, SweepRules, sweep};
+use taustream_planner::collide::{Clearance, StraightEdge, SweepRules, sweep};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::{Other, Snapshot, World};
 
@@ -265,6 +266,27 @@ fn clearance_between_links_that_a_sweep_proves_holds_at_every_pose_between() {
     assert!(proven > 200 && refused > 100, "{proven} proven, {refused} refused");
 }
 
+/// A sweep that is asked for more than the least distance is blocked by that distance, one that is asked for less is not, and one that may
+/// look at one pose less, or has no time, is not proven.
+fn assert_rules_are_kept((world, edge): (&World, &StraightEdge), clearance: &Clearance, seed: u64) {
+    let sweep = |rules: &SweepRules, budget: &Budget| sweep(world, edge, [0.0, 1.0], rules, budget);
+    let Some(pair) = clearance.pair else { return };
+    let extra = |extra_m: f64| SweepRules { extra_m, ..SweepRules::PROOF };
+    let beyond_m = clearance.sampled_m - pair.required_m;
+    let blocked = sweep(&extra(beyond_m + 1e-4), &Budget::unbounded()).expect_err("asked for too much");
+    let (_, distance_m) = blocked.pair.expect("what is too close");
+    let most_m = clearance.sampled_m + 1e-4 + SweepRules::PROOF.resolution_m;
+    assert!(distance_m <= most_m, "seed {seed}: {distance_m} is not too close, {most_m} is");
+    let less_m = clearance.proven_m - pair.required_m - 1e-4;
+    assert!(sweep(&extra(less_m), &Budget::unbounded()).is_ok(), "seed {seed}: {clearance:?}");
+
+    let hurried = SweepRules { checks_max: clearance.checks - 1, ..SweepRules::PROOF };
+    let cut = sweep(&hurried, &Budget::unbounded()).expect_err("one pose less than it takes");
+    assert!(cut.pair.is_none() && cut.checks == hurried.checks_max, "seed {seed}: {cut:?}");
+    let late = sweep(&SweepRules::PROOF, &Budget::until(Duration::ZERO, None)).expect_err("no time");
+    assert!(late.pair.is_none(), "seed {seed}: {late:?}");
+}
+
 /// Goal: what a sweep proves about a whole motion holds at every instant of it, for all shapes against all.
 /// Method: dense poses of random edges among random obstacles, each shape's distance as the world measures it there.
 #[test]
@@ -293,6 +315,7 @@ fn clearance_that_a_sweep_proves_holds_at_every_pose_between() {
             continue;
         };
         proven += 1;
+        assert_rules_are_kept((&world, &edge), &clearance, seed);
         let mut snapshot = Snapshot::default();
         for step in 0..=200 {
             let t = f64::from(step) / 200.0;
