@@ -88,7 +88,11 @@ fn histories_keep_every_rule() {
                 }
                 match history(seed) {
                     Ok(log) => totals.note(&log),
-                    Err(why) => failures.push(why),
+                    Err(why) => {
+                        // At once: a long run may be ended before the others are done.
+                        println!("history {seed} fails: {}", why.lines().next().unwrap_or_default());
+                        failures.push(why);
+                    }
                 }
             }
         };
