@@ -13,6 +13,7 @@ const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
 
 pub(super) const STEPS: &[Step] = &[
     step("forward kinematics", kinematics),
+    step("clearances of planned motions", clearances),
     step("mesh files", meshes),
     step("optimisers step by step", walks),
     step("optimisers by their results", optimisers),
@@ -49,6 +50,15 @@ fn kinematics(place: &Place) -> Result<Outcome> {
             "ur5_spherized of the published problems (not part of this project; looked in {looked}, TAUSTREAM_MBM_DIR names another folder)"
         ))
     })
+}
+
+/// Distances by an independent library, in pinned versions, against what was proven of planned motions.
+fn clearances(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv-clearance", "clearance-requirements.txt", &["--no-deps"])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join("clearance.py")).arg(place.programs.join("motions")).arg(&place.root);
+    perform("clearances of planned motions against an independent library", &mut command)?;
+    Ok(Outcome::Passed)
 }
 
 /// The optimisers against programs that walk them from their papers.
