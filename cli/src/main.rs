@@ -14,6 +14,7 @@ mod manual;
 mod offline;
 mod output;
 mod plot;
+mod progress;
 mod view;
 mod words;
 

@@ -1,5 +1,6 @@
 //! The arguments of `taustream-planner`, in the library because the manual page is made from them.
 use clap::Parser;
+use std::path::PathBuf;
 
 /// Plan motions for one arm: serve `taustream replan` and send verified motions to the streamer.
 ///
@@ -19,4 +20,7 @@ pub struct Arguments {
     /// Scene instead of that in the settings: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub scene: Option<String>,
+    /// Keep the scene in this file, and begin with what it holds: changes by `taustream scene` outlast this process then.
+    #[arg(long, value_name = "FILE")]
+    pub keep_scene: Option<PathBuf>,
 }

@@ -33,7 +33,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match run(&settings) {
+    match run(&settings, arguments.keep_scene.as_deref()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             tracing::error!("{e:#}");
@@ -50,7 +50,7 @@ fn load(arguments: &Arguments) -> Result<Settings, Faults> {
     Ok(settings)
 }
 
-fn run(settings: &Settings) -> Result<()> {
+fn run(settings: &Settings, keep_scene: Option<&Path>) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop)).context("cannot take signals")?;
@@ -61,7 +61,7 @@ fn run(settings: &Settings) -> Result<()> {
     let mut said_ready = false;
     let mut failures = 0;
     while !stop.load(Ordering::Relaxed) {
-        match serve(settings, &runtime, &stop, &claim, &mut said_ready) {
+        match serve((settings, keep_scene), &runtime, &stop, &claim, &mut said_ready) {
             Ok(Ending::Stopped) => break,
             Ok(Ending::NamesGone) => failures = 0,
             Err(e) => {
@@ -85,7 +85,7 @@ fn run(settings: &Settings) -> Result<()> {
 
 /// Serves until the end, or until the files behind its services vanish.
 fn serve(
-    settings: &Settings,
+    (settings, keep_scene): (&Settings, Option<&Path>),
     runtime: &Path,
     stop: &Arc<AtomicBool>,
     claim: &Claim,
@@ -93,6 +93,9 @@ fn serve(
 ) -> Result<Ending, OpenError> {
     let wire = Wire::join(&settings.name, "taustream-planner", runtime)?;
     let mut service = Service::open(&wire, &settings.robot, &settings.scene, stop)?;
+    if let Some(path) = keep_scene {
+        service.keep_scene(path)?;
+    }
     // A planner that is killed from now on leaves nothing that the next one would have to clear under a living streamer.
     claim.started();
     if !*said_ready {

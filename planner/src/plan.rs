@@ -3,6 +3,7 @@ use crate::budget::Budget;
 use crate::collide::SweepRules;
 use crate::dynamics::NoMasses;
 use crate::enter::Entry;
+use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::{MarginExit, Relaxed, find_margin_exit, is_clear};
 use crate::objective::{Evaluator, Objective};
@@ -93,6 +94,29 @@ pub struct Plan {
     pub first_s: f64,
     /// Poses that searches, shortcuts and refinements checked: the measure of work that every machine agrees on.
     pub checks: usize,
+    /// What was done, in its order.
+    pub stages: Vec<Stage>,
+}
+
+impl Plan {
+    /// Length of the path in joint space, rad: the sum of the differences of all joints, by dense samples.
+    #[must_use]
+    pub fn path_length_rad(&self) -> f64 {
+        const SAMPLES: u32 = 2_000;
+        let at = |i: u32| {
+            let t_s = self.trajectory.duration_s() * f64::from(i) / f64::from(SAMPLES);
+            self.trajectory.sample(t_s).position_rad
+        };
+        let mut before_rad = at(0);
+        let mut length_rad = 0.0;
+        for i in 1..=SAMPLES {
+            let now_rad = at(i);
+            let square: f64 = now_rad.iter().zip(&before_rad).map(|(a, b)| (a - b).powi(2)).sum();
+            length_rad += square.sqrt();
+            before_rad = now_rad;
+        }
+        length_rad
+    }
 }
 
 /// Which of the two given poses.
@@ -193,6 +217,8 @@ pub enum PlanError {
         tried: String,
         /// What ended the search, and what helps.
         remedy: Remedy,
+        /// What was done, in its order.
+        explanation: Box<Explanation>,
     },
     /// A joint would be on its way for longer than any motion may take.
     #[error(
@@ -220,6 +246,8 @@ pub enum PlanError {
     Untimed {
         /// What found the path.
         tried: String,
+        /// What was done, in its order.
+        explanation: Box<Explanation>,
     },
     /// A path was found, but its timed motion could not be proven.
     #[error("a path was found ({tried}), but its motion is not proven: {violation}")]
@@ -228,6 +256,8 @@ pub enum PlanError {
         tried: String,
         /// Why the proof failed.
         violation: Violation,
+        /// What was done, in its order.
+        explanation: Box<Explanation>,
     },
 }
 
@@ -450,6 +480,23 @@ fn plan_out(
 }
 
 impl PlanError {
+    /// What was done before it failed, in its order; empty where nothing was begun.
+    #[must_use]
+    pub fn stages(&self) -> &[Stage] {
+        match self {
+            Self::NotFound { explanation, .. }
+            | Self::Untimed { explanation, .. }
+            | Self::Unproven { explanation, .. } => &explanation.stages,
+            Self::BadPose { .. }
+            | Self::OutsideLimits { .. }
+            | Self::InCollision { .. }
+            | Self::InsideMargin { .. }
+            | Self::Shape { .. }
+            | Self::NoMasses(_)
+            | Self::TooSlow { .. } => &[],
+        }
+    }
+
     /// A pose that touches something, or is nearer to it than it may be.
     pub(crate) fn too_close(which: PoseOf, contact: Contact) -> Self {
         if contact.touches() {

@@ -11,6 +11,7 @@ mod scene_effect;
 mod streaming;
 mod tip;
 
+use crate::kept_scene::{SceneFile, restore};
 use crate::kind::PlannerKind;
 use crate::live_scene::LiveScene;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_through_until, plan_until};
@@ -20,6 +21,7 @@ use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
 use std::cell::RefCell;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
@@ -103,6 +105,7 @@ impl OpenError {
 pub struct Service<'a> {
     robot: &'a Robot,
     live_scene: RefCell<LiveScene>,
+    scene_file: Option<SceneFile>,
     scene_server: SceneServer,
     /// What became of a motion by a change of the scene last.
     last_effect: RefCell<String>,
@@ -157,6 +160,7 @@ impl<'a> Service<'a> {
         Ok(Self {
             robot,
             live_scene: RefCell::new(live_scene),
+            scene_file: None,
             scene_server: wire.scene_server()?,
             last_effect: RefCell::default(),
             foreign: Foreign::open(wire)?,
@@ -175,6 +179,17 @@ impl<'a> Service<'a> {
             promise,
             footprint: wire.footprint(),
         })
+    }
+
+    /// Begins with the scene in a file, if there is one, and keeps every later one there.
+    ///
+    /// # Errors
+    /// When the file makes no sense, or there is no thread to write it from.
+    pub fn keep_scene(&mut self, path: &Path) -> Result<(), OpenError> {
+        restore(&mut self.live_scene.borrow_mut(), path).map_err(|e| OpenError::Scene(e.to_string()))?;
+        let file = SceneFile::open(path).map_err(|e| OpenError::Thread(e.to_string()))?;
+        self.scene_file = Some(file);
+        Ok(())
     }
 
     /// Serves until `stop` is set, or the files behind its services vanish.

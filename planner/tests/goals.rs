@@ -5,9 +5,11 @@ mod common;
 use common::{config, pose, sphere, ur5, ur5_origins_m};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::JointArray;
+use taustream_planner::budget::Budget;
 use taustream_planner::goals::{
     ERROR_M_MAX, ERROR_RAD_MAX, Inverse, LineError, Orientation, TipSpeed, plan_line,
 };
@@ -375,7 +377,7 @@ fn tip_keeps_to_its_straight_line_its_speed_and_its_orientation() {
     for (by_m, linear_m_s) in [([0.1, 0.0, 0.0], 0.25), ([0.0, 0.3, -0.1], 0.1), ([-0.05, -0.2, 0.2], 1.0)] {
         let to_m: [f64; 3] = std::array::from_fn(|i| from_m[i] + by_m[i]);
         let speed = TipSpeed { linear_m_s, ..TipSpeed::default() };
-        let line = plan_line(&situation, &TipTarget::position(to_m), &speed)
+        let line = plan_line(&situation, &TipTarget::position(to_m), &speed, &Budget::unbounded())
             .unwrap_or_else(|e| panic!("{by_m:?}: {e}"));
         let motion = &line.imported.trajectory;
         assert_eq!(verify(&robot, &empty, motion).as_ref(), Ok(&line.imported.proof));
@@ -408,13 +410,40 @@ fn straight_line_that_the_arm_cannot_follow_is_refused_with_place_and_reason() {
     let [x, y, z] = ur5_origins_m(&start_rad)[6];
     // Out of reach half way, and across the axis of the base.
     for (to_m, words) in [([x - 0.5, y, z], "left after"), ([-x, -y, z], "left after")] {
-        let error = plan_line(&situation, &TipTarget::position(to_m), &TipSpeed::default()).unwrap_err();
+        let error =
+            plan_line(&situation, &TipTarget::position(to_m), &TipSpeed::default(), &Budget::unbounded())
+                .unwrap_err();
         assert!(matches!(error, LineError::Left { .. }) && error.to_string().contains(words), "{error}");
     }
-    let here = plan_line(&situation, &TipTarget::position([x, y, z]), &TipSpeed::default());
+    let here =
+        plan_line(&situation, &TipTarget::position([x, y, z]), &TipSpeed::default(), &Budget::unbounded());
     assert_eq!(here.unwrap_err(), LineError::Still);
     let ball = scene(vec![sphere("ball", [x, y + 0.15, z - 0.01], 0.03)]);
     let blocked = Situation { scene: &ball, ..situation };
-    let error = plan_line(&blocked, &TipTarget::position([x, y + 0.3, z]), &TipSpeed::default()).unwrap_err();
+    let error = plan_line(
+        &blocked,
+        &TipTarget::position([x, y + 0.3, z]),
+        &TipSpeed::default(),
+        &Budget::unbounded(),
+    )
+    .unwrap_err();
     assert!(error.to_string().contains("ball"), "{error}");
+}
+
+/// Goal: nobody waits for a line whose requester has gone, and a deadline holds for lines, too.
+#[test]
+fn straight_line_is_given_up_when_it_is_cancelled_or_its_time_is_over() {
+    let robot = ur5();
+    let scene = scene(Vec::new());
+    let start_rad = pose([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+    let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
+    let [.., tip] = robot.chain.frames(&start_rad);
+    let [x, y, z]: [f64; 3] = tip.translation.vector.into();
+    let (target, speed) = (TipTarget::position([x, y + 0.2, z]), TipSpeed::default());
+    let gone = AtomicBool::new(true);
+    for budget in [Budget::until(Duration::from_secs(60), Some(&gone)), Budget::until(Duration::ZERO, None)] {
+        let error = plan_line(&situation, &target, &speed, &budget).unwrap_err();
+        assert!(matches!(error, LineError::NoTime { .. }), "{error}");
+    }
+    plan_line(&situation, &target, &speed, &Budget::unbounded()).expect("there is such a line");
 }

@@ -19,6 +19,7 @@ use taustream_messages::{
     PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply, SceneRequest,
 };
 use taustream_motion::{JointArray, Trajectory};
+use taustream_planner::kept_scene::{SceneFile, restore};
 use taustream_planner::live_scene::{LiveScene, SceneChangeError};
 use taustream_planner::send::send_trajectory;
 use taustream_planner::service::Service;
@@ -563,4 +564,64 @@ fn changes_count_together_or_not_at_all_and_history_joins_them() {
     assert!(
         verify(&ur5(), &live.current().scene, &Trajectory::new(6, pose(FROM), &[]).expect("rest")).is_ok()
     );
+}
+
+/// Goal: a planner that starts again knows what stood around the arm and what the tip held; a file that makes no sense is refused.
+#[test]
+fn kept_scene_comes_back_whole_and_a_bad_file_is_refused() {
+    let folder = std::env::temp_dir().join(format!("taustream-kept-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join("scene.toml");
+    let (robot, scene) = (ur5(), scene("bracket"));
+    let fresh = || LiveScene::new(&robot, &scene).expect("builds");
+    let mut live = fresh();
+    restore(&mut live, &path).expect("no file is no fault");
+    let meshes =
+        |live: &LiveScene| live.objects().into_iter().filter(|o| o.shape == ObjectShape::Mesh).count();
+    assert!(meshes(&live) > 0, "a scene with a mesh");
+    let mesh = live.objects().into_iter().find(|o| o.shape == ObjectShape::Mesh).expect("a mesh").name;
+    let other = live.objects().into_iter().find(|o| o.shape != ObjectShape::Mesh).expect("another").name;
+    let tool = SceneChange::Add {
+        name: "tool".to_owned(),
+        shape: ObjectShape::Capsule { radius_m: 0.01, length_m: 0.1 },
+        pose: at([0.0, 0.0, 0.2]),
+        fixed_to: FixedTo::Tip,
+        mass_kg: 0.3,
+        replaces: false,
+    };
+    let changes = [
+        ball("ball", [0.1, 1.0 / 3.0, 2.0], 0.1),
+        tool,
+        SceneChange::Move { name: mesh, pose: at([0.0, 0.0, 5.0]) },
+        SceneChange::Remove { name: other },
+    ];
+    {
+        let file = SceneFile::open(&path).expect("a thread");
+        for change in changes {
+            live.apply(&[change], None).expect("made");
+            file.keep(&live);
+        }
+    }
+    let mut again = fresh();
+    restore(&mut again, &path).expect("read");
+    let sorted = |live: &LiveScene| {
+        let mut all = live.objects();
+        all.sort_by(|a, b| a.name.cmp(&b.name));
+        all
+    };
+    assert_eq!(sorted(&again), sorted(&live));
+    let good = std::fs::read_to_string(&path).expect("written");
+    for (from, to, words) in [
+        ("version = 1", "version = 2", "version = 2"),
+        ("\"tip\"", "\"hand\"", "base or tip"),
+        ("mass_kg = 0.3", "mass_kg = nan", "NaN"),
+        ("\"capsule\"", "\"cone\"", "cone"),
+        ("mass_kg", "mass_g", "mass_g"),
+    ] {
+        assert!(good.contains(from), "{from} in {good}");
+        std::fs::write(&path, good.replacen(from, to, 1)).expect("written");
+        let error = restore(&mut fresh(), &path).expect_err("refused").to_string();
+        assert!(error.contains(words) && error.contains("scene.toml"), "{to}: {error}");
+    }
+    std::fs::remove_dir_all(&folder).expect("removed");
 }

@@ -69,6 +69,9 @@ pub(crate) struct PlanArgs {
     /// shortcuts, mostly within milliseconds, and after 2000 ms at most.
     #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
     pub(crate) deadline_ms: Option<u32>,
+    /// Say what was tried, stage by stage: how long each took, what came of it, and how long the best motion was then.
+    #[arg(long)]
+    pub(crate) explain: bool,
     /// Trajectory file to write; `-` is stdout. Without it only the summary is printed.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

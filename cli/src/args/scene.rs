@@ -15,7 +15,7 @@ Examples:
 
 Every change is checked at once against the motion that runs: what is in its way makes the planner lead the arm to its goal by
 another way, or stop it on its path. The answer states which link, which object, where and when. Objects are lost when the planner
-ends. Programs send the same as a message of fixed size: docs/scene.md.";
+ends, unless it was started with --keep-scene FILE. Programs send the same as a message of fixed size: docs/scene.md.";
 
 /// `taustream scene`
 #[derive(Args, Debug)]

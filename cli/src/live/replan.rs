@@ -6,6 +6,7 @@ use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::offline::verify::Unmodelled;
 use crate::output::Form;
+use crate::progress::Waiting;
 use crate::started_ns;
 use crate::words::receipt_sentence;
 use serde::Serialize;
@@ -206,9 +207,12 @@ pub(crate) fn go(
     request: &CheckedPlanRequest,
     wait: bool,
 ) -> Result<(), Failure> {
-    form.progress(format_args!("planning, {:.1} s at most ..", deadline_s(request)));
     let arm = ArmName::of(settings);
-    let planned = ask_while(client, &arm, request, &mut || Ok(()))?;
+    let (mut waiting, words) = (Waiting::begin(), format!("planning, {:.1} s at most", deadline_s(request)));
+    let planned = ask_while(client, &arm, request, &mut || {
+        waiting.say(form, &words);
+        Ok(())
+    })?;
     let answered_ns = now_ns();
     let mut first_setpoint_ns = None;
     let executed = if wait {

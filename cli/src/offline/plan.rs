@@ -5,12 +5,14 @@ use crate::args::{Goal, PlanArgs};
 use crate::arm;
 use crate::failure::Failure;
 use crate::output::{Form, deliver};
+use crate::progress::while_it_takes;
 use serde::Serialize;
 use std::fmt;
 use std::time::{Duration, Instant};
 use taustream_arm::text::counted;
 use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
+use taustream_planner::budget::Budget;
 use taustream_planner::goals::{LineError, TipError, plan_line};
 use taustream_planner::{
     Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
@@ -32,6 +34,8 @@ struct Summary {
     #[serde(rename = "energy_J")]
     energy_j: Option<f64>,
     strokes: usize,
+    /// Of the path in joint space.
+    path_length_rad: f64,
     clearance_m: f64,
     clearance_at_s: f64,
     clearance_between: [String; 2],
@@ -53,12 +57,38 @@ struct Summary {
     line_m: Option<f64>,
     /// How far the tip is from it at most.
     line_off_m: Option<f64>,
+    /// What was done, in its order.
+    stages: Vec<StageLine>,
+    /// True when people shall see the stages, too.
+    #[serde(skip)]
+    explain: bool,
+}
+
+/// One stage of planning.
+#[derive(Debug, Serialize)]
+struct StageLine {
+    what: String,
+    took_s: f64,
+    /// Duration of the best verified motion after it.
+    motion_s: Option<f64>,
+    #[serde(skip)]
+    line: String,
 }
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s (seed {})", self.planner, self.planning_s, self.seed)?;
-        writeln!(f, "duration      {:.3} s, {}", self.duration_s, counted(self.strokes, "stroke"))?;
+        if self.explain {
+            for stage in &self.stages {
+                writeln!(f, "  {}", stage.line)?;
+            }
+        }
+        let (duration_s, length_rad) = (self.duration_s, self.path_length_rad);
+        writeln!(
+            f,
+            "duration      {duration_s:.3} s, {}, {length_rad:.3} rad long",
+            counted(self.strokes, "stroke")
+        )?;
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
         }
@@ -111,19 +141,26 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         ..default
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
-    let found = match args.goal.of(&robot, &start_rad)? {
-        Goal::Tip(_) if args.via.given().is_some_and(|option| args.goal.linear || option == "--via") => {
-            let option = args.via.given().unwrap_or_default();
-            let why = "a straight line of the tip has no corners, and way points need a goal of the joints";
-            return Err(Failure::Usage(format!("{option}: {why}")));
-        }
+    let goal = args.goal.of(&robot, &start_rad)?;
+    if let (Goal::Tip(_), Some(option)) = (&goal, args.via.given())
+        && (args.goal.linear || option == "--via")
+    {
+        let why = "a straight line of the tip has no corners, and way points need a goal of the joints";
+        return Err(Failure::Usage(format!("{option}: {why}")));
+    }
+    let work = || match goal {
         Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args)
             .map_err(|error| Failure::Refused(format!("no plan: {error}")))
-            .map(Ok)?,
-        Goal::Tip(target) => to_tip(&situation, &target, (args, &options)),
-        Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options))?,
+            .map(Ok),
+        Goal::Tip(target) => Ok(to_tip(&situation, &target, (args, &options))),
+        Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options)),
     };
-    let found = found.map_err(|error| explain(&error, args, &robot))?;
+    let found = while_it_takes(form, "planning", work)?.map_err(|error| {
+        if args.explain {
+            error.stages().iter().for_each(|stage| form.progress(format_args!("  {stage}")));
+        }
+        explain(&error, args, &robot)
+    })?;
     let json = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
@@ -145,7 +182,10 @@ struct Planned {
 
 fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, LineError> {
     let started = Instant::now();
-    let found = plan_line(situation, target, &args.goal.tip_speed())?;
+    let budget = args
+        .deadline_ms
+        .map_or_else(Budget::unbounded, |ms| Budget::until(Duration::from_millis(ms.into()), None));
+    let found = plan_line(situation, target, &args.goal.tip_speed(), &budget)?;
     let line = Some([found.length_m, found.off_m]);
     let plan = found.into_plan("straight line of the tip".to_owned(), started.elapsed().as_secs_f64());
     let tip = Some((*target, target.error(situation.robot, &plan.trajectory.end_rad())));
@@ -208,6 +248,13 @@ fn explain(error: &GoalError, args: &PlanArgs, robot: &Robot) -> Failure {
 
 fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &PlanArgs) -> Summary {
     let goal_rad = found.trajectory.end_rad().iter().take(robot.joints.len()).copied().collect();
+    let path_length_rad = found.path_length_rad();
+    let stages = found.stages.iter().map(|stage| StageLine {
+        what: stage.what.clone(),
+        took_s: stage.took_s,
+        motion_s: stage.motion_s,
+        line: stage.to_string(),
+    });
     let (a, b) = found.proof.clearance_between;
     Summary {
         robot: robot.name.clone(),
@@ -220,6 +267,9 @@ fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &
         duration_s: found.proof.duration_s,
         energy_j: found.energy_j,
         strokes: found.trajectory.strokes().len(),
+        path_length_rad,
+        stages: stages.collect(),
+        explain: args.explain,
         clearance_m: found.proof.clearance_m,
         clearance_at_s: found.proof.clearance_at_s,
         clearance_between: [a, b],

@@ -22,6 +22,48 @@ fn planned(scratch: &Scratch) -> serde_json::Value {
     scratch.run(&words).json()
 }
 
+/// The answer and the refusal both say what was tried and how long it took.
+#[test]
+fn plan_explains_its_stages() {
+    let scratch = Scratch::new();
+    let ran = scratch.run(&[
+        "plan",
+        "--robot",
+        "ur5",
+        "--scene",
+        "pillars",
+        "--start",
+        "-0.5,-0.7,0.7,-1.57,-1.57,0",
+        "--goal",
+        "0.5,-0.7,0.7,-1.57,-1.57,0",
+        "--explain",
+    ]);
+    let found = ran.done();
+    for words in [
+        " ms  bodies and pairs",
+        "straight line (blocked: link3 and front_pillar)",
+        "RRT-Connect (",
+        "; best motion ",
+    ] {
+        assert!(found.contains(words), "{words}: {found}");
+    }
+    let refused = scratch.run(&[
+        "plan",
+        "--robot",
+        "ur5",
+        "--scene",
+        "pillars",
+        "--start",
+        "-0.5,-0.7,0.7,-1.57,-1.57,0",
+        "--goal",
+        "0.5,-0.7,0.7,-1.57,-1.57,0",
+        "--planner",
+        "straight",
+        "--explain",
+    ]);
+    refused.refused(1, &["no path found", " ms  straight line (blocked: link3 and front_pillar)"]);
+}
+
 #[test]
 fn plan_writes_a_file_that_verifies_and_ends_at_the_goal() {
     let scratch = Scratch::new();

@@ -1,4 +1,5 @@
 //! Why a goal is not reached.
+use crate::explain::Stage;
 use crate::plan::PlanError;
 use crate::verify::Contact;
 use taustream_optimizers::Refusal;
@@ -101,5 +102,24 @@ fn what_else(by_rad: Option<f64>) -> &'static str {
     match by_rad {
         None => "position, another seed or a longer deadline",
         Some(_) => "position or orientation, a larger tolerance, another seed or a longer deadline",
+    }
+}
+
+impl GoalError {
+    /// What was done before it failed, in its order; empty where nothing was begun.
+    #[must_use]
+    pub fn stages(&self) -> &[Stage] {
+        match self {
+            Self::Plan(error) => error.stages(),
+            Self::NoMotion { error, .. } | Self::NoneOf { error, .. } => error.stages(),
+            Self::BadPosition { .. }
+            | Self::BadTolerance { .. }
+            | Self::TooFar { .. }
+            | Self::Missed { .. }
+            | Self::NoClearPose { .. }
+            | Self::NoGoal
+            | Self::NoTime
+            | Self::Refused(_) => &[],
+        }
     }
 }

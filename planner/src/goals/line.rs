@@ -7,7 +7,9 @@ use super::error::GoalError;
 use super::inverse::Inverse;
 use super::target::{Orientation, TipTarget};
 use super::{Situation, check_reach, check_target};
-use crate::import::{ImportError, Imported, Reference, import};
+use crate::budget::Budget;
+use crate::explain::Stage;
+use crate::import::{ImportError, Imported, Reference, import_within};
 use crate::plan::{Plan, PoseOf, check_pose};
 use crate::timing::line::LineLimits;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -65,7 +67,18 @@ impl Line {
     pub fn into_plan(self, how: String, planning_s: f64) -> Plan {
         let Imported { trajectory, proof, .. } = self.imported;
         let score = proof.duration_s;
-        Plan { trajectory, how, proof, score, energy_j: None, planning_s, first_s: planning_s, checks: 0 }
+        let stages = vec![Stage { what: how.clone(), took_s: planning_s, motion_s: Some(proof.duration_s) }];
+        Plan {
+            trajectory,
+            how,
+            proof,
+            score,
+            energy_j: None,
+            planning_s,
+            first_s: planning_s,
+            checks: 0,
+            stages,
+        }
     }
 }
 
@@ -85,6 +98,14 @@ pub enum LineError {
     /// The target or the start is at fault.
     #[error(transparent)]
     Goal(#[from] GoalError),
+    /// The clock, or a request that was withdrawn.
+    #[error(
+        "the straight line was not worked out within {after_s:.2} s; give it a longer deadline, or a shorter line"
+    )]
+    NoTime {
+        /// How long was tried.
+        after_s: f64,
+    },
     /// Nothing to do.
     #[error("the tip is at the target already")]
     Still,
@@ -114,11 +135,16 @@ pub enum LineError {
     },
 }
 
-/// Plans a verified straight line of the tip. A target without orientation keeps the one of the start.
+/// Plans a verified straight line of the tip, while the budget lasts. A target without orientation keeps the one of the start.
 ///
 /// # Errors
 /// Where along the line the arm cannot follow and why, or what is in the way.
-pub fn plan_line(situation: &Situation, target: &TipTarget, speed: &TipSpeed) -> Result<Line, LineError> {
+pub fn plan_line(
+    situation: &Situation,
+    target: &TipTarget,
+    speed: &TipSpeed,
+    budget: &Budget,
+) -> Result<Line, LineError> {
     let Situation { robot, scene, start_rad, .. } = *situation;
     for (what, value, unit) in [
         ("speed of the tip", speed.linear_m_s, "m/s"),
@@ -137,15 +163,19 @@ pub fn plan_line(situation: &Situation, target: &TipTarget, speed: &TipSpeed) ->
     if line.length_m < STEP_M * 1e-3 && line.angle_rad < STEP_RAD * 1e-3 {
         return Err(LineError::Still);
     }
-    let track = JointTrack::follow(robot, &line, &start_rad, reach_m)?;
+    let out_of_time = || LineError::NoTime { after_s: budget.elapsed_s() };
+    let track = JointTrack::follow((robot, &start_rad), &line, reach_m, budget)?;
     let profile = track.limits(robot, &line, speed).optimum();
-    let table = track.table(robot, (&line, reach_m), |t_s| profile.position(t_s), profile.duration_s());
+    let shares = |t_s: f64| profile.position(t_s);
+    let table = track.table(robot, (&line, reach_m), (&shares, profile.duration_s()), budget);
+    let table = table.ok_or_else(out_of_time)?;
     let reference = Reference::of_table(table, &robot.limits())?;
     let mut refusal = None;
     for halving in 0..=HALVINGS {
         let tolerance_rad = OFF_M.min(0.5 * speed.off_m_max) * 0.5_f64.powi(halving) / reach_m;
-        let imported = match import(robot, scene, &reference, tolerance_rad) {
+        let imported = match import_within(robot, scene, &reference, tolerance_rad, budget) {
             Ok(imported) => imported,
+            Err(_) if budget.was_cut() => return Err(out_of_time()),
             Err(why) => return Err(refusal.unwrap_or(LineError::Import(why))),
         };
         let off_m = line.off_m(robot, &imported);
@@ -213,16 +243,19 @@ struct JointTrack {
 
 impl JointTrack {
     fn follow(
-        robot: &Robot,
+        (robot, start_rad): (&Robot, &JointArray),
         line: &Segment,
-        start_rad: &JointArray,
         reach_m: f64,
+        budget: &Budget,
     ) -> Result<Self, LineError> {
         let steps = (line.length_m / STEP_M).max(line.angle_rad / STEP_RAD).ceil().clamp(STEPS[0], STEPS[1]);
         let mut poses_rad = vec![*start_rad];
         let mut last_rad = *start_rad;
         let mut k = 1.0;
         while k <= steps {
+            if budget.is_over() {
+                return Err(LineError::NoTime { after_s: budget.elapsed_s() });
+            }
             let target = line.target(k / steps);
             let next_rad = Inverse::new(robot, &target, reach_m).polish(&last_rad);
             let error = target.error(robot, &next_rad);
@@ -297,14 +330,14 @@ impl JointTrack {
         self.poses_rad.windows(5).map(|window| std::array::from_fn(|j| at(window, j))).collect()
     }
 
-    /// The motion as rows; each is solved again, so that it is on the line to the last digits.
+    /// The motion as rows; each is solved again, so that it is on the line to the last digits. `None` when the budget ends.
     fn table(
         &self,
         robot: &Robot,
         (line, reach_m): (&Segment, f64),
-        share_at: impl Fn(f64) -> f64,
-        duration_s: f64,
-    ) -> MotionTable {
+        (share_at, duration_s): (&dyn Fn(f64) -> f64, f64),
+        budget: &Budget,
+    ) -> Option<MotionTable> {
         let rows = (duration_s / ROW_S).ceil().clamp(ROWS[0], ROWS[1]);
         let last = self.poses_rad.len().saturating_sub(1) as f64;
         let (mut t_s, mut position_rad) = (Vec::new(), Vec::new());
@@ -312,6 +345,9 @@ impl JointTrack {
         let mut near_rad = known.next().copied().unwrap_or_default();
         let (mut passed, mut k) = (0.0, 0.0);
         while k <= rows {
+            if budget.is_over() {
+                return None;
+            }
             let at_s = duration_s * k / rows;
             let share = share_at(at_s).clamp(0.0, 1.0);
             // Shares only grow, so the pose before is the nearest known one.
@@ -328,7 +364,7 @@ impl JointTrack {
             k += 1.0;
         }
         let (joints, ignored) = (robot.joints.len(), Vec::new());
-        MotionTable {
+        Some(MotionTable {
             joints,
             t_s,
             position_rad,
@@ -336,7 +372,7 @@ impl JointTrack {
             acceleration_rad_s2: None,
             began_s: 0.0,
             ignored,
-        }
+        })
     }
 }
 

@@ -17,9 +17,11 @@ pub use places::{TimedBy, optimised_durations_s, poses_of};
 pub use profiles::{K_DEFAULT, ProfileError, ViaProfile};
 pub use reference::{Reference, Via, fitted_durations_s};
 
+use crate::budget::Budget;
 use crate::plan::PlanError;
 use crate::timing::{SLACK, scale_to_fit};
-use crate::verify::{Proof, Violation, verify};
+use crate::verify::{Proof, Violation, verify_in};
+use crate::world::World;
 use fit::{Candidate, candidates, scaled};
 use taustream_arm::{Robot, Scene};
 use taustream_motion::digits::OutsideRange;
@@ -229,6 +231,20 @@ pub fn import(
     reference: &Reference,
     tolerance_rad: f64,
 ) -> Result<Imported, ImportError> {
+    import_within(robot, scene, reference, tolerance_rad, &Budget::unbounded())
+}
+
+/// As [`import`], given up when a budget ends.
+///
+/// # Errors
+/// As [`import`]; any of them once the budget has ended.
+pub(crate) fn import_within(
+    robot: &Robot,
+    scene: &Scene,
+    reference: &Reference,
+    tolerance_rad: f64,
+    budget: &Budget,
+) -> Result<Imported, ImportError> {
     check(robot, reference, tolerance_rad)?;
     let limits = robot.limits();
     let found = candidates(reference, &limits, tolerance_rad);
@@ -238,6 +254,9 @@ pub fn import(
     let least_rad = found.iter().map(|c| c.off_rad).fold(f64::INFINITY, f64::min);
     let mut refusal = ImportError::TooFar { least_rad, tolerance_rad };
     for candidate in chosen.into_iter().take(TRIES) {
+        if budget.is_over() {
+            break;
+        }
         let scale = candidate.scale;
         let smoothed = candidate.smoothed(reference)?;
         let (trajectory, scale, peaks) = match within_limits(&smoothed, scale, robot) {
@@ -256,7 +275,7 @@ pub fn import(
             continue;
         }
         let used = KernelUsed { n: kernel.n, width_s: kernel.width_s * scale, delay_s: delay_s * scale };
-        return prove((robot, scene), reference, (trajectory, scale, deviation), Some(used));
+        return prove((robot, scene, budget), reference, (trajectory, scale, deviation), Some(used));
     }
     Err(refusal)
 }
@@ -283,7 +302,7 @@ pub fn import_strokes(robot: &Robot, scene: &Scene, via: &Via, n: u32) -> Result
     // Durations that were fitted use their limits to the last bit: only what is truly beyond them is scaled.
     let scale = if needed <= 1.0 + 1e-9 { 1.0 } else { needed * (1.0 + SLACK) };
     let (trajectory, scale, _) = within_limits(&exact, scale, robot)?;
-    prove((robot, scene), &reference, (trajectory, scale, Deviation::default()), None)
+    prove((robot, scene, &Budget::unbounded()), &reference, (trajectory, scale, Deviation::default()), None)
 }
 
 fn check(robot: &Robot, reference: &Reference, tolerance_rad: f64) -> Result<(), ImportError> {
@@ -342,12 +361,14 @@ fn within_limits(
 }
 
 fn prove(
-    (robot, scene): (&Robot, &Scene),
+    (robot, scene, budget): (&Robot, &Scene, &Budget),
     reference: &Reference,
     (trajectory, time_scale, deviation): (Trajectory, f64, Deviation),
     kernel: Option<KernelUsed>,
 ) -> Result<Imported, ImportError> {
-    let proof = verify(robot, scene, &trajectory)
+    let world = World::new(robot, scene).map_err(|name| Violation::Shape { name });
+    let proof = world
+        .and_then(|world| verify_in(&world, &trajectory, budget))
         .map_err(|violation| ImportError::Unproven { deviation_rad: deviation.rad, violation })?;
     let end_speeds_rad_s =
         reference.end_speeds_rad_s().map(|speeds| speeds.iter().fold(0.0, |most: f64, v| most.max(v.abs())));

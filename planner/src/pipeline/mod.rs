@@ -12,6 +12,7 @@ pub(crate) use corners::blends_rad;
 
 use crate::budget::Budget;
 use crate::collide::{StraightEdge, SweepRules, sweep};
+use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
 use crate::objective::{Evaluator, Objective};
@@ -120,6 +121,10 @@ fn processor_s() -> f64 {
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
+fn explained(stages: Vec<Stage>) -> Box<Explanation> {
+    Box::new(Explanation { stages })
+}
+
 /// One planning run.
 pub struct Pipeline<'a> {
     space: Space<'a>,
@@ -139,6 +144,9 @@ pub struct Pipeline<'a> {
     shortest_s: f64,
     /// What was done, as text.
     tried: Vec<String>,
+    /// The same with times, and the time of the last of them since the begin, s.
+    stages: Vec<Stage>,
+    noted_s: f64,
     best: Option<Best>,
     /// Processor time of the thread at the start, and until the first verified motion.
     began_s: f64,
@@ -172,6 +180,12 @@ impl<'a> Pipeline<'a> {
             refines_by_energy: false,
             shortest_s: f64::INFINITY,
             tried: Vec::new(),
+            stages: vec![Stage {
+                what: "bodies and pairs".to_owned(),
+                took_s: budget.elapsed_s(),
+                motion_s: None,
+            }],
+            noted_s: budget.elapsed_s(),
             best: None,
             began_s: processor_s(),
             first_s: 0.0,
@@ -179,6 +193,19 @@ impl<'a> Pipeline<'a> {
             violation: None,
             untimed: false,
         }
+    }
+
+    /// Takes down what was tried, and how long that took.
+    fn note(&mut self, what: String) {
+        self.note_time(what.clone());
+        self.tried.push(what);
+    }
+
+    fn note_time(&mut self, what: String) {
+        let now_s = self.space.budget.elapsed_s();
+        let motion_s = self.best.as_ref().map(|best| best.proof.duration_s);
+        self.stages.push(Stage { what, took_s: now_s - self.noted_s, motion_s });
+        self.noted_s = now_s;
     }
 
     /// Has every motion begin where the arm stands, inside the margin, and go straight to where [`Self::run`] starts.
@@ -347,7 +374,7 @@ impl<'a> Pipeline<'a> {
         let result = sweep(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.budget);
         match result.map_err(|b| b.pair) {
             Ok(_) => {
-                self.tried.push("straight line".to_owned());
+                self.note("straight line".to_owned());
                 self.propose(line, "straight line");
                 if self.margin_exit.is_some() {
                     // The exit path ends in a corner, or on the line: no need to stop there.
@@ -357,11 +384,11 @@ impl<'a> Pipeline<'a> {
             }
             Err(Some((pair, _))) => {
                 let (a, b) = self.space.world.names(&pair);
-                self.tried.push(format!("straight line (blocked: {a} and {b})"));
+                self.note(format!("straight line (blocked: {a} and {b})"));
                 false
             }
             Err(None) => {
-                self.tried.push("straight line (not proven in time)".to_owned());
+                self.note("straight line (not proven in time)".to_owned());
                 false
             }
         }
@@ -406,7 +433,7 @@ impl<'a> Pipeline<'a> {
             }
         }
         let (title, unit) = (searcher.title(), searcher.unit());
-        self.tried.push(format!("{title} ({nodes} {unit}, {found} of {made} searches)"));
+        self.note(format!("{title} ({nodes} {unit}, {found} of {made} searches)"));
         best
     }
 
@@ -437,7 +464,7 @@ impl<'a> Pipeline<'a> {
         let (mut corners, found) = match refined {
             Ok(refined) => refined?,
             Err(refusal) => {
-                self.tried.push(format!("{name} from {from} (not started: {refusal})"));
+                self.note(format!("{name} from {from} (not started: {refusal})"));
                 return None;
             }
         };
@@ -451,7 +478,7 @@ impl<'a> Pipeline<'a> {
         // Of several rounds the last says enough.
         let start = format!("{name} from {from} (");
         self.tried.retain(|tried| !tried.starts_with(&start));
-        self.tried.push(format!("{name} from {from} ({evaluations} evaluations{verdict})"));
+        self.note(format!("{name} from {from} ({evaluations} evaluations{verdict})"));
         if !free {
             return None;
         }
@@ -522,7 +549,9 @@ impl<'a> Pipeline<'a> {
         false
     }
 
-    fn finish(self) -> Result<Plan, PlanError> {
+    fn finish(mut self) -> Result<Plan, PlanError> {
+        self.note_time("timing, corners and proof".to_owned());
+        let stages = self.stages;
         let budget = self.space.budget;
         let cut = budget.was_cut();
         let tried = self.tried.join(", ");
@@ -538,16 +567,19 @@ impl<'a> Pipeline<'a> {
                 }
                 let (energy_j, checks) = (self.evaluator.energy_j(&trajectory), self.space.checks());
                 let (planning_s, first_s) = (budget.elapsed_s(), self.first_s);
-                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, first_s, checks })
+                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, first_s, checks, stages })
             }
             (None, Some(violation)) => {
                 if cut && matches!(violation, Violation::Unresolved { .. }) {
                     let tried = format!("{tried}, {violation}");
-                    return Err(PlanError::NotFound { tried, remedy: Remedy::Clock(self.options.deadline) });
+                    let remedy = Remedy::Clock(self.options.deadline);
+                    return Err(PlanError::NotFound { tried, remedy, explanation: explained(stages) });
                 }
-                Err(PlanError::Unproven { tried, violation })
+                Err(PlanError::Unproven { tried, violation, explanation: explained(stages) })
             }
-            (None, None) if self.untimed && !cut => Err(PlanError::Untimed { tried }),
+            (None, None) if self.untimed && !cut => {
+                Err(PlanError::Untimed { tried, explanation: explained(stages) })
+            }
             (None, None) => {
                 let remedy = match self.options.planner {
                     _ if cut => Remedy::Clock(self.options.deadline),
@@ -559,7 +591,7 @@ impl<'a> Pipeline<'a> {
                     | PlannerKind::Bfo
                     | PlannerKind::Optimiser(_) => Remedy::Budget(self.options.deadline),
                 };
-                Err(PlanError::NotFound { tried, remedy })
+                Err(PlanError::NotFound { tried, remedy, explanation: explained(stages) })
             }
         }
     }

@@ -79,7 +79,7 @@ impl Pipeline<'_> {
                 best = Some(Candidate { estimate_s, path });
             }
         }
-        self.tried.push(format!("RRT-Connect ({nodes} nodes, {found} of {made} searches)"));
+        self.note(format!("RRT-Connect ({nodes} nodes, {found} of {made} searches)"));
         let Candidate { estimate_s, path } = best?;
         if estimate_s < CLEARLY_LESS * self.least_estimate_s {
             self.round(&path, &searched(Searcher::RrtConnect), Some(&lanes));

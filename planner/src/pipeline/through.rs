@@ -42,7 +42,7 @@ impl Pipeline<'_> {
         let mut rng = SeededRng::new(self.options.seed, 10 + number as u64);
         let search = searcher.search(&self.space, [from, to], checks_max, &mut rng);
         let verdict = if search.path.is_some() { "" } else { ", nothing found" };
-        self.tried.push(format!(
+        self.note(format!(
             "{} for leg {} ({} {}{verdict})",
             searcher.title(),
             number + 1,

@@ -64,6 +64,9 @@ impl Service<'_> {
             return;
         }
         let effect = self.effect_on_motion(&changed);
+        if let Some(file) = &self.scene_file {
+            file.keep(&self.live_scene.borrow());
+        }
         let total = self.live_scene.borrow().objects().len();
         for Accepted { request, revision, received_ns } in accepted {
             let outcome = SceneOutcome::Changed {

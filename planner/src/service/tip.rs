@@ -1,13 +1,17 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
 use super::{Request, Service};
+use crate::budget::Budget;
 use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
 use crate::live_scene::SceneRevision;
 use crate::plan::{Plan, PlanOptions, StartMargin};
 use nalgebra::{Quaternion, UnitQuaternion};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome};
 use taustream_messages::tip_goal::{TipGoal, TipLine};
 use taustream_motion::JointArray;
+
+/// How long a straight line may take whose request states no deadline.
+const LINE_WITHIN: Duration = Duration::from_secs(5);
 
 /// The target of a goal in the library's words.
 fn target(tip: &TipGoal) -> TipTarget {
@@ -61,7 +65,10 @@ impl Service<'_> {
         let (situation, target) = (situation(&revision, start_rad), target(tip));
         let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
         let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
-        let planned = self.work(request, options.deadline, |_| plan_line(&situation, &target, &speed))?;
+        let within = if options.spends_deadline { options.deadline } else { LINE_WITHIN };
+        let planned = self.work(request, within, |cancel| {
+            plan_line(&situation, &target, &speed, &Budget::until(within, Some(cancel)))
+        })?;
         let line = planned.map_err(|e| e.to_string())?;
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);
         let plan = line.into_plan(how, started.elapsed().as_secs_f64());
