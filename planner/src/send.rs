@@ -22,6 +22,8 @@ use taustream_motion::Trajectory;
 const POLL: Duration = Duration::from_millis(1);
 /// How long a wait for a receipt relies on its event.
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
+/// How long a sender stays, so that the planner learns what it has sent.
+const LINGER: Duration = Duration::from_millis(50);
 /// A streamer that sends no report for this long is not running.
 pub const REPORT_WITHIN: Duration = Duration::from_secs(1);
 /// A report that is not older is the streamer's state of now, ns: a reporting period and a half at the default rate.
@@ -80,7 +82,11 @@ pub fn send_trajectory(
     trajectory: &Trajectory,
     timeout: Duration,
 ) -> Result<SentTrajectory, SendError> {
-    Outbox::open(wire)?.send(robot, trajectory, Replaces::Rest, timeout)
+    let outbox = Outbox::open(wire)?;
+    let sent = outbox.send(robot, trajectory, Replaces::Rest, timeout);
+    // What was sent is seen only while its sender is there, and the planner looks every few milliseconds.
+    thread::sleep(LINGER);
+    sent
 }
 
 /// The ports through which trajectories go out and answers come back.

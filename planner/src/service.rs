@@ -362,6 +362,7 @@ impl<'a> Service<'a> {
                 );
                 cancel.store(true, Ordering::Relaxed);
             }
+            self.foreign.look();
             self.take_scene_requests();
             if self.stop.load(Ordering::Relaxed) {
                 cancel.store(true, Ordering::Relaxed);

@@ -21,7 +21,7 @@ use taustream_messages::{
 use taustream_motion::{JointArray, Trajectory};
 use taustream_planner::kept_scene::{SceneFile, restore};
 use taustream_planner::live_scene::{LiveScene, SceneChangeError};
-use taustream_planner::send::send_trajectory;
+use taustream_planner::send::Outbox;
 use taustream_planner::service::Service;
 use taustream_planner::world::World;
 use taustream_planner::{PlanOptions, verify};
@@ -373,7 +373,9 @@ fn scene_change_in_the_way_of_a_motion_of_another_process_stops_it() {
         let robot = ur5();
         let plan = taustream_planner::plan(&robot, &empty(), &pose(FROM), &pose(TO), &PlanOptions::default());
         let motion = plan.expect("a plan").trajectory;
-        let sent = send_trajectory(&asker.wire, &robot, &motion, Duration::from_secs(2)).expect("sent");
+        // What was sent is seen while its sender is there.
+        let outbox = Outbox::open(&asker.wire).expect("ports");
+        let sent = outbox.send(&robot, &motion, Replaces::Rest, Duration::from_secs(2)).expect("sent");
         assert!(matches!(sent.receipt.and_then(|receipt| receipt.outcome()), Some(Outcome::Accepted { .. })));
         thread::sleep(Duration::from_millis(50));
         let aside = asker.change(&[ball("aside", [0.0, 0.0, -2.0], 0.1)]);

@@ -1,8 +1,7 @@
 //! Scenarios over the real processes on a real vcan0: the machine they run in and the checks of their recordings.
 //!
 //! [`machine`] boots a kernel with CAN on any Linux host and runs a command there. [`test_bench`] starts the real processes
-//! for one of the [`scenarios`], [`bus_scenarios`], [`cut_scenarios`], [`disturbed_scenarios`], [`stream_scenarios`],
-//! [`scene_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what the `bus-recorder`
+//! for one of the [`scenarios`], [`bus_scenarios`], [`cut_scenarios`], [`disturbed_scenarios`], [`stream_scenarios`] and [`damiao_scenarios`]. [`candump`] reads what the `bus-recorder`
 //! saw on the bus, [`cycle_log`] what the streamer claims, and [`setpoints`] compares the two ([`mit_setpoints`]
 //! for motors in MIT mode).
 //!
@@ -29,7 +28,6 @@ mod on_path;
 pub mod restart_scenarios;
 pub mod retry;
 pub mod scenarios;
-pub mod scene_scenarios;
 mod scratch;
 pub mod services;
 pub mod setpoints;
