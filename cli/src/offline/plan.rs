@@ -13,7 +13,7 @@ use taustream_arm::text::counted;
 use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::budget::Budget;
-use taustream_planner::goals::{LineError, TipError, plan_line};
+use taustream_planner::goals::{TipError, plan_line};
 use taustream_planner::{
     Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
     plan_to_tip,
@@ -149,9 +149,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("{option}: {why}")));
     }
     let work = || match goal {
-        Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args)
-            .map_err(|error| Failure::Refused(format!("no plan: {error}")))
-            .map(Ok),
+        Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args).map(Ok),
         Goal::Tip(target) => Ok(to_tip(&situation, &target, (args, &options))),
         Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options)),
     };
@@ -180,12 +178,13 @@ struct Planned {
     line: Option<[f64; 2]>,
 }
 
-fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, LineError> {
+fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, Failure> {
     let started = Instant::now();
     let budget = args
         .deadline_ms
         .map_or_else(Budget::unbounded, |ms| Budget::until(Duration::from_millis(ms.into()), None));
-    let found = plan_line(situation, target, &args.goal.tip_speed(), &budget)?;
+    let found = plan_line(situation, target, &args.goal.tip_speed(), &budget)
+        .map_err(|error| Failure::Refused(format!("no plan: {error}")))?;
     let line = Some([found.length_m, found.off_m]);
     let plan = found.into_plan("straight line of the tip".to_owned(), started.elapsed().as_secs_f64());
     let tip = Some((*target, target.error(situation.robot, &plan.trajectory.end_rad())));
