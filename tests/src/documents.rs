@@ -23,7 +23,7 @@ const CHECKOUT_LINES: [(&str, &str); 12] = [
     ("cargo xtask uninstall", "the installed services under systemd"),
     ("sudo systemctl enable --now systemd-networkd", "the installed services under systemd"),
     ("sudo cp /usr/share/taustream/network/", "the installed services under systemd"),
-    ("cargo mutants -p taustream-motion", "nothing: it takes hours"),
+    ("cargo mutants -p taustream-", "nothing: it takes hours"),
 ];
 
 /// How a block is tested.
