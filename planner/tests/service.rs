@@ -482,7 +482,7 @@ fn service_planning_ends_when_its_requester_goes_and_others_are_answered_meanwhi
     with_service_in(&ringed(), "cancelled", &played, |arm, _| {
         let wire = join(arm, "client");
         let client = wire.plan_client().expect("port");
-        let hard = CheckedPlanRequest { deadline_ms: 60_000, ..request(When::AtOnce, "rrt", pose(RINGED)) };
+        let hard = CheckedPlanRequest { deadline_ms: 60_000, ..request(When::AtOnce, "", pose(RINGED)) };
         let pending = client.send_copy(PlanRequest::from(&hard)).expect("sent");
         let busy = loop {
             let outcome = ask(arm, &request(When::AtOnce, "", pose(THERE)), || ());
