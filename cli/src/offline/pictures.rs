@@ -96,16 +96,11 @@ fn via(limits: &[JointLimits; MAX_JOINTS]) -> Option<Vec<JointMotion>> {
     let corners_rad = POINTS_RAD.map(|rad| pose(&rad));
     let path = Path { corners_rad: &corners_rad, joints: JOINTS, limits };
     let ours = path.rounded(&[BLEND_RAD; 3], f64::INFINITY)?.trajectory;
-    let timed = |what: &str, duration_s: f64| format!("{what}: {duration_s:.2} s");
     let paper = paper(&corners_rad, limits)?;
-    let ruckig = RuckigStops::between(&corners_rad, limits)?;
-    let paper_words = timed("one stroke each (Wang et al.)", paper.duration_s());
-    let ruckig_words = timed("Ruckig, stops", ruckig.duration_s);
-    let our_words = timed("taustream", ours.duration_s());
     Some(vec![
-        sampled(paper_words, &paper, [0.0, paper.duration_s()]),
-        JointMotion { what: ruckig_words, duration_s: ruckig.duration_s, samples: ruckig.samples },
-        sampled(our_words, &ours, [0.0, ours.duration_s()]),
+        whole("one stroke each (Wang et al.)", &paper),
+        ruckig_stops(&corners_rad, limits)?,
+        whole("taustream", &ours),
     ])
 }
 
@@ -126,29 +121,21 @@ fn paper(corners_rad: &[JointArray], limits: &[JointLimits; MAX_JOINTS]) -> Opti
 }
 
 /// The optimum of each segment, one after the other: what Ruckig gives for a straight line from rest to rest.
-struct RuckigStops {
-    duration_s: f64,
-    samples: Vec<(f64, [f64; 4])>,
-}
-
-impl RuckigStops {
-    fn between(corners_rad: &[JointArray], limits: &[JointLimits; MAX_JOINTS]) -> Option<Self> {
-        let mut stops = Self { duration_s: 0.0, samples: Vec::new() };
-        for pair in corners_rad.windows(2) {
-            let [from, to] = pair else { return None };
-            let optimum = LineLimits::between(from, to, (JOINTS, limits))?.optimum();
-            let (from_rad, delta_rad) = (from.get(DRAWN)?, to.get(DRAWN)? - from.get(DRAWN)?);
-            let segment_s = optimum.duration_s();
-            for k in 0..=SAMPLES {
-                let t_s = segment_s * f64::from(k) / f64::from(SAMPLES);
-                let [s, v, a, j] = optimum.state(t_s);
-                let values = [from_rad + delta_rad * s, delta_rad * v, delta_rad * a, delta_rad * j];
-                stops.samples.push((stops.duration_s + t_s, values));
-            }
-            stops.duration_s += segment_s;
+fn ruckig_stops(corners_rad: &[JointArray], limits: &[JointLimits; MAX_JOINTS]) -> Option<JointMotion> {
+    let (mut duration_s, mut samples) = (0.0, Vec::new());
+    for pair in corners_rad.windows(2) {
+        let [from, to] = pair else { return None };
+        let optimum = LineLimits::between(from, to, (JOINTS, limits))?.optimum();
+        let (from_rad, delta_rad) = (from.get(DRAWN)?, to.get(DRAWN)? - from.get(DRAWN)?);
+        for k in 0..=SAMPLES {
+            let t_s = optimum.duration_s() * f64::from(k) / f64::from(SAMPLES);
+            let [s, v, a, j] = optimum.state(t_s);
+            let values = [from_rad + delta_rad * s, delta_rad * v, delta_rad * a, delta_rad * j];
+            samples.push((duration_s + t_s, values));
         }
-        Some(stops)
+        duration_s += optimum.duration_s();
     }
+    Some(JointMotion { what: timed("Ruckig, stops", duration_s), duration_s, samples })
 }
 
 /// A straight move, what became of it, and what it would have been.
@@ -158,12 +145,20 @@ fn replan(limits: &[JointLimits; MAX_JOINTS]) -> Option<Vec<JointMotion>> {
     let old = Path { corners_rad: &corners_rad, joints: JOINTS, limits }.stopping()?.trajectory;
     let at_s = CUT_SHARE * old.duration_s();
     let new = replacement(&old, at_s, &pose(&NEW_GOAL_RAD), limits)?;
-    let words = |what: &str, duration_s: f64| format!("{what}: {duration_s:.2} s");
     Some(vec![
-        sampled(words("the first move", old.duration_s()), &old, [0.0, old.duration_s()]),
+        whole("the first move", &old),
         sampled(format!("kept until {at_s:.2} s"), &new, [0.0, at_s]),
-        sampled(words("replacement", new.duration_s()), &new, [at_s, new.duration_s()]),
+        sampled(timed("replacement", new.duration_s()), &new, [at_s, new.duration_s()]),
     ])
+}
+
+fn timed(what: &str, duration_s: f64) -> String {
+    format!("{what}: {duration_s:.2} s")
+}
+
+fn whole(what: &str, trajectory: &Trajectory) -> JointMotion {
+    let duration_s = trajectory.duration_s();
+    sampled(timed(what, duration_s), trajectory, [0.0, duration_s])
 }
 
 fn sampled(what: String, trajectory: &Trajectory, [from_s, to_s]: [f64; 2]) -> JointMotion {

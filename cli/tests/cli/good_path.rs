@@ -26,18 +26,12 @@ fn planned(scratch: &Scratch) -> serde_json::Value {
 #[test]
 fn plan_explains_its_stages() {
     let scratch = Scratch::new();
-    let ran = scratch.run(&[
-        "plan",
-        "--robot",
-        "ur5",
-        "--scene",
-        "pillars",
-        "--start",
-        "-0.5,-0.7,0.7,-1.57,-1.57,0",
-        "--goal",
-        "0.5,-0.7,0.7,-1.57,-1.57,0",
-        "--explain",
-    ]);
+    let explained = |more: &[&str]| {
+        let ends = ["--start", "-0.5,-0.7,0.7,-1.57,-1.57,0", "--goal", "0.5,-0.7,0.7,-1.57,-1.57,0"];
+        let words = ["plan", "--robot", "ur5", "--scene", "pillars", "--explain"];
+        scratch.run(&[&words, ends.as_slice(), more].concat())
+    };
+    let ran = explained(&[]);
     let found = ran.done();
     for words in [
         " ms  bodies and pairs",
@@ -47,21 +41,8 @@ fn plan_explains_its_stages() {
     ] {
         assert!(found.contains(words), "{words}: {found}");
     }
-    let refused = scratch.run(&[
-        "plan",
-        "--robot",
-        "ur5",
-        "--scene",
-        "pillars",
-        "--start",
-        "-0.5,-0.7,0.7,-1.57,-1.57,0",
-        "--goal",
-        "0.5,-0.7,0.7,-1.57,-1.57,0",
-        "--planner",
-        "straight",
-        "--explain",
-    ]);
-    refused.refused(1, &["no path found", " ms  straight line (blocked: link3 and front_pillar)"]);
+    explained(&["--planner", "straight"])
+        .refused(1, &["no path found", " ms  straight line (blocked: link3 and front_pillar)"]);
 }
 
 #[test]
