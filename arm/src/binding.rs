@@ -3,8 +3,8 @@
 //! A wrong sign, gear or zero sends a joint the wrong way at full speed, so none of them has a default, and every
 //! angle that the joint may be commanded must be a position that the servo can represent.
 use crate::document::{Node, shown};
-use crate::identifiers::{self, Use};
 use crate::protocol;
+use crate::protocol::identifiers::Use;
 use crate::reader::{Bounds, Table};
 use crate::robot::Robot;
 use crate::settings::{Bus, BusKind, FEEDBACK_EVERY_MAX, SETPOINT_EVERY_MAX, Servo, Traffic};
@@ -129,14 +129,14 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
         let servo = read_servo(&mut table, robot, joint, bus);
         busy.extend(bus);
         if let Some(servo) = &servo {
-            if nodes.insert((servo.bus, servo.node_id)) {
+            if nodes.insert((servo.bus, servo.protocol.name(), servo.node_id)) {
                 check_identifiers(&table, servo, robot, &mut uses);
             } else {
                 let id = servo.node_id.to_string();
                 table.fault("node_id", &id, "each node id once on a bus: two servos would answer");
             }
             if let Some(joint) = robot.and_then(|robot| robot.joints.get(servo.joint)) {
-                protocol::check_joint(&table, &servo.protocol, joint, [servo.sign, servo.zero_offset_rad]);
+                servo.protocol.check_joint(&table, joint, [servo.sign, servo.zero_offset_rad]);
                 trust::check_reaction(&table, servo, joint);
                 trust::check_feedback(&table, servo, joint);
             }
@@ -246,7 +246,7 @@ fn check_identifiers(
     taken: &mut Vec<UsedIdentifier>,
 ) {
     let mut clashed = false;
-    for mine in identifiers::of(servo.node_id, &servo.protocol) {
+    for mine in servo.protocol.identifiers(servo.node_id) {
         let clash = taken.iter().find(|other| other.bus == servo.bus && other.by.clashes(&mine));
         let Some(other) = clash else {
             taken.push(UsedIdentifier { bus: servo.bus, joint: servo.joint, by: mine });
@@ -257,7 +257,7 @@ fn check_identifiers(
             clashed = true;
             let joint = robot.and_then(|robot| robot.joints.get(other.joint));
             let name = joint.map_or_else(|| format!("{}", other.joint), |joint| joint.name.clone());
-            let value = format!("identifier 0x{:03X} for {}", mine.id, mine.what);
+            let value = format!("identifier {} for {}", mine.number(), mine.what);
             let expected =
                 format!("an identifier of its own on the bus: joint {name} has it for {}", other.by.what);
             table.fault(mine.key, &value, &expected);

@@ -7,11 +7,11 @@ pub mod flow;
 pub mod frame;
 mod remedies;
 
-use crate::protocol::Protocol;
+use crate::protocol::{self, Protocol};
 use crate::settings::{Bus, BusKind, Settings};
+use flow::Flow;
 pub use flow::{CONTROL_REPEAT_TURNS, HEARTBEAT_MS};
-use flow::{Cia402Bus, Exchange, Flow};
-use frame::{BitRates, Format, Frame};
+use frame::BitRates;
 pub use remedies::LoadRemedy;
 
 /// Above this, settings are refused: the cycle's frames do not fit into the cycle.
@@ -19,10 +19,6 @@ pub const REFUSED_PERCENT: f64 = 100.0;
 /// Above this, a warning is due: configuration and repetitions have little room.
 pub const WARNED_PERCENT: f64 = 80.0;
 
-/// Control or status word and a 32-bit position.
-const CIA402_PDO_BYTES: u32 = 6;
-/// Every command and every feedback.
-const DAMIAO_BYTES: u32 = 8;
 /// What a virtual bus is measured against, for people who plan a real one.
 const USUAL_BIT_S: u32 = 1_000_000;
 
@@ -46,7 +42,7 @@ pub struct BusLoad {
 impl BusLoad {
     fn of(bus: &Bus, settings: &Settings, servos: &[Protocol]) -> Self {
         let period_s = f64::from(settings.cycle.period_us.max(1)) * 1e-6;
-        let flows = flows(bus, servos, 1.0 / period_s);
+        let flows = protocol::flows(bus, servos, 1.0 / period_s);
         let nominal_bit_s = bus.kind.bitrate_bit_s().unwrap_or(USUAL_BIT_S);
         let data_bit_s = bus.kind.data_bitrate_bit_s().unwrap_or(nominal_bit_s);
         let rates = BitRates { nominal_bit_s, data_bit_s };
@@ -87,41 +83,6 @@ impl Settings {
     }
 
     fn protocols_on(&self, bus: usize) -> Vec<Protocol> {
-        self.servos.iter().filter(|servo| servo.bus == bus).map(|servo| servo.protocol).collect()
-    }
-}
-
-/// What the servos of a bus and their master send.
-fn flows(bus: &Bus, servos: &[Protocol], cycle_hz: f64) -> Vec<Flow> {
-    let count = |wanted: fn(&Protocol) -> bool| {
-        u32::try_from(servos.iter().filter(|protocol| wanted(protocol)).count()).unwrap_or(u32::MAX)
-    };
-    let drives = count(|protocol| matches!(protocol, Protocol::Cia402(_)));
-    let motors = count(|protocol| matches!(protocol, Protocol::Damiao(_)));
-    let mut flows = Vec::new();
-    if drives > 0 {
-        let cia402 = cia402_bus(bus, drives, cycle_hz);
-        flows.extend(cia402.process_data());
-        flows.extend(cia402.service());
-    }
-    if motors > 0 {
-        let format = match bus.kind {
-            BusKind::Virtual | BusKind::Classic { .. } => Format::Classic,
-            BusKind::Fd { .. } => Format::Fd,
-        };
-        let frame = Frame::standard(format, DAMIAO_BYTES);
-        flows.extend(Exchange { servos: motors, cycle_hz, command: frame, answer: Some(frame) }.flows());
-    }
-    flows
-}
-
-fn cia402_bus(bus: &Bus, drives: u32, cycle_hz: f64) -> Cia402Bus {
-    Cia402Bus {
-        drives,
-        cycle_hz,
-        traffic: bus.traffic,
-        setpoint_bytes: CIA402_PDO_BYTES,
-        answer_bytes: CIA402_PDO_BYTES,
-        format: Format::Classic,
+        self.servos.iter().filter(|servo| servo.bus == bus).map(|servo| servo.protocol.clone()).collect()
     }
 }

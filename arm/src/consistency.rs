@@ -2,7 +2,6 @@
 //!
 //! Each is fine by itself; their owner would find out by an arm that stops for no reason, or does not stop in time.
 use crate::bus_load::{BusLoad, HEARTBEAT_MS, REFUSED_PERCENT};
-use crate::protocol::DamiaoMode;
 use crate::reader::FaultList;
 use crate::settings::{CycleSettings, Settings, Supervision, Traffic};
 
@@ -70,43 +69,6 @@ pub(crate) fn check_jump(fault_list: &FaultList, settings: &Settings) {
             joint.name
         );
         fault_list.add(None, "supervision.position_jump_rad_max", &format!("{jump_rad:?}"), &expected);
-    }
-}
-
-/// Damiao motors against the cycle, the supervision and the traffic that they are driven with.
-pub(crate) fn check_damiao(fault_list: &FaultList, settings: &Settings) {
-    let counted_ms = settings.cycle.drive_watchdog_ms;
-    let timeout_s = settings.supervision.drive_timeout_s;
-    for (i, servo) in settings.servos.iter().enumerate() {
-        let Some(damiao) = servo.protocol.as_damiao() else { continue };
-        if damiao.watchdog_ms < counted_ms {
-            let expected = format!(
-                "at least cycle.drive_watchdog_ms = {counted_ms}: until then the streamer counts on the motor"
-            );
-            fault_list.add(
-                None,
-                &format!("servo[{i}].watchdog_ms"),
-                &damiao.watchdog_ms.to_string(),
-                &expected,
-            );
-        }
-        if let DamiaoMode::Mit { gain_ramp_ms, .. } = damiao.mode
-            && f64::from(gain_ramp_ms) * 1e-3 > 0.5 * timeout_s
-        {
-            let expected = format!(
-                "at most half of supervision.drive_timeout_s = {timeout_s}: the ramp is a part of enabling"
-            );
-            fault_list.add(None, &format!("servo[{i}].gain_ramp_ms"), &gain_ramp_ms.to_string(), &expected);
-        }
-        let Some(bus) = settings.buses.get(servo.bus).filter(|bus| bus.traffic != Traffic::EVERY_CYCLE)
-        else {
-            continue;
-        };
-        let value =
-            format!("damiao on bus {} with setpoint_every, stagger, feedback_every or packed", bus.name);
-        let expected = "a bus with one command and one answer a cycle: the motor does not interpolate, and answers \
-                        each command";
-        fault_list.add(None, &format!("servo[{i}].protocol"), &value, expected);
     }
 }
 

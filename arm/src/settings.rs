@@ -1,6 +1,6 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
-use crate::protocol::Protocol;
+use crate::protocol::{self, Protocol};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::stopping::STOP_S_MAX;
 use crate::{AfterStall, Faults, Feedback, Reaction, Robot, Scene, binding, consistency};
@@ -97,7 +97,7 @@ pub struct Servo {
     pub joint: usize,
     /// Index into [`Settings::buses`].
     pub bus: usize,
-    /// Node id: 1 to 127 in CANopen, 1 to 15 of a Damiao motor (`ESC_ID`).
+    /// Its number on the bus, as its protocol counts: 1 to 127 in CANopen, 1 to 15 of a Damiao motor (`ESC_ID`).
     pub node_id: u8,
     /// Its protocol, with what is the protocol's own.
     pub protocol: Protocol,
@@ -302,7 +302,7 @@ impl Settings {
             fault_list.merge(faults);
         }
         consistency::check_jump(fault_list, &settings);
-        consistency::check_damiao(fault_list, &settings);
+        protocol::check_settings(fault_list, &settings);
         consistency::check_traffic(fault_list, &settings);
         consistency::check_limp_risk(fault_list, &settings);
         Some(settings)

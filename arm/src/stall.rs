@@ -1,6 +1,6 @@
 //! How a motion continues after a stall of the streamer's loop: a gap between two setpoints that the drives do not bridge.
 use crate::document::shown;
-use crate::protocol::{DamiaoMode, Protocol};
+use crate::protocol::Protocol;
 use crate::reader::Table;
 use crate::settings::Settings;
 
@@ -25,17 +25,6 @@ impl AfterStall {
             Self::GoOn => "go-on",
         }
     }
-
-    /// The gentler of the two for a kind of drive, by the peak acceleration that was measured (docs/adr, "What follows a
-    /// stall").
-    #[must_use]
-    pub(crate) const fn by_default(protocol: &Protocol) -> Self {
-        match protocol {
-            // The velocity stands in every command, so the motor continues meanwhile.
-            Protocol::Damiao(damiao) if matches!(damiao.mode, DamiaoMode::Mit { .. }) => Self::GoOn,
-            Protocol::Damiao(_) | Protocol::Cia402(_) => Self::Freeze,
-        }
-    }
 }
 
 const WORDS: &str = "\"freeze\" or \"go-on\": what follows a stall of the streamer's loop";
@@ -44,7 +33,7 @@ const WORDS: &str = "\"freeze\" or \"go-on\": what follows a stall of the stream
 pub(crate) fn read(table: &mut Table<'_>, protocol: Option<&Protocol>) -> Option<AfterStall> {
     let word = table.text_if_there("after_stall", WORDS);
     if !table.had("after_stall") {
-        return protocol.map(AfterStall::by_default);
+        return protocol.map(Protocol::after_stall);
     }
     let word = word?;
     let found = AfterStall::ALL.into_iter().find(|policy| policy.word() == word);

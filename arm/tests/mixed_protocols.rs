@@ -1,7 +1,7 @@
 //! A bus with servos of two protocols: accepted when no identifiers collide, refused by name when they do.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 use std::path::{Path, PathBuf};
-use taustream_arm::{Protocol, Settings};
+use taustream_arm::{Damiao, Settings};
 
 fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml")
@@ -26,13 +26,17 @@ fn bus_of_two_protocols_is_taken_when_no_identifiers_meet() {
     let settings = Settings::from_toml(&file(), &mixed(9, 0x019)).unwrap();
     let names: Vec<&str> = settings.servos.iter().map(|servo| servo.protocol.name()).collect();
     assert_eq!(names, ["cia402", "cia402", "damiao", "cia402", "cia402", "cia402"]);
-    assert!(matches!(settings.servos[2].protocol, Protocol::Damiao(damiao) if damiao.feedback_id == 0x19));
+    assert_eq!(settings.servos[2].protocol.get::<Damiao>().unwrap().feedback_id, 0x19);
 }
 
 #[test]
 fn identifiers_that_meet_across_protocols_are_refused_with_joint_and_number() {
     for (node_id, feedback_id, words) in [
-        (2, 0x019, "each node id once on a bus"),
+        (
+            2,
+            0x019,
+            "0x202 for VEL commands: expected an identifier of its own on the bus: joint shoulder_lift has it for RPDO 1",
+        ),
         (
             9,
             0x181,
@@ -46,7 +50,11 @@ fn identifiers_that_meet_across_protocols_are_refused_with_joint_and_number() {
             0x585,
             "0x585 for the SDO reply: expected an identifier of its own on the bus: joint elbow has it for feedback",
         ),
-        (4, 0x019, "each node id once on a bus"),
+        (
+            4,
+            0x019,
+            "0x204 for RPDO 1: expected an identifier of its own on the bus: joint elbow has it for VEL commands",
+        ),
     ] {
         let faults = Settings::from_toml(&file(), &mixed(node_id, feedback_id)).unwrap_err();
         assert!(faults.to_string().contains(words), "{node_id} {feedback_id:#x}: {faults}");

@@ -1,12 +1,16 @@
 //! CAN frames, classic and FD, in one fixed-size type.
 use taustream_motion::MAX_JOINTS;
 
+/// Flag of a 29-bit id in [`CanId`].
+const EXTENDED: u32 = 0x8000_0000;
 /// Flag of a remote request in [`CanId`].
 const REMOTE: u32 = 0x4000_0000;
 /// Flag of an error frame in [`CanId`].
 const ERROR: u32 = 0x2000_0000;
 /// Largest 11-bit id.
 const STANDARD_MAX: u32 = 0x7FF;
+/// Largest 29-bit id.
+const EXTENDED_MAX: u32 = 0x1FFF_FFFF;
 
 /// A CAN id with its kind, laid out as `canid_t`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,6 +22,16 @@ impl CanId {
     #[must_use]
     pub const fn standard(id: u16) -> Self {
         Self(id as u32 & STANDARD_MAX)
+    }
+    /// A 29-bit id; higher bits are cut off.
+    #[must_use]
+    pub const fn extended(id: u32) -> Self {
+        Self(id & EXTENDED_MAX | EXTENDED)
+    }
+    /// A remote request under this 11-bit id; its frame has no data.
+    #[must_use]
+    pub const fn standard_remote(id: u16) -> Self {
+        Self(id as u32 & STANDARD_MAX | REMOTE)
     }
     /// From the kernel's representation.
     #[must_use]
@@ -34,6 +48,18 @@ impl CanId {
     #[must_use]
     pub const fn as_standard_data(self) -> Option<u16> {
         if self.0 <= STANDARD_MAX { Some((self.0 & STANDARD_MAX) as u16) } else { None }
+    }
+    /// The 29-bit id of an extended data frame; `None` for standard, remote and error frames.
+    #[must_use]
+    pub const fn as_extended_data(self) -> Option<u32> {
+        let flags = self.0 & !EXTENDED_MAX;
+        if flags == EXTENDED { Some(self.0 & EXTENDED_MAX) } else { None }
+    }
+    /// The 11-bit id of a remote request; `None` for every other frame.
+    #[must_use]
+    pub const fn as_standard_remote(self) -> Option<u16> {
+        let id = self.0 & !REMOTE;
+        if self.is_remote() && id <= STANDARD_MAX { Some((id & STANDARD_MAX) as u16) } else { None }
     }
     /// True for an error frame of the kernel.
     #[must_use]

@@ -6,11 +6,13 @@
 
 pub mod bring_up;
 pub mod codec;
-pub mod drivers;
 pub mod frame;
 pub mod link;
+pub mod motors;
+pub mod protocols;
 pub mod servo;
 pub mod sim;
+pub mod words;
 
 pub use frame::{CanFrame, CanId, FrameBatch, JointSet};
 pub use link::{CanLink, ErrorFrame, LinkFault};

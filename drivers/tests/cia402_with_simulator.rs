@@ -3,7 +3,7 @@
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::{Cia402Driver, CountScale, rad_from_counts};
-use taustream_drivers::sim::{ServoSimulator, settings::drives};
+use taustream_drivers::sim::{Drive, ServoSimulator, settings::drives};
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
 
 const JOINTS: usize = 6;
@@ -151,7 +151,7 @@ fn restarted_master_that_still_observes_energised_drives_releases_them_on_reques
     }
     assert!(
         (0..JOINTS)
-            .all(|joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0)
+            .all(|joint| arm.simulator.drive(joint).unwrap().get::<Drive>().unwrap().statusword() & 0x04 == 0)
     );
     arm.drive_target = DriveTarget::Disabled;
     arm.until(DriveState::Disabled);

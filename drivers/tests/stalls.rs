@@ -13,7 +13,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use taustream_arm::Settings;
-use taustream_drivers::drivers::{self, BusDriver};
+use taustream_drivers::protocols::{self, BusDriver};
 use taustream_drivers::sim::ServoSimulator;
 use taustream_drivers::sim::settings::drives;
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
@@ -82,7 +82,7 @@ impl Arm {
         let settings = Settings::from_toml(&path, &text).unwrap_or_else(|faults| panic!("{faults}"));
         let setups = drives(&settings, Some(&START_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
         let mut arm = Self {
-            driver: drivers::of_bus(&settings, 0).unwrap(),
+            driver: protocols::of_bus(&settings, 0).unwrap(),
             simulator: ServoSimulator::new(setups, 1, 1),
             now: Nanos(1_000_000_000),
             drive_target: DriveTarget::Disabled,

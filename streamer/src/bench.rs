@@ -27,15 +27,14 @@ use peers::Peers;
 use serde::Serialize;
 use stages::StageClock;
 pub use stages::StageTime;
-use taustream_arm::{Cia402, Protocol, Servo, Settings};
+use taustream_arm::{Servo, Settings};
 use taustream_drivers::codec::canopen::sync;
 use taustream_drivers::codec::cia402::{CountScale, counts_from_rad, encode_rpdo};
-use taustream_drivers::codec::damiao_frames::{Request, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::codec::setpoint_frames::{Group, SendSchedule, encode_pair, groups};
 use taustream_drivers::link::LinkChoice;
 use taustream_drivers::{
-    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
+    CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
@@ -197,7 +196,7 @@ impl ServoDriver for BenchDriver {
         out: &mut FrameBatch,
     ) {
         (self.commands, self.drive_target, self.now) = (*commands, drive_target, now);
-        if self.servos.iter().any(|servo| servo.protocol.as_cia402().is_some()) {
+        if self.servos.iter().any(|servo| CountScale::of(servo).is_some()) {
             out.push(sync());
         }
         let command = |servo: &Servo| commands.get(servo.joint).copied().unwrap_or_default();
@@ -238,30 +237,20 @@ impl ServoDriver for BenchDriver {
     }
 }
 
-/// The frame of an energised servo's setpoint, packed as its protocol packs it.
+/// The frame of an energised servo's setpoint: counts of a CiA 402 drive, a packed command of every other servo.
 fn setpoint(servo: &Servo, command: &JointCommand) -> CanFrame {
-    match servo.protocol {
-        Protocol::Cia402(Cia402 { gear_ratio, counts_per_rev, .. }) => {
-            let Servo { sign, zero_offset_rad, .. } = *servo;
-            let scale = CountScale { sign, gear_ratio, counts_per_rev, zero_offset_rad };
-            encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, command.position_rad))
-        }
-        Protocol::Damiao(damiao) => {
-            let ranges = MitRanges::symmetric(
-                damiao.position_range_rad,
-                damiao.velocity_range_rad_s,
-                damiao.torque_range_nm,
-            );
-            let packed = MitCommand {
-                position_rad: (command.position_rad - servo.zero_offset_rad) * servo.sign,
-                velocity_rad_s: command.velocity_rad_s * servo.sign,
-                stiffness_nm_rad: 100.0,
-                damping_nm_s_rad: 1.0,
-                torque_nm: 0.0,
-            };
-            Request::Mit(packed.encode(&ranges).unwrap_or_default()).encode(servo.node_id, Wire::Classic)
-        }
+    if let Some(scale) = CountScale::of(servo) {
+        return encode_rpdo(servo.node_id, 0x000F, counts_from_rad(&scale, command.position_rad));
     }
+    let packed = MitCommand {
+        position_rad: (command.position_rad - servo.zero_offset_rad) * servo.sign,
+        velocity_rad_s: command.velocity_rad_s * servo.sign,
+        stiffness_nm_rad: 100.0,
+        damping_nm_s_rad: 1.0,
+        torque_nm: 0.0,
+    };
+    let bytes = packed.encode(&MitRanges::symmetric(12.5, 30.0, 10.0)).unwrap_or_default();
+    CanFrame::classic(CanId::standard(u16::from(servo.node_id)), &bytes)
 }
 
 /// One side's times.
@@ -309,7 +298,7 @@ impl Bench {
         for (index, bus) in settings.buses.iter().enumerate() {
             let servos: Vec<_> = settings.servos.iter().filter(|s| s.bus == index).cloned().collect();
             if index == 0 {
-                frames.extend(servos.iter().any(|s| s.protocol.as_cia402().is_some()).then(sync));
+                frames.extend(servos.iter().any(|s| CountScale::of(s).is_some()).then(sync));
                 frames.extend(servos.iter().map(|servo| setpoint(servo, &JointCommand::default())));
             }
             let joints = servos.iter().map(|s| s.joint).collect();

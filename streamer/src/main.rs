@@ -12,8 +12,8 @@ use taustream_arm::daemon::Manager;
 use taustream_arm::log::start_log;
 use taustream_arm::state_dir::SystemDisk;
 use taustream_arm::{Kind, Settings, drive_epochs, find, last_pose};
-use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
+use taustream_drivers::protocols;
 use taustream_streamer::arguments::Arguments;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next};
@@ -107,7 +107,7 @@ fn open_buses(settings: &Settings, choice: LinkChoice, runtime: &Path) -> Result
     let mut buses = Vec::new();
     for (index, bus) in settings.buses.iter().enumerate() {
         let link = link::open(bus, choice, LinkRole::Master, runtime)?;
-        let driver = drivers::of_bus(settings, index)?;
+        let driver = protocols::of_bus(settings, index)?;
         buses.push(Bus::new(link, Box::new(driver), settings));
     }
     Ok(Buses::new(buses)?)

@@ -4,7 +4,8 @@ use crate::pose_store::Directories;
 use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_drivers::ErrorFrame;
-use taustream_drivers::bring_up::{Refusal, explain_on, explain_refusal_on, explain_status};
+use taustream_drivers::bring_up::Refusal;
+use taustream_drivers::words::{explain_on, explain_refusal_on, explain_status};
 use taustream_messages::{BusFault, BusReport, Cause, Evidence};
 use taustream_motion::digits::Decimals;
 

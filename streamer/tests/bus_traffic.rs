@@ -208,7 +208,7 @@ fn drive_without_dummy_entries_refuses_packed_setpoints_by_object() {
     arm.run(3_000);
     let cause = arm.core.supervisor().cause().expect("a drive that refuses is a fault");
     assert_eq!((cause.joint, cause.code, cause.object), (Some(3), 0x0604_0041, 0x0016_0101), "{cause:X?}");
-    let words = taustream_drivers::bring_up::explain_refusal(&taustream_drivers::bring_up::Refusal {
+    let words = taustream_drivers::words::explain_refusal(&taustream_drivers::bring_up::Refusal {
         code: cause.code,
         object: cause.object,
         numbers: [cause.value, cause.limit],

@@ -10,7 +10,7 @@
 use crate::cycle_log::{Event, LoggedCycle};
 use crate::on_path::PathCheck;
 use crate::setpoints::{BusFrame, CheckResult, Flaw, may_be_off};
-use taustream_arm::{DamiaoMode, Settings};
+use taustream_arm::{Damiao, DamiaoMode, Settings};
 
 /// Registers and requests for feedback.
 const REGISTERS: u32 = 0x7FF;
@@ -52,16 +52,16 @@ impl MotorEncoding {
 #[must_use]
 pub fn encodings(settings: &Settings) -> Option<Vec<MotorEncoding>> {
     let encoding = |servo: &taustream_arm::Servo| {
-        let damiao = servo.protocol.as_damiao()?;
-        let DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } = damiao.mode else { return None };
+        let damiao = servo.protocol.get::<Damiao>()?;
+        let DamiaoMode::Mit(gains) = damiao.mode else { return None };
         Some(MotorEncoding {
             joint: servo.joint,
             node_id: servo.node_id,
             feedback_id: damiao.feedback_id,
             sign: servo.sign,
             zero_rad: servo.zero_offset_rad,
-            reach: [damiao.position_range_rad, damiao.velocity_range_rad_s],
-            gains: [stiffness_nm_rad, damping_nm_s_rad],
+            reach: [damiao.ranges.position_rad, damiao.ranges.velocity_rad_s],
+            gains: [gains.stiffness_nm_rad, gains.damping_nm_s_rad],
         })
     };
     settings.servos.iter().map(encoding).collect()

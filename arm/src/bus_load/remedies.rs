@@ -1,7 +1,7 @@
 //! What would make a bus less full: the settings that exist, each with the load that it would give.
 use super::frame::{BitRates, Format};
-use super::{BusLoad, WARNED_PERCENT, cia402_bus, flow};
-use crate::protocol::Protocol;
+use super::{BusLoad, WARNED_PERCENT, flow};
+use crate::protocol::{self, FdUse, Protocol};
 use crate::settings::{Bus, BusKind, Settings, Traffic};
 
 /// Data rate that CAN FD is computed with.
@@ -30,7 +30,7 @@ pub(super) fn of(bus: &Bus, settings: &Settings, servos: &[Protocol]) -> Vec<Loa
     if !matches!(bus.kind, BusKind::Fd { .. }) {
         remedies.fd();
     }
-    if servos.iter().all(|protocol| protocol.as_cia402().is_some()) {
+    if servos.iter().all(Protocol::shapes_traffic) {
         remedies.traffic();
     }
     let period_us = settings.cycle.period_us.saturating_mul(2);
@@ -60,20 +60,17 @@ impl Remedies<'_> {
 
     fn fd(&mut self) {
         let kind = BusKind::Fd { bitrate_bit_s: FD_BIT_S, data_bitrate_bit_s: FD_DATA_BIT_S };
-        let drives = self.servos.iter().filter(|protocol| protocol.as_cia402().is_some()).count();
-        if drives == 0 {
+        let all = |wanted| self.servos.iter().all(|protocol| protocol.fd() == wanted);
+        if all(FdUse::Spoken) {
             let what =
                 "bitrate_bit_s = 1000000 and data_bitrate_bit_s = 5000000 (CAN FD), set in the motors too";
             let fd = Bus { kind, ..self.bus.clone() };
             self.push(what.to_owned(), &fd, self.settings, self.servos);
-        } else if drives == self.servos.len() {
+        } else if all(FdUse::Planned) {
             // Said with its number, because drives can be chosen; but it is no setting yet.
             let cycle_hz = 1e6 / f64::from(self.settings.cycle.period_us.max(1));
-            let drives = u32::try_from(drives).unwrap_or(u32::MAX);
-            let mut cia402 = cia402_bus(self.bus, drives, cycle_hz);
-            cia402.format = Format::Fd;
             let rates = BitRates { nominal_bit_s: FD_BIT_S, data_bit_s: FD_DATA_BIT_S };
-            let flows = [cia402.process_data(), cia402.service()].concat();
+            let flows = protocol::flows_with(self.bus, self.servos, cycle_hz, |_| Format::Fd);
             let what = "CAN FD at 1 and 5 Mbit/s, with servos that speak it (CiA 402 drives are sent classic frames)";
             self.note(what.to_owned(), flow::percent(&flows, rates));
         }

@@ -196,7 +196,7 @@ impl CheckedSettings {
             node_id: servo.node_id,
             protocol: servo.protocol.name().to_owned(),
             sign: servo.sign,
-            own: ProtocolLine(servo.protocol),
+            own: ProtocolLine(servo.protocol.clone()),
             zero_offset_rad: servo.zero_offset_rad,
             limp_is_safe: servo.limp_is_safe,
             limp_risk_acknowledged: servo.limp_risk_acknowledged,

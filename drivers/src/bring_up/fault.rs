@@ -1,11 +1,9 @@
 //! What the master itself finds wrong with a node, beside what the node reports.
 //!
-//! [`crate::ServoStatus::error_code`] holds kinds of codes that do not overlap: emergency codes (up to 0xFFFF), these
-//! (0x1 0000 to 0x1 FFFF), those of Damiao motors (0x2 0000 to 0x2 FFFF), and SDO abort codes (from 0x503 0000).
-use crate::bring_up::damiao_fault as damiao;
+//! [`crate::ServoStatus::error_code`] of a CiA 402 drive holds kinds of codes that do not overlap: emergency codes (up to
+//! 0xFFFF), these (0x1 0000 to 0x1 FFFF), and SDO abort codes (from 0x503 0000).
 use crate::bring_up::scale;
 use crate::codec::cia402_words::{DriveStep, STATUS_WARNING};
-use crate::codec::damiao_frames::status_words;
 use crate::codec::{emcy, error_text, object};
 
 /// A finding of the master.
@@ -155,22 +153,10 @@ pub struct Refusal {
     pub numbers: [f64; 2],
 }
 
-/// Which object was refused and why: "object 0x1600:02: SDO abort 0x06040041 object cannot be mapped into a PDO".
+/// Which object of a drive was refused and why: "object 0x1600:02: SDO abort 0x06040041 object cannot be mapped into a PDO".
 #[must_use]
-pub fn explain_refusal(refusal: &Refusal) -> String {
-    explain_refusal_on(refusal, true)
-}
-
-/// The same, on a link that has a cable or none.
-#[must_use]
-pub fn explain_refusal_on(refusal: &Refusal, has_cable: bool) -> String {
+pub fn explain_refusal(refusal: &Refusal, has_cable: bool) -> String {
     let Refusal { code, object, numbers: [stated, expected] } = *refusal;
-    if object == 0 {
-        return explain_on(code, has_cable);
-    }
-    if let Some(sentence) = damiao::explain_refusal(code, object) {
-        return sentence;
-    }
     if code == BringUpFault::ScaleDiffers.code()
         && let Some(sentence) = scale::sentence(object, stated, expected)
     {
@@ -183,24 +169,15 @@ pub fn explain_refusal_on(refusal: &Refusal, has_cable: bool) -> String {
     } else {
         ""
     };
-    format!("object 0x{index:04X}:{sub:02}: {}{advice}", explain(code))
+    format!("object 0x{index:04X}:{sub:02}: {}{advice}", explain(code, has_cable))
 }
 
-/// The sentence for any code that [`crate::ServoStatus::error_code`] may hold.
+/// The sentence for a code of a drive, on a link that has a cable or none.
 #[must_use]
-pub fn explain(code: u32) -> String {
-    explain_on(code, true)
-}
-
-/// The same, on a link that has a cable or none.
-#[must_use]
-pub fn explain_on(code: u32, has_cable: bool) -> String {
+pub fn explain(code: u32, has_cable: bool) -> String {
     if let Some(fault) = BringUpFault::ALL.into_iter().find(|fault| fault.code() == code) {
         let without_cable = unwired(fault).filter(|_| !has_cable);
         return without_cable.unwrap_or_else(|| fault.sentence()).to_owned();
-    }
-    if let Some(sentence) = damiao::explain_on(code, has_cable) {
-        return sentence;
     }
     match u16::try_from(code) {
         Ok(code) => format!("0x{code:04X} {}", emcy::words(code)),
@@ -208,40 +185,11 @@ pub fn explain_on(code: u32, has_cable: bool) -> String {
     }
 }
 
-/// A drive's status word as text, by the name of its protocol: "0x0218 fault".
+/// A drive's statusword as text: "0x0218 fault".
 #[must_use]
-pub fn explain_status(protocol: Option<&str>, word: u32) -> String {
-    match protocol {
-        Some("cia402") => {
-            let status = (word & 0xFFFF) as u16;
-            let step = DriveStep::from_status(status).map_or("no state of CiA 402", DriveStep::word);
-            let warning = if status & STATUS_WARNING == 0 { "" } else { ", warning" };
-            format!("0x{status:04X} {step}{warning}")
-        }
-        Some("damiao") => {
-            let status = (word & 0xF) as u8;
-            let words = status_words(status).split(';').next().unwrap_or_default();
-            format!("{status:X} {words}")
-        }
-        Some(_) | None => format!("0x{word:04X}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn status_words_are_explained_by_protocol() {
-        for (protocol, word, expected) in [
-            (Some("cia402"), 0x0250, "0x0250 switch on disabled"),
-            (Some("cia402"), 0x12B7, "0x12B7 operation enabled, warning"),
-            (Some("cia402"), 0x0218, "0x0218 fault"),
-            (Some("damiao"), 0x1E_1E01, "1 enabled"),
-            (Some("damiao"), 0x1E_1E09, "9 under-voltage"),
-            (None, 0x0218, "0x0218"),
-        ] {
-            assert_eq!(explain_status(protocol, word), expected);
-        }
-    }
+pub fn status_text(word: u32) -> String {
+    let status = (word & 0xFFFF) as u16;
+    let step = DriveStep::from_status(status).map_or("no state of CiA 402", DriveStep::word);
+    let warning = if status & STATUS_WARNING == 0 { "" } else { ", warning" };
+    format!("0x{status:04X} {step}{warning}")
 }

@@ -4,9 +4,6 @@
 pub(crate) mod adopt;
 pub mod cia402;
 mod configure;
-pub mod damiao;
-pub mod damiao_fault;
-pub mod damiao_plan;
 pub mod fault;
 mod observe;
 pub mod plan;
@@ -15,6 +12,4 @@ pub mod scale;
 pub mod timing;
 
 pub use cia402::Node;
-pub use fault::{
-    BringUpFault, Refusal, explain, explain_on, explain_refusal, explain_refusal_on, explain_status,
-};
+pub use fault::{BringUpFault, Refusal};

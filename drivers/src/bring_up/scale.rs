@@ -15,7 +15,7 @@
 //! Sources: CiA 402-2, "Factor group", "Position control function" and "Homing mode".
 use crate::codec::cia402_words::{CountScale, counts_from_rad};
 use crate::codec::object::{self, Address};
-use taustream_arm::{Overruled, RobotJoint, ScaleObject, Servo};
+use taustream_arm::{Cia402, Overruled, RobotJoint, ScaleObject, Servo};
 
 /// Relative difference up to which two ratios are the same: a decimal fraction of the settings has its digits.
 const SAME: f64 = 1e-6;
@@ -43,7 +43,7 @@ impl ExpectedScale {
     /// Of a servo and its joint; none for a servo of another protocol.
     #[must_use]
     pub fn of(servo: &Servo, joint: &RobotJoint) -> Option<Self> {
-        let cia402 = servo.protocol.as_cia402()?;
+        let cia402 = servo.protocol.get::<Cia402>()?;
         let scale = CountScale::of(servo)?;
         let [low, high] = joint.limits.position_rad.map(|end_rad| counts_from_rad(&scale, end_rad));
         Some(Self {

@@ -393,7 +393,7 @@ impl ServoDriver for Cia402Driver {
     }
 
     fn explain(&self, error_code: u32) -> String {
-        fault::explain(error_code)
+        fault::explain(error_code, true)
     }
 }
 

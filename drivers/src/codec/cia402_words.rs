@@ -132,7 +132,7 @@ impl CountScale {
     /// Of a servo; none when it speaks another protocol and has no counts.
     #[must_use]
     pub fn of(servo: &Servo) -> Option<Self> {
-        let Cia402 { gear_ratio, counts_per_rev, .. } = *servo.protocol.as_cia402()?;
+        let Cia402 { gear_ratio, counts_per_rev, .. } = *servo.protocol.get::<Cia402>()?;
         Some(Self { sign: servo.sign, gear_ratio, counts_per_rev, zero_offset_rad: servo.zero_offset_rad })
     }
 }

@@ -4,8 +4,6 @@
 pub mod canopen;
 pub mod cia402;
 pub mod cia402_words;
-pub mod damiao;
-pub mod damiao_frames;
 pub mod emcy;
 pub mod error_text;
 pub mod mit;

@@ -1,24 +1,24 @@
-//! Simulated servos, with a motor and gravity, behind a real link: CiA 402 drives with an object dictionary, and Damiao
-//! motors with their registers.
+//! Simulated servos, with a motor and gravity, behind a real link. CiA 402 drives with an object dictionary are here, the
+//! motors of each other protocol in its folder.
 //!
-//! [`Drive`] is one drive, [`Motor`] one Damiao motor, [`ServoSimulator`] the servos of an arm with faults on request, [`serve`] runs
-//! the simulator on links. All but the last are pure: frames and time in, frames out.
+//! [`Drive`] is one drive, [`ServoModel`] any servo, [`ServoSimulator`] the servos of an arm with faults on request, [`serve`]
+//! runs the simulator on links. All but the last are pure: frames and time in, frames out.
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; a bus with a bit rate knows no
 //! bit errors ([`wire`]); of the modes of operation there is only cyclic synchronous position.
 pub mod arguments;
 pub mod bit_time;
-mod controller;
+pub(crate) mod controller;
 mod dictionary;
 mod disturbance;
 mod drive;
 mod drive_motion;
 mod drive_objects;
+pub(crate) mod drive_settings;
 pub mod faults;
 mod linked;
-mod mechanics;
-mod motor;
-mod motor_registers;
+pub(crate) mod mechanics;
+pub mod model;
 mod network;
 mod objects;
 mod pdo;
@@ -28,7 +28,6 @@ mod power;
 pub mod priority;
 mod sdo_server;
 pub mod serve;
-mod servo;
 pub mod settings;
 pub mod simulator;
 pub mod wire;
@@ -38,10 +37,9 @@ pub use disturbance::Disturbance;
 pub use drive::{Drive, DriveParameters};
 pub use faults::{FaultRequest, SimulatorCommand};
 pub use linked::LinkedSimulator;
-pub use motor::{Motor, MotorParameters};
+pub use model::{ModelParameters, ServoModel};
 pub use plant::PlantParameters;
 pub use planted::PlantedObject;
 pub use power::PowerState;
-pub use servo::{ServoParameters, SimulatedServo};
 pub use simulator::ServoSimulator;
 pub use wire::{Wire, WireCounters};

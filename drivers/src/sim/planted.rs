@@ -5,7 +5,6 @@
 //! with feedback that agrees. The same text serves `--object` and the key `objects` of `[simulator]`.
 use super::dictionary::Dictionary;
 use super::drive::{Drive, DriveParameters};
-use super::servo::ServoParameters;
 use super::settings::DriveSetup;
 use crate::codec::{Address, object};
 use std::f64::consts::TAU;
@@ -45,7 +44,7 @@ pub enum PlantError {
     Joint(String),
     /// The joint's servo has no objects.
     #[error(
-        "joint {0} has no CiA 402 drive, so no objects; ranges of a Damiao motor are keys of [simulator]"
+        "joint {0} has no CiA 402 drive, so no objects; the parameters of motors are keys of [simulator]"
     )]
     NoDrive(String),
     /// The drive does not have the object, or it holds no such value.
@@ -84,11 +83,10 @@ pub fn plant(text: &str, setups: &mut [DriveSetup]) -> Result<(), PlantError> {
 }
 
 fn add(setup: &mut DriveSetup, object: PlantedObject) -> Result<(), PlantError> {
-    let ServoParameters::Cia402(parameters) = &setup.parameters else {
-        return Err(PlantError::NoDrive(setup.joint.clone()));
-    };
-    if !Drive::shipped(parameters).plant(object) {
-        return Err(PlantError::Object(object.address));
+    match setup.parameters.takes_object(object) {
+        None => return Err(PlantError::NoDrive(setup.joint.clone())),
+        Some(false) => return Err(PlantError::Object(object.address)),
+        Some(true) => {}
     }
     setup.objects.push(object);
     Ok(())

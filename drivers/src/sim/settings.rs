@@ -3,28 +3,25 @@
 //! Every key has a default, because nothing here moves an arm. A key for joints takes one value for all of them or one
 //! a joint, base to tip. Every fault of the section is reported at once.
 use super::controller::LoopParameters;
-use super::drive::DriveParameters;
-use super::motor::MotorParameters;
+use super::model::ModelParameters;
 use super::plant::PlantParameters;
 use super::planted::{self, PlantedObject};
-use super::servo::ServoParameters;
-use crate::codec::damiao::wire_of;
-use crate::codec::damiao_frames::Wire;
+use crate::protocols::REGISTRY;
 use std::cell::RefCell;
 use std::path::Path;
-use taustream_arm::{Cia402, Damiao, DamiaoMode, Fault, Faults, Protocol, Servo, Settings};
+use taustream_arm::{BusKind, Fault, Faults, MitGains, Servo, Settings};
 use taustream_motion::JointLimits;
 use toml::{Table, Value};
 
 /// One servo and the joint that it moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct DriveSetup {
     /// The joint's name.
     pub joint: String,
     /// Index of its bus in [`Settings::buses`].
     pub bus: usize,
     /// The servo.
-    pub parameters: ServoParameters,
+    pub parameters: Box<dyn ModelParameters>,
     /// Objects of its drive that hold something else than the parameters make.
     pub objects: Vec<PlantedObject>,
 }
@@ -39,7 +36,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let joints = settings.robot.joints.len();
     let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
     let mut setups: Vec<DriveSetup> =
-        settings.servos.iter().map(|servo| section.setup(settings, servo)).collect();
+        settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
     section.plant_objects(&mut setups);
     section.unknown_keys();
@@ -70,11 +67,9 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
 /// A few cycles of a six-joint arm: enough for a burst, and an overload shows within a tenth of a second.
 const QUEUE_FRAMES: u32 = 64;
 
-/// Every key, for unknown ones to be found, and for the nearest known key to be named.
-const KEYS: [&str; 33] = [
-    "objects",
+/// Keys of every servo and of the buses; those of each protocol come beside them.
+const KEYS: [&str; 18] = [
     "bus_queue_frames",
-    "dummy_mapping",
     "start_rad",
     "inertia_kg_m2",
     "viscous_nm_s_rad",
@@ -90,58 +85,23 @@ const KEYS: [&str; 33] = [
     "integral_time_ms",
     "torque_lag_ms",
     "extrapolation_ms",
-    "following_window_rad",
-    "following_timeout_ms",
-    "soft_limit_margin_rad",
-    "slow_rad_s2",
-    "quick_stop_rad_s2",
-    "watchdog_ms",
     "boot_ms",
     "step_us",
-    "motor_position_range_rad",
-    "motor_velocity_range_rad_s",
-    "motor_torque_range_nm",
-    "motor_mode",
-    "motor_timeout_ms",
-    "mode_offset_ids",
-    "continuous_feedback_ms",
 ];
 
 /// What a joint is by default.
-#[derive(Clone, Copy)]
-struct Load {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Load {
     inertia_kg_m2: f64,
     viscous_nm_s_rad: f64,
     coulomb_nm: f64,
     gravity_nm: f64,
 }
 
-/// A joint of an arm of some 20 kg, as a geared drive moves it.
-const LARGE: Load = Load { inertia_kg_m2: 1.0, viscous_nm_s_rad: 1.0, coulomb_nm: 1.0, gravity_nm: 10.0 };
-
-/// A joint that a motor can carry and its gains can hold: damped by 0.7 as a spring, so light that the motor accelerates it as
-/// the limits allow, and out of its place by a tenth of the tracking error that stops the arm, at most.
-fn load_for(damiao: &Damiao, acceleration_rad_s2: f64, tracking_rad: f64) -> Load {
-    const DAMPING_RATIO: f64 = 0.7;
-    let torque_nm = damiao.torque_range_nm;
-    let moved_kg_m2 = 0.3 * torque_nm / acceleration_rad_s2.max(1e-3);
-    let (damped_kg_m2, held_nm, damping_nm_s_rad) = match damiao.mode {
-        DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } => (
-            damping_nm_s_rad.powi(2) / (4.0 * DAMPING_RATIO.powi(2) * stiffness_nm_rad),
-            0.1 * tracking_rad * stiffness_nm_rad,
-            damping_nm_s_rad,
-        ),
-        DamiaoMode::PosVel => (f64::INFINITY, f64::INFINITY, f64::INFINITY),
-    };
-    let inertia_kg_m2 = damped_kg_m2.min(moved_kg_m2).clamp(1e-4, LARGE.inertia_kg_m2);
-    // It falls while the gains rise: no faster than a long link.
-    let falling_nm = 20.0 * inertia_kg_m2;
-    Load {
-        inertia_kg_m2,
-        viscous_nm_s_rad: LARGE.viscous_nm_s_rad.min(0.1 * damping_nm_s_rad).min(0.01 * torque_nm),
-        coulomb_nm: LARGE.coulomb_nm.min(0.01 * torque_nm).min(held_nm),
-        gravity_nm: LARGE.gravity_nm.min(0.05 * torque_nm).min(held_nm).min(falling_nm),
-    }
+impl Load {
+    /// A joint of an arm of some 20 kg, as a geared drive moves it.
+    pub(crate) const LARGE: Self =
+        Self { inertia_kg_m2: 1.0, viscous_nm_s_rad: 1.0, coulomb_nm: 1.0, gravity_nm: 10.0 };
 }
 
 /// The section while it is being read.
@@ -152,117 +112,96 @@ struct Section<'a> {
     faults: RefCell<Vec<Fault>>,
 }
 
-impl Section<'_> {
-    fn setup(&self, settings: &Settings, servo: &Servo) -> DriveSetup {
-        let joint = settings.robot.joints.get(servo.joint);
-        let limits = joint.map(|joint| joint.limits).unwrap_or_default();
-        let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
-        let at = servo.joint;
-        let plant = self.plant(at, servo, &limits, settings.supervision.tracking_error_rad_max);
-        let parameters = match servo.protocol {
-            Protocol::Cia402(cia402) => {
-                let watchdog_ms = settings.cycle.drive_watchdog_ms;
-                ServoParameters::Cia402(self.drive(servo, &cia402, (plant, &limits), watchdog_ms))
-            }
-            Protocol::Damiao(damiao) => {
-                let wire = settings.buses.get(servo.bus).map_or(Wire::Classic, |bus| wire_of(bus.kind));
-                ServoParameters::Damiao(self.motor(servo, &damiao, (plant, &limits), wire))
-            }
+/// One joint's part of the section while it is being read.
+pub(crate) struct SimulatedJoint<'a> {
+    section: &'a Section<'a>,
+    /// Of the arm.
+    pub(crate) settings: &'a Settings,
+    /// Its servo.
+    pub(crate) servo: &'a Servo,
+    /// Of the joint.
+    pub(crate) limits: JointLimits,
+}
+
+impl SimulatedJoint<'_> {
+    /// A number, or `default`.
+    pub(crate) fn number(
+        &self,
+        key: &'static str,
+        default: f64,
+        range: std::ops::RangeInclusive<f64>,
+    ) -> f64 {
+        self.section.number(key, self.servo.joint, default, range)
+    }
+
+    /// A whole number, or `default`.
+    pub(crate) fn whole<T>(&self, key: &'static str, default: u32, range: std::ops::RangeInclusive<u32>) -> T
+    where
+        T: TryFrom<u32> + Default,
+    {
+        self.section.whole(key, self.servo.joint, default, range)
+    }
+
+    /// True or false, or `default`.
+    pub(crate) fn flag(&self, key: &'static str, default: bool) -> bool {
+        self.section.flag(key, self.servo.joint, default)
+    }
+
+    /// Kind of its bus.
+    pub(crate) fn bus_kind(&self) -> Option<BusKind> {
+        self.settings.buses.get(self.servo.bus).map(|bus| bus.kind)
+    }
+
+    /// Link angle at power-up.
+    pub(crate) fn start_rad(&self) -> f64 {
+        let [low_rad, high_rad] = self.limits.position_rad;
+        self.number("start_rad", 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad)
+    }
+
+    /// Time from power-up to the first answer.
+    pub(crate) fn boot_s(&self) -> f64 {
+        self.number("boot_ms", 20.0, 0.0..=60_000.0) * 1e-3
+    }
+
+    /// Step of the mechanics.
+    pub(crate) fn step_ns(&self) -> u64 {
+        u64::from(self.whole::<u32>("step_us", 250, 10..=1000)) * 1000
+    }
+
+    /// A joint that a motor of this torque can carry and its gains, if it has any, can hold: damped by 0.7 as a spring, so light
+    /// that the motor accelerates it as the limits allow, and out of its place by a tenth of the tracking error that stops the
+    /// arm, at most.
+    pub(crate) fn load_for(&self, torque_nm: f64, gains: Option<MitGains>) -> Load {
+        const DAMPING_RATIO: f64 = 0.7;
+        let large = Load::LARGE;
+        let tracking_rad = self.settings.supervision.tracking_error_rad_max;
+        let moved_kg_m2 = 0.3 * torque_nm / self.limits.stop.acceleration_rad_s2.max(1e-3);
+        let (damped_kg_m2, held_nm, damping_nm_s_rad) = match gains {
+            Some(MitGains { stiffness_nm_rad, damping_nm_s_rad, .. }) => (
+                damping_nm_s_rad.powi(2) / (4.0 * DAMPING_RATIO.powi(2) * stiffness_nm_rad),
+                0.1 * tracking_rad * stiffness_nm_rad,
+                damping_nm_s_rad,
+            ),
+            None => (f64::INFINITY, f64::INFINITY, f64::INFINITY),
         };
-        DriveSetup { joint: name, bus: servo.bus, parameters, objects: Vec::new() }
-    }
-
-    fn start_rad(&self, at: usize, limits: &JointLimits) -> f64 {
-        let [low_rad, high_rad] = limits.position_rad;
-        self.number("start_rad", at, 0.0_f64.clamp(low_rad, high_rad), low_rad..=high_rad)
-    }
-
-    fn boot_s(&self, at: usize) -> f64 {
-        self.number("boot_ms", at, 20.0, 0.0..=60_000.0) * 1e-3
-    }
-
-    fn step_ns(&self, at: usize) -> u64 {
-        u64::from(self.whole::<u32>("step_us", at, 250, 10..=1000)) * 1000
-    }
-
-    fn drive(
-        &self,
-        servo: &Servo,
-        cia402: &Cia402,
-        (plant, limits): (PlantParameters, &JointLimits),
-        watchdog_ms: u32,
-    ) -> DriveParameters {
-        let at = servo.joint;
-        let [low_rad, high_rad] = limits.position_rad;
-        let margin_rad = self.number("soft_limit_margin_rad", at, 0.02, 0.0..=3.0);
-        let (slow_rad_s2, quick_rad_s2) =
-            (limits.motion.acceleration_rad_s2.max(1e-3), limits.stop.acceleration_rad_s2.max(1e-3));
-        DriveParameters {
-            node_id: servo.node_id,
-            sign: servo.sign,
-            gear_ratio: cia402.gear_ratio,
-            counts_per_rev: cia402.counts_per_rev,
-            zero_offset_rad: servo.zero_offset_rad,
-            home_offset_counts: cia402.home_offset_counts,
-            dummy_mapping: self.flag("dummy_mapping", at, true),
-            start_rad: self.start_rad(at, limits),
-            plant,
-            loops: self.loops(at),
-            following_window_rad: self.number("following_window_rad", at, 0.3, 1e-6..=100.0),
-            following_timeout_ms: self.whole("following_timeout_ms", at, 50, 0..=65_535),
-            soft_limit_rad: [low_rad - margin_rad, high_rad + margin_rad],
-            slow_rad_s2: self.number("slow_rad_s2", at, slow_rad_s2, 1e-3..=1e4),
-            quick_rad_s2: self.number("quick_stop_rad_s2", at, quick_rad_s2, 1e-3..=1e4),
-            watchdog_ms: self.whole("watchdog_ms", at, watchdog_ms, 0..=65_535),
-            reaction: servo.reaction,
-            boot_s: self.boot_s(at),
-            step_ns: self.step_ns(at),
-        }
-    }
-
-    /// A motor as it is sold: its flash holds the ranges that the settings state, MIT mode, and no watchdog.
-    fn motor(
-        &self,
-        servo: &Servo,
-        damiao: &Damiao,
-        (plant, limits): (PlantParameters, &JointLimits),
-        wire: Wire,
-    ) -> MotorParameters {
-        let at = servo.joint;
-        let reach = |key, stated| self.number(key, at, stated, 1e-3..=1e6);
-        MotorParameters {
-            node_id: servo.node_id,
-            feedback_id: damiao.feedback_id,
-            wire,
-            sign: servo.sign,
-            zero_offset_rad: servo.zero_offset_rad,
-            start_rad: self.start_rad(at, limits),
-            plant,
-            loops: self.loops(at),
-            ranges: [
-                reach("motor_position_range_rad", damiao.position_range_rad),
-                reach("motor_velocity_range_rad_s", damiao.velocity_range_rad_s),
-                reach("motor_torque_range_nm", damiao.torque_range_nm),
-            ],
-            mode: self.whole("motor_mode", at, 1, 1..=4),
-            timeout_ms: self.whole("motor_timeout_ms", at, 0, 0..=65_535),
-            mode_offset_ids: self.flag("mode_offset_ids", at, false),
-            continuous_ms: self.whole("continuous_feedback_ms", at, 0, 0..=10_000),
-            boot_s: self.boot_s(at),
-            step_ns: self.step_ns(at),
+        let inertia_kg_m2 = damped_kg_m2.min(moved_kg_m2).clamp(1e-4, large.inertia_kg_m2);
+        // It falls while the gains rise: no faster than a long link.
+        let falling_nm = 20.0 * inertia_kg_m2;
+        Load {
+            inertia_kg_m2,
+            viscous_nm_s_rad: large.viscous_nm_s_rad.min(0.1 * damping_nm_s_rad).min(0.01 * torque_nm),
+            coulomb_nm: large.coulomb_nm.min(0.01 * torque_nm).min(held_nm),
+            gravity_nm: large.gravity_nm.min(0.05 * torque_nm).min(held_nm).min(falling_nm),
         }
     }
 
     /// Mechanics; torque and speed that the motor has by default suffice for the joint's stop limits.
-    fn plant(&self, at: usize, servo: &Servo, limits: &JointLimits, tracking_rad: f64) -> PlantParameters {
-        let load = match servo.protocol {
-            Protocol::Cia402(_) => LARGE,
-            Protocol::Damiao(damiao) => load_for(&damiao, limits.stop.acceleration_rad_s2, tracking_rad),
-        };
-        let inertia_kg_m2 = self.number("inertia_kg_m2", at, load.inertia_kg_m2, 1e-4..=1e4);
-        let viscous_nm_s_rad = self.number("viscous_nm_s_rad", at, load.viscous_nm_s_rad, 0.0..=1e4);
-        let coulomb_nm = self.number("coulomb_nm", at, load.coulomb_nm, 0.0..=1e4);
-        let gravity_nm = self.number("gravity_nm", at, load.gravity_nm, -1e4..=1e4);
+    pub(crate) fn plant(&self, load: Load) -> PlantParameters {
+        let limits = &self.limits;
+        let inertia_kg_m2 = self.number("inertia_kg_m2", load.inertia_kg_m2, 1e-4..=1e4);
+        let viscous_nm_s_rad = self.number("viscous_nm_s_rad", load.viscous_nm_s_rad, 0.0..=1e4);
+        let coulomb_nm = self.number("coulomb_nm", load.coulomb_nm, 0.0..=1e4);
+        let gravity_nm = self.number("gravity_nm", load.gravity_nm, -1e4..=1e4);
         let speed_rad_s = limits.motion.velocity_rad_s.max(1e-3);
         let load_nm = gravity_nm.abs() + coulomb_nm + viscous_nm_s_rad * speed_rad_s;
         let enough_nm = 1.5 * (load_nm + inertia_kg_m2 * limits.stop.acceleration_rad_s2);
@@ -271,23 +210,35 @@ impl Section<'_> {
             viscous_nm_s_rad,
             coulomb_nm,
             gravity_nm,
-            gravity_level_rad: self.number("gravity_level_rad", at, 0.0, -100.0..=100.0),
-            torque_nm_max: self.number("torque_nm_max", at, enough_nm.max(1e-3), 1e-3..=1e6),
-            speed_rad_s_max: self.number("speed_rad_s_max", at, 1.25 * speed_rad_s, 1e-3..=1e3),
-            brake: self.flag("brake", at, servo.limp_is_safe),
-            brake_delay_s: self.number("brake_delay_ms", at, 20.0, 0.0..=5000.0) * 1e-3,
+            gravity_level_rad: self.number("gravity_level_rad", 0.0, -100.0..=100.0),
+            torque_nm_max: self.number("torque_nm_max", enough_nm.max(1e-3), 1e-3..=1e6),
+            speed_rad_s_max: self.number("speed_rad_s_max", 1.25 * speed_rad_s, 1e-3..=1e3),
+            brake: self.flag("brake", self.servo.limp_is_safe),
+            brake_delay_s: self.number("brake_delay_ms", 20.0, 0.0..=5000.0) * 1e-3,
         }
     }
 
     /// Control loops. The bounds keep the fastest of them stable at the largest step of the mechanics.
-    fn loops(&self, at: usize) -> LoopParameters {
+    pub(crate) fn loops(&self) -> LoopParameters {
         LoopParameters {
-            position_gain_1_s: self.number("position_gain_1_s", at, 60.0, 1.0..=150.0),
-            velocity_bandwidth_rad_s: self.number("velocity_bandwidth_rad_s", at, 400.0, 10.0..=600.0),
-            integral_time_s: self.number("integral_time_ms", at, 20.0, 5.0..=1000.0) * 1e-3,
-            torque_lag_s: self.number("torque_lag_ms", at, 0.3, 0.0..=0.5) * 1e-3,
-            extrapolation_s: self.number("extrapolation_ms", at, 0.0, 0.0..=1000.0) * 1e-3,
+            position_gain_1_s: self.number("position_gain_1_s", 60.0, 1.0..=150.0),
+            velocity_bandwidth_rad_s: self.number("velocity_bandwidth_rad_s", 400.0, 10.0..=600.0),
+            integral_time_s: self.number("integral_time_ms", 20.0, 5.0..=1000.0) * 1e-3,
+            torque_lag_s: self.number("torque_lag_ms", 0.3, 0.0..=0.5) * 1e-3,
+            extrapolation_s: self.number("extrapolation_ms", 0.0, 0.0..=1000.0) * 1e-3,
         }
+    }
+}
+
+impl Section<'_> {
+    fn setup(&self, settings: &Settings, servo: &Servo) -> Option<DriveSetup> {
+        let joint = settings.robot.joints.get(servo.joint);
+        let limits = joint.map(|joint| joint.limits).unwrap_or_default();
+        let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
+        let known = REGISTRY.iter().find(|known| known.name == servo.protocol.name())?;
+        let simulated = SimulatedJoint { section: self, settings, servo, limits };
+        let parameters = (known.simulate)(&simulated);
+        Some(DriveSetup { joint: name, bus: servo.bus, parameters, objects: Vec::new() })
     }
 
     /// Objects of drives that hold something else than the parameters make.
@@ -382,9 +333,11 @@ impl Section<'_> {
     }
 
     fn unknown_keys(&self) {
+        let of_protocols = REGISTRY.iter().flat_map(|known| known.simulator_keys);
+        let keys: Vec<&str> = KEYS.iter().chain(of_protocols).copied().collect();
         for (key, value) in self.table {
-            if !KEYS.contains(&key.as_str()) {
-                self.fault(key, &value.to_string(), &format!("one of the keys {}", KEYS.join(", ")));
+            if !keys.contains(&key.as_str()) {
+                self.fault(key, &value.to_string(), &format!("one of the keys {}", keys.join(", ")));
             }
         }
     }

@@ -3,7 +3,7 @@
 //! Pure like the drives: frames, commands and time in, frames out. Randomness comes from a seed.
 use super::disturbance::Disturbance;
 use super::faults::{After, FaultKind, FaultRequest};
-use super::servo::SimulatedServo;
+use super::model::ServoModel;
 use super::settings::DriveSetup;
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
@@ -19,7 +19,7 @@ const HELD_MAX: usize = 4096;
 struct Unit {
     joint: String,
     bus: usize,
-    drive: SimulatedServo,
+    drive: Box<dyn ServoModel>,
     enabled: Option<Nanos>,
     moving: Option<Nanos>,
     silent: bool,
@@ -65,7 +65,7 @@ impl ServoSimulator {
         let units = setups.into_iter().map(|setup| Unit {
             joint: setup.joint,
             bus: setup.bus,
-            drive: SimulatedServo::new(setup.parameters, &setup.objects),
+            drive: setup.parameters.build(&setup.objects),
             enabled: None,
             moving: None,
             silent: false,
@@ -90,8 +90,8 @@ impl ServoSimulator {
 
     /// The drive of a joint.
     #[must_use]
-    pub fn drive(&self, joint: usize) -> Option<&SimulatedServo> {
-        self.units.get(joint).map(|unit| &unit.drive)
+    pub fn drive(&self, joint: usize) -> Option<&dyn ServoModel> {
+        self.units.get(joint).map(|unit| &*unit.drive)
     }
 
     /// Requests a fault.
@@ -153,12 +153,12 @@ impl ServoSimulator {
         now: Nanos,
         at: usize,
         out: &mut [Vec<CanFrame>],
-        call: impl FnOnce(&mut SimulatedServo, &mut Vec<CanFrame>),
+        call: impl FnOnce(&mut dyn ServoModel, &mut Vec<CanFrame>),
     ) {
         let mut frames = std::mem::take(&mut self.scratch);
         frames.clear();
         if let Some(unit) = self.units.get_mut(at) {
-            call(&mut unit.drive, &mut frames);
+            call(&mut *unit.drive, &mut frames);
             let (bus, silent, delay_s, loss) = (unit.bus, unit.silent, unit.delay_s, unit.loss);
             for frame in frames.iter().filter(|_| !silent) {
                 if self.is_lost(loss) {

@@ -1,7 +1,7 @@
 //! Bring-up of drives: what is asked, what is refused, and what an energised drive keeps.
 use super::{Bench, ENABLED, FOLLOWS, QUICK_STOP, SWITCH_ON_DISABLED, frame, hex, settings};
-use taustream_arm::{Overruled, Protocol, Reaction, ScaleObject};
-use taustream_drivers::bring_up::explain_refusal;
+use taustream_arm::{Cia402, Overruled, Reaction, ScaleObject};
+use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
 /// Every frame that node 1 is sent from the first look to NMT start, written out from CiA 301 and CiA 402-2.
@@ -390,8 +390,9 @@ fn bring_up_of_a_drive_that_counts_otherwise_is_refused_by_object_and_numbers() 
 #[test]
 fn bring_up_with_an_overruled_object_takes_the_drive() {
     let mut settings = settings(1);
-    let Protocol::Cia402(cia402) = &mut settings.servos[0].protocol else { unreachable!() };
-    cia402.overruled = Overruled::NONE.with(ScaleObject::GearRatio);
+    let cia402 = *settings.servos[0].protocol.get::<Cia402>().unwrap();
+    let overruled = Overruled::NONE.with(ScaleObject::GearRatio);
+    settings.servos[0].protocol = Cia402 { overruled, ..cia402 }.into();
     let mut bench = Bench::with(settings);
     bench.drives[0].objects.insert((0x6091, 1), (4, 1));
     bench.drives[0].objects.insert((0x6091, 2), (4, 1));

@@ -1,8 +1,8 @@
 //! From silence to a configured motor: what is looked at, what is written, and what is refused.
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
 use taustream_arm::BusKind;
-use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
-use taustream_drivers::{CanFrame, DriveState, DriveTarget, drivers};
+use taustream_drivers::protocols::damiao::frames::{Request, Special, Wire};
+use taustream_drivers::{CanFrame, DriveState, DriveTarget, protocols};
 
 /// Everything that motor 1 is sent, without repetitions of the same frame.
 fn requests(arm: &mut Arm, cycles: u32) -> Vec<Request> {
@@ -149,7 +149,7 @@ fn motor_that_somebody_else_has_energised_is_left_alone_until_torque_off() {
 fn motors_that_a_dead_streamer_left_energised_are_unowned_in_each_mode() {
     for settings in [edited(&[]), pos_vel()] {
         let mut arm = Arm::enabled(settings.clone());
-        arm.driver = drivers::of_bus(&settings, 0).unwrap();
+        arm.driver = protocols::of_bus(&settings, 0).unwrap();
         arm.drive_target = DriveTarget::Disabled;
         arm.until(DriveState::EnergisedUnowned);
         for joint in 0..JOINTS {

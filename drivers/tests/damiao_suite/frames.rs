@@ -1,6 +1,6 @@
 //! Frames and packing, against bytes written out by hand from the manual's tables.
-use taustream_drivers::codec::damiao_frames::{Feedback, Reply, Request, Special, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges, MitState, Span};
+use taustream_drivers::protocols::damiao::frames::{Feedback, Reply, Request, Special, Wire};
 use taustream_drivers::{CanFrame, CanId};
 
 const DM4310: MitRanges = MitRanges::symmetric(12.5, 30.0, 10.0);

@@ -1,8 +1,8 @@
 //! The codec against frames of an independent library (`tests/peers/damiao_frames.py` writes them, and checks them in
 //! every whole test run).
 use std::fmt::Debug;
-use taustream_drivers::codec::damiao_frames::{Reply, Request, Special, Wire};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
+use taustream_drivers::protocols::damiao::frames::{Reply, Request, Special, Wire};
 use taustream_drivers::{CanFrame, CanId};
 
 const FRAMES: &str = include_str!("frames.csv");

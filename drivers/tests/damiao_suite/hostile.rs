@@ -1,8 +1,7 @@
 //! Frames that should never be sent: nothing panics, nothing moves, nothing is believed that is not the motor's.
 use super::{Arm, JOINTS, edited};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
-use taustream_drivers::codec::damiao_frames::{Reply, Request, Special, Wire};
-use taustream_drivers::sim::SimulatedServo;
+use taustream_drivers::protocols::damiao::frames::{Reply, Request, Special, Wire};
 use taustream_drivers::{CanFrame, CanId, DriveState, DriveTarget};
 
 /// Frames that are often nearly right: identifiers of the protocol, its first bytes, any length, classic or FD.
@@ -82,7 +81,7 @@ proptest! {
             arm.simulator.advance(arm.now, &mut out);
             arm.simulator.receive(arm.now, 0, &[frame], &mut out);
             for joint in 0..JOINTS {
-                let SimulatedServo::Damiao(motor) = arm.servo(joint) else { panic!("joint {joint} is no motor") };
+                let motor = arm.servo(joint);
                 assert!(motor.position_rad().is_finite() && motor.velocity_rad_s().abs() < 100.0);
             }
             for frame in &out[0] {

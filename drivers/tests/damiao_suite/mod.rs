@@ -1,11 +1,12 @@
 //! A bench of a bus in memory: the drivers of its settings against its simulated servos, in cycles of 1 ms.
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
-use taustream_drivers::drivers::BusDriver;
+use taustream_drivers::protocols::BusDriver;
+use taustream_drivers::protocols::damiao::{Motor, MotorParameters};
 use taustream_drivers::sim::settings::{DriveSetup, drives};
-use taustream_drivers::sim::{FaultRequest, ServoParameters, ServoSimulator, SimulatedServo};
+use taustream_drivers::sim::{FaultRequest, ServoModel, ServoSimulator};
 use taustream_drivers::{
-    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus, drivers,
+    CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus, protocols,
 };
 
 mod bring_up;
@@ -66,7 +67,7 @@ impl Arm {
         let mut setups = drives(&settings, Some(&START_RAD)).unwrap();
         setups.iter_mut().for_each(change);
         Self {
-            driver: drivers::of_bus(&settings, 0).unwrap(),
+            driver: protocols::of_bus(&settings, 0).unwrap(),
             simulator: ServoSimulator::new(setups, 1, 1),
             settings,
             now: Nanos(1_000_000_000),
@@ -135,7 +136,7 @@ impl Arm {
     /// What an operator reads about a servo.
     pub(crate) fn why(&self, joint: usize) -> String {
         let status = self.status(joint);
-        taustream_drivers::bring_up::explain_refusal(&status.refusal())
+        taustream_drivers::words::explain_refusal(&status.refusal())
     }
 
     /// Sets the commands to where the joints are, as the streamer does before it enables.
@@ -173,16 +174,13 @@ impl Arm {
         self.simulator.request(self.now, FaultRequest::parse(&text, &names).unwrap());
     }
 
-    pub(crate) fn servo(&self, joint: usize) -> &SimulatedServo {
+    pub(crate) fn servo(&self, joint: usize) -> &dyn ServoModel {
         self.simulator.drive(joint).unwrap()
     }
 
     /// Status nibble of a simulated motor.
     pub(crate) fn nibble(&self, joint: usize) -> u8 {
-        match self.servo(joint) {
-            SimulatedServo::Damiao(motor) => motor.status(),
-            SimulatedServo::Cia402(_) => panic!("joint {joint} is no motor"),
-        }
+        self.servo(joint).get::<Motor>().unwrap().status()
     }
 
     /// Bytes of the newest cycle's frames under an identifier.
@@ -192,9 +190,6 @@ impl Arm {
 }
 
 /// The parameters of a motor, to be changed before it powers up.
-pub(crate) fn motor_of(setup: &mut DriveSetup) -> &mut taustream_drivers::sim::MotorParameters {
-    match &mut setup.parameters {
-        ServoParameters::Damiao(motor) => motor,
-        ServoParameters::Cia402(_) => panic!("{} is no motor", setup.joint),
-    }
+pub(crate) fn motor_of(setup: &mut DriveSetup) -> &mut MotorParameters {
+    setup.parameters.get_mut().unwrap()
 }

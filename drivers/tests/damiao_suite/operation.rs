@@ -1,16 +1,16 @@
 //! Energising, following, letting go.
 use super::{Arm, JOINTS, edited, motor_of, pos_vel};
-use taustream_arm::Settings;
-use taustream_drivers::codec::damiao_frames::{Request, Special, Wire};
+use taustream_arm::{Damiao, Settings};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
+use taustream_drivers::protocols::damiao::frames::{Request, Special, Wire};
 use taustream_drivers::{DriveState, DriveTarget, JointCommand, ServoDriver, ZeroRefused};
 
 /// What a motor of the arm is commanded in the newest cycle, decoded with its ranges.
 fn mit(arm: &Arm, joint: usize) -> Option<MitCommand> {
     let servo = &arm.settings.servos[joint];
-    let damiao = servo.protocol.as_damiao()?;
-    let ranges =
-        MitRanges::symmetric(damiao.position_range_rad, damiao.velocity_range_rad_s, damiao.torque_range_nm);
+    let damiao = servo.protocol.get::<Damiao>()?;
+    let span = damiao.ranges;
+    let ranges = MitRanges::symmetric(span.position_rad, span.velocity_rad_s, span.torque_nm);
     arm.sent.iter().find_map(|frame| match Request::decode(frame, servo.node_id) {
         Some(Request::Mit(bytes)) => Some(MitCommand::decode(bytes, &ranges)),
         _ => None,
@@ -98,7 +98,8 @@ fn motors_follow_a_sine_in_both_modes_and_velocity_is_fed_forward() {
         assert_eq!(arm.states(), [DriveState::Enabled; JOINTS]);
         assert!(errors_rad.iter().all(|error| *error < worst_rad), "{errors_rad:?}");
         // Gravity bends a spring: shoulder lift carries more than pan.
-        if arm.settings.servos[0].protocol.as_damiao().unwrap().mode != taustream_arm::DamiaoMode::PosVel {
+        if arm.settings.servos[0].protocol.get::<Damiao>().unwrap().mode != taustream_arm::DamiaoMode::PosVel
+        {
             assert!(errors_rad[1] > 1.5 * errors_rad[0], "gains act: {errors_rad:?}");
         }
     }

@@ -1,9 +1,9 @@
 //! A master that ends while the drives are energised, and the next one that finds them so.
 use super::arm::{Arm, shipped};
 use taustream_arm::{Reaction, Settings};
-use taustream_drivers::bring_up::explain_refusal;
 use taustream_drivers::codec::cia402::Cia402Driver;
-use taustream_drivers::sim::PowerState;
+use taustream_drivers::sim::{Drive, PowerState};
+use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, ServoDriver};
 
 /// Two encoder counts: what a drive steers to may not move by more.
@@ -49,7 +49,7 @@ fn only_reads(frames: &[CanFrame]) -> bool {
 fn standing(arm: &Arm) -> [(f64, f64); 6] {
     std::array::from_fn(|joint| {
         let servo = arm.simulator.drive(joint).unwrap();
-        (servo.as_cia402().unwrap().reference_rad(), servo.position_rad())
+        (servo.get::<Drive>().unwrap().reference_rad(), servo.position_rad())
     })
 }
 
@@ -72,7 +72,7 @@ fn drives_that_hold_are_adopted_by_reading_and_kept_without_a_jump() {
     ] {
         let mut arm = orphaned(Reaction::Hold, ms);
         assert_eq!(
-            arm.simulator.drive(1).unwrap().as_cia402().unwrap().power_state(),
+            arm.simulator.drive(1).unwrap().get::<Drive>().unwrap().power_state(),
             state,
             "{ms} ms after"
         );
@@ -134,9 +134,9 @@ fn adopted_drives_are_de_energised_on_request() {
                 arm.cycle(DriveTarget::Keep);
             }
             arm.reach(drive_target, DriveState::Disabled);
-            assert!((0..6).all(
-                |joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0
-            ));
+            assert!((0..6).all(|joint| {
+                arm.simulator.drive(joint).unwrap().get::<Drive>().unwrap().statusword() & 0x04 == 0
+            }));
         }
     }
 }
@@ -171,9 +171,9 @@ fn drives_of_another_configuration_are_left_alone_and_the_difference_named() {
             arm.cycle(DriveTarget::TorqueOff);
         }
         assert!(
-            (0..6).all(
-                |joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 == 0
-            ),
+            (0..6)
+                .all(|joint| arm.simulator.drive(joint).unwrap().get::<Drive>().unwrap().statusword() & 0x04
+                    == 0),
             "{object}"
         );
         // Then they are anybody's, and come up as after power-up.
@@ -208,7 +208,7 @@ fn taking_over_that_is_called_off_leaves_the_drives_holding() {
     }
     assert_still(&arm, &rest, "called off");
     assert!(
-        (0..6).all(|joint| arm.simulator.drive(joint).unwrap().as_cia402().unwrap().statusword() & 0x04 != 0),
+        (0..6).all(|joint| arm.simulator.drive(joint).unwrap().get::<Drive>().unwrap().statusword() & 0x04 != 0),
         "one was de-energised"
     );
 }

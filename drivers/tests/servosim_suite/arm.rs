@@ -3,7 +3,7 @@ use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::sim::settings::drives;
-use taustream_drivers::sim::{FaultRequest, ServoSimulator};
+use taustream_drivers::sim::{Drive, FaultRequest, ServoSimulator};
 use taustream_drivers::{
     CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
@@ -242,6 +242,6 @@ fn master_that_vanishes_leaves_the_arm_stopped_and_held() {
     for joint in 0..6 {
         let drive = arm.simulator.drive(joint).unwrap();
         assert!((drive.position_rad() - rest_rad[joint]).abs() < 1e-9, "joint {joint} still moves");
-        assert_eq!(drive.as_cia402().unwrap().statusword() & 0x4F, 0x08, "joint {joint} is not in fault");
+        assert_eq!(drive.get::<Drive>().unwrap().statusword() & 0x4F, 0x08, "joint {joint} is not in fault");
     }
 }

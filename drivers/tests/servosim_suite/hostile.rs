@@ -4,7 +4,7 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptes
 use std::path::Path;
 use taustream_arm::Settings;
 use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{FaultRequest, ServoParameters, SimulatorCommand};
+use taustream_drivers::sim::{DriveParameters, FaultRequest, SimulatorCommand};
 use taustream_drivers::{CanFrame, CanId};
 
 fn joints() -> Vec<String> {
@@ -162,7 +162,7 @@ fn empty_section_gives_motors_that_suffice_for_the_stop_limits() {
     let setups = drives(&settings, None).unwrap_or_else(|faults| panic!("{faults}"));
     assert_eq!(setups.len(), 6);
     for (setup, joint) in setups.iter().zip(&settings.robot.joints) {
-        let ServoParameters::Cia402(drive) = setup.parameters else { panic!("{} is no drive", setup.joint) };
+        let drive = setup.parameters.get::<DriveParameters>().unwrap();
         let plant = drive.plant;
         let needed_nm = plant.inertia_kg_m2 * joint.limits.stop.acceleration_rad_s2 + plant.gravity_nm.abs();
         assert!(plant.torque_nm_max > needed_nm, "{}", setup.joint);

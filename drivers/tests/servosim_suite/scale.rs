@@ -1,10 +1,17 @@
 //! Drives that count otherwise than the settings say: what they would do, and that they are refused.
 use super::adopt::{orphaned, restart_as};
 use super::arm::{Arm, shipped};
-use taustream_arm::{Overruled, Protocol, Reaction, ScaleObject, Settings};
-use taustream_drivers::bring_up::explain_refusal;
+use taustream_arm::{Cia402, Overruled, Reaction, ScaleObject, Settings};
+use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget};
 use toml::Value;
+
+/// Changes how the elbow's drive counts.
+fn change_elbow(settings: &mut Settings, change: impl FnOnce(&mut Cia402)) {
+    let mut cia402 = *settings.servos[2].protocol.get::<Cia402>().unwrap();
+    change(&mut cia402);
+    settings.servos[2].protocol = cia402.into();
+}
 
 /// The shipped arm whose elbow's drive has these objects.
 fn with_objects(texts: &[&str]) -> Settings {
@@ -64,11 +71,12 @@ fn drives_without_the_objects_come_up() {
 #[test]
 fn overruled_gear_moves_the_joint_by_another_angle_with_feedback_that_agrees() {
     let mut settings = with_objects(&["object=0x6091:01,value=202", "object=0x607D:01,value=absent"]);
-    let Protocol::Cia402(cia402) = &mut settings.servos[2].protocol else { unreachable!() };
-    for object in [ScaleObject::GearRatio, ScaleObject::FeedConstant, ScaleObject::SoftLimit] {
-        cia402.overruled = cia402.overruled.with(object);
-    }
-    assert_ne!(cia402.overruled, Overruled::NONE);
+    change_elbow(&mut settings, |cia402| {
+        for object in [ScaleObject::GearRatio, ScaleObject::FeedConstant, ScaleObject::SoftLimit] {
+            cia402.overruled = cia402.overruled.with(object);
+        }
+        assert_ne!(cia402.overruled, Overruled::NONE);
+    });
     let mut arm = Arm::with(settings);
     let moved_rad = moved_by_fifth_of_a_radian(&mut arm);
     // Half the units a motor revolution: 0.2 rad commanded are 0.4 rad of the link.
@@ -94,10 +102,11 @@ fn moved_by_fifth_of_a_radian(arm: &mut Arm) -> f64 {
 
 /// The settings with these objects of the elbow's drive overruled.
 fn overruling(objects: &[ScaleObject], mut settings: Settings) -> Settings {
-    let Protocol::Cia402(cia402) = &mut settings.servos[2].protocol else { unreachable!() };
-    for object in objects {
-        cia402.overruled = cia402.overruled.with(*object);
-    }
+    change_elbow(&mut settings, |cia402| {
+        for object in objects {
+            cia402.overruled = cia402.overruled.with(*object);
+        }
+    });
     settings
 }
 
@@ -122,8 +131,7 @@ fn home_offset_shifts_the_zero_unless_the_settings_state_it() {
     assert!((off_rad.abs() - shift_rad).abs() < 1e-4, "off by {off_rad} rad instead of {shift_rad}");
 
     let mut stated = shipped();
-    let Protocol::Cia402(cia402) = &mut stated.servos[2].protocol else { unreachable!() };
-    cia402.home_offset_counts = OFFSET_COUNTS;
+    change_elbow(&mut stated, |cia402| cia402.home_offset_counts = OFFSET_COUNTS);
     let mut arm = Arm::with(stated.clone());
     arm.enable();
     let off_rad = arm.simulator.drive(2).unwrap().position_rad() - arm.status(2).position_rad;
@@ -136,8 +144,7 @@ fn energised_drive_that_counts_otherwise_is_not_adopted() {
     let mut arm = orphaned(Reaction::Hold, 40);
     // The next master has other settings for the same drives.
     let mut other = arm.settings.clone();
-    let Protocol::Cia402(cia402) = &mut other.servos[2].protocol else { unreachable!() };
-    cia402.gear_ratio = 50.0;
+    change_elbow(&mut other, |cia402| cia402.gear_ratio = 50.0);
     restart_as(&mut arm, &other);
     for _ in 0..3_000 {
         arm.cycle(DriveTarget::Disabled);

@@ -2,8 +2,8 @@
 //! simulated time, so that tens of thousands of cycles take seconds and always run the same.
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
-use taustream_drivers::drivers;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
+use taustream_drivers::protocols;
 use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
@@ -66,7 +66,7 @@ impl Arm {
         for (index, bus) in settings.buses.iter().enumerate() {
             far_ends.push(Some(link::open(bus, LinkChoice::Local, LinkRole::Servos, &runtime).unwrap()));
             let near_end = link::open(bus, LinkChoice::Local, LinkRole::Master, &runtime).unwrap();
-            let driver = drivers::of_bus(&settings, index).unwrap();
+            let driver = protocols::of_bus(&settings, index).unwrap();
             buses.push(Bus::new(near_end, Box::new(driver), &settings));
         }
         let (queues, command_queue) = intake::pair();

@@ -3,7 +3,7 @@ use anyhow::{Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use taustream_arm::Settings;
+use taustream_arm::{Cia402, Settings};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::retry::{Failed, passes};
 use taustream_tests::scenarios::{self, CheckMode, Goals, Scenario};
@@ -126,7 +126,7 @@ fn frames(recording: &str, interface: &str) -> Result<Vec<BusFrame>> {
 /// The servos of one bus.
 fn encodings(settings: &Settings, bus: usize) -> Vec<Encoding> {
     let encoding = |servo: &taustream_arm::Servo| {
-        let cia402 = servo.protocol.as_cia402()?;
+        let cia402 = servo.protocol.get::<Cia402>()?;
         Some(Encoding {
             joint: servo.joint,
             node_id: servo.node_id,

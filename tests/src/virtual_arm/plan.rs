@@ -1,7 +1,7 @@
 //! What goes wrong in a run, and when: decided from the seed before it begins.
 use super::random::SeededRng;
 use std::fmt;
-use taustream_arm::{Protocol, Settings};
+use taustream_arm::{Cia402, Settings};
 use taustream_drivers::sim::faults::FaultKind;
 
 /// What a plan may contain.
@@ -164,7 +164,7 @@ fn bus_event(rng: &mut SeededRng, settings: &Settings) -> Event {
 
 fn drive_event(rng: &mut SeededRng, settings: &Settings) -> Event {
     let joint = rng.index(settings.robot.joints.len());
-    let is_cia402 = matches!(settings.servos[joint].protocol, Protocol::Cia402(_));
+    let is_cia402 = settings.servos[joint].protocol.get::<Cia402>().is_some();
     let kind = match rng.whole(0, 7) {
         0 | 1 => FaultKind::Silence,
         2 => FaultKind::Delay { by_s: rng.within(0.001, 0.08) },

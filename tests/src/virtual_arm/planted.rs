@@ -1,5 +1,5 @@
 //! Drivers that do what no driver may do, so that the checker can be seen to find it.
-use taustream_drivers::drivers::BusDriver;
+use taustream_drivers::protocols::BusDriver;
 use taustream_drivers::{
     CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };

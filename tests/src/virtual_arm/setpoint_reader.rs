@@ -1,9 +1,9 @@
 //! The setpoints that a frame holds for each joint, read by decoders that share nothing with the product's.
 use crate::mit_setpoints::MotorEncoding;
 use crate::setpoints::{Encoding, target};
-use taustream_arm::{DamiaoMode, Protocol, Settings};
+use taustream_arm::{Cia402, Damiao, DamiaoMode, Settings};
 use taustream_drivers::CanFrame;
-use taustream_drivers::sim::ServoSimulator;
+use taustream_drivers::sim::{ServoModel, ServoSimulator};
 
 /// RPDO1 and RPDO2 of node 0.
 const RPDO1: u32 = 0x200;
@@ -55,24 +55,23 @@ impl SetpointReader {
     pub fn new(settings: &Settings) -> Self {
         let motors = crate::mit_setpoints::encodings(settings).unwrap_or_default();
         let reading = |servo: &taustream_arm::Servo| {
-            let kind = match servo.protocol {
-                Protocol::Cia402(cia402) => Kind::Counts(Encoding {
+            let kind = if let Some(cia402) = servo.protocol.get::<Cia402>() {
+                Kind::Counts(Encoding {
                     joint: servo.joint,
                     node_id: servo.node_id,
                     counts_per_rad: servo.sign * cia402.gear_ratio * cia402.counts_per_rev
                         / std::f64::consts::TAU,
                     zero_rad: servo.zero_offset_rad,
-                }),
-                Protocol::Damiao(damiao) => match damiao.mode {
-                    DamiaoMode::Mit { .. } => {
-                        Kind::Mit(*motors.iter().find(|motor| motor.joint == servo.joint)?)
-                    }
+                })
+            } else {
+                match servo.protocol.get::<Damiao>()?.mode {
+                    DamiaoMode::Mit(_) => Kind::Mit(*motors.iter().find(|motor| motor.joint == servo.joint)?),
                     DamiaoMode::PosVel => Kind::PosVel {
                         node_id: servo.node_id,
                         sign: servo.sign,
                         zero_rad: servo.zero_offset_rad,
                     },
-                },
+                }
             };
             Some(Reading { joint: servo.joint, bus: servo.bus, kind })
         };
@@ -152,5 +151,5 @@ impl Reading {
 /// Whether the drive of a joint follows commands with torque now.
 #[must_use]
 pub fn is_enabled(simulator: &ServoSimulator, joint: usize) -> bool {
-    simulator.drive(joint).is_some_and(taustream_drivers::sim::SimulatedServo::is_enabled)
+    simulator.drive(joint).is_some_and(ServoModel::is_enabled)
 }

@@ -8,12 +8,12 @@ use super::random::SeededRng;
 use super::setpoint_reader::is_enabled;
 use anyhow::{Context, Result};
 use std::collections::VecDeque;
-use taustream_arm::Settings;
-use taustream_drivers::drivers::{self, BusDriver};
+use taustream_arm::{Cia402, Settings};
+use taustream_drivers::protocols::{self, BusDriver};
 use taustream_drivers::sim::faults::{After, FaultKind, FaultRequest};
 use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::wire::Sender;
-use taustream_drivers::sim::{ServoSimulator, SimulatedServo};
+use taustream_drivers::sim::{ServoModel, ServoSimulator};
 use taustream_drivers::{CanFrame, CanId, Nanos, ServoDriver};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces, Report};
 use taustream_motion::{JointArray, Trajectory};
@@ -104,7 +104,7 @@ impl World {
         let buses: Vec<SharedBus> = shared.collect();
         let mut cycle_buses = Vec::new();
         for (index, (bus, shared)) in settings.buses.iter().zip(&buses).enumerate() {
-            let driver = wrap(drivers::of_bus(&settings, index).context("a driver")?);
+            let driver = wrap(protocols::of_bus(&settings, index).context("a driver")?);
             let link = VirtualLink::new(bus.interface.clone(), shared.clone());
             cycle_buses.push(Bus::new(Box::new(link), driver, &settings));
         }
@@ -192,7 +192,7 @@ impl World {
     /// True angles of the links.
     #[must_use]
     pub fn position_rad(&self) -> JointArray {
-        self.measure(SimulatedServo::position_rad)
+        self.measure(ServoModel::position_rad)
     }
 
     /// What the drives are and report.
@@ -200,7 +200,7 @@ impl World {
     pub fn drives_in_words(&self) -> String {
         let joints = self.settings.robot.joints.len();
         let word = |joint: usize| {
-            let is = self.simulator.drive(joint).map_or(String::new(), SimulatedServo::describe);
+            let is = self.simulator.drive(joint).map_or(String::new(), ServoModel::describe);
             let said =
                 self.newest.map_or((0, 0), |report| (report.drive_status[joint], report.drive_error[joint]));
             format!("joint {}: {is}, reported {:#06x}, error {:#x}", joint + 1, said.0, said.1)
@@ -208,7 +208,7 @@ impl World {
         (0..joints).map(word).collect::<Vec<_>>().join("; ")
     }
 
-    fn measure(&self, value: fn(&SimulatedServo) -> f64) -> JointArray {
+    fn measure(&self, value: fn(&dyn ServoModel) -> f64) -> JointArray {
         std::array::from_fn(|joint| self.simulator.drive(joint).map_or(0.0, value))
     }
 
@@ -348,7 +348,7 @@ impl World {
             phase: self.phase(),
             bus_lost: self.buses.iter().any(lost),
             enabled: std::array::from_fn(|joint| is_enabled(&self.simulator, joint)),
-            speed_rad_s: self.measure(SimulatedServo::velocity_rad_s),
+            speed_rad_s: self.measure(ServoModel::velocity_rad_s),
             disturbed: self.now_ms() < self.disturbed_until_ms,
         }
     }
@@ -389,7 +389,7 @@ impl World {
             self.said = said;
             for setpoint in read {
                 let enabled = is_enabled(&self.simulator, setpoint.joint);
-                let at_rad = self.simulator.drive(setpoint.joint).map_or(0.0, SimulatedServo::position_rad);
+                let at_rad = self.simulator.drive(setpoint.joint).map_or(0.0, ServoModel::position_rad);
                 self.checker.reached(setpoint, on_wire.tick, (enabled, at_rad));
             }
         }
@@ -461,7 +461,7 @@ impl World {
                 // A setpoint frame of the first servo of the bus, without data: no drive applies it.
                 let servo = self.settings.servos.iter().find(|servo| servo.bus == index);
                 let node = u16::from(servo.map_or(1, |servo| servo.node_id));
-                let is_cia402 = servo.is_some_and(|servo| servo.protocol.as_cia402().is_some());
+                let is_cia402 = servo.is_some_and(|servo| servo.protocol.get::<Cia402>().is_some());
                 let id = if is_cia402 { 0x200 + node } else { node };
                 bus.offer(now, CanFrame::classic(CanId::standard(id), &[]));
             }

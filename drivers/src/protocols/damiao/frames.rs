@@ -124,7 +124,7 @@ pub const TIMEOUT_UNITS_A_MS: u32 = 20;
 #[must_use]
 pub const fn mode_number(mode: &DamiaoMode) -> u32 {
     match mode {
-        DamiaoMode::Mit { .. } => 1,
+        DamiaoMode::Mit(_) => 1,
         DamiaoMode::PosVel => 2,
     }
 }

@@ -1,26 +1,23 @@
-//! A configured Damiao motor on its way to energised, while it follows, and back.
-use super::{Motor, MotorStage, MotorTarget, NO_REPLY, REPEAT, age};
-use crate::bring_up::damiao_fault::DamiaoFault;
+//! A configured motor on its way to energised, while it follows, and back.
+use super::super::{AnsweringMotor, Ask, MotorCommand, MotorFault, PowerWord};
+use super::{Machine, MotorStage, MotorTarget, NO_REPLY, REPEAT, age};
 use crate::bring_up::timing::BringUpCycle;
-use crate::codec::damiao_frames::{Request, STATUS_DISABLED, STATUS_ENABLED, Special};
-use crate::codec::mit::MitCommand;
 use crate::servo::{DriveTarget, Nanos};
-use taustream_arm::DamiaoMode;
 
-impl Motor {
-    pub(super) fn ready(&mut self, now: Nanos, status: Option<u8>, rises: bool) -> Option<Request> {
-        if status == Some(STATUS_ENABLED) {
+impl<M: AnsweringMotor> Machine<M> {
+    pub(super) fn ready(&mut self, now: Nanos, status: Option<PowerWord>, rises: bool) -> Option<Ask> {
+        if status == Some(PowerWord::On) {
             // Another master has energised it.
             self.stage = MotorStage::Unowned;
             return None;
         }
         if age(now, self.measured_at) >= NO_REPLY.0 && age(now, self.requested_at) >= NO_REPLY.0 {
             self.received = false;
-            self.observe(now, Some(DamiaoFault::NoReply));
+            self.observe(now, Some(MotorFault::NoReply));
             return None;
         }
         if std::mem::take(&mut self.set_zero) {
-            return Some(Request::Special(Special::SetZero, 0));
+            return Some(Ask::SetZero);
         }
         if let Some((since, next)) = self.clearing {
             if !self.in_error() {
@@ -29,125 +26,119 @@ impl Motor {
                 self.clearing = None;
             } else if now >= next {
                 self.clearing = Some((since, later(now, REPEAT)));
-                return Some(Request::Special(Special::ClearError, 0));
+                return Some(Ask::ClearError);
             }
         }
         if rises && !self.in_error() && self.fault.is_none() {
             (self.requested, self.answer) = (None, None);
             self.stage = MotorStage::Verify { job: 0, since: now };
         }
-        Some(Request::Refresh)
+        Some(Ask::Refresh)
     }
 
-    pub(super) fn arming(
-        &mut self,
-        now: Nanos,
-        target: Option<MotorTarget>,
-        since: Nanos,
-    ) -> Option<Request> {
+    pub(super) fn arming(&mut self, now: Nanos, target: Option<MotorTarget>, since: Nanos) -> Option<Ask> {
         if self.in_error() {
             self.stage = MotorStage::Ready;
-            return Some(Request::Refresh);
+            return Some(Ask::Refresh);
         }
         if age(now, since) >= self.timeouts.step.0 {
-            return self.go(DamiaoFault::NoReply);
+            return self.go(MotorFault::NoReply);
         }
         if self.measured_at <= since {
-            return Some(Request::Refresh);
+            return Some(Ask::Refresh);
         }
         // False for a position that is not known.
         let near =
             target.is_some_and(|t| (t.position_rad - self.measured.position_rad).abs() <= self.near_rad);
         if !near {
-            return self.go(DamiaoFault::CommandFar);
+            return self.go(MotorFault::CommandFar);
         }
         self.sent_rad = self.measured.position_rad;
         self.stage = MotorStage::Enable { since: now, next: now };
-        // A command without gains first: an earlier command of the motor must not take effect.
-        self.command(target, 0.0)
+        Some(if M::COMMAND_BEFORE_ENABLE { self.command(target, 0.0) } else { Ask::Refresh })
     }
 
     pub(super) fn enabling(
         &mut self,
         now: Nanos,
-        status: Option<u8>,
+        status: Option<PowerWord>,
         target: Option<MotorTarget>,
         at: (Nanos, Nanos),
-    ) -> Option<Request> {
+    ) -> Option<Ask> {
         let (since, next) = at;
-        if status == Some(STATUS_ENABLED) {
+        if status == Some(PowerWord::On) {
             self.stage = MotorStage::Ramp { since: now };
-            return self.command(target, 0.0);
+            return Some(self.command(target, 0.0));
         }
         if self.in_error() {
             self.stage = MotorStage::Ready;
-            return Some(Request::Refresh);
+            return Some(Ask::Refresh);
         }
         if age(now, since) >= self.timeouts.step.0 {
-            self.fault = Some(DamiaoFault::EnableTimeout);
+            self.fault = Some(MotorFault::EnableTimeout);
             return self.disable(now);
         }
         if now < next {
-            return self.command(target, 0.0);
+            return Some(if M::COMMAND_BEFORE_ENABLE { self.command(target, 0.0) } else { Ask::Refresh });
         }
         self.stage = MotorStage::Enable { since, next: later(now, REPEAT) };
-        Some(Request::Special(Special::Enable, 0))
+        Some(Ask::Enable)
     }
 
     pub(super) fn following(
         &mut self,
         cycle: BringUpCycle,
-        status: Option<u8>,
+        status: Option<PowerWord>,
         target: Option<MotorTarget>,
-    ) -> Option<Request> {
+    ) -> Option<Ask> {
         let now = cycle.now;
         if matches!(cycle.drive_target, DriveTarget::Disabled | DriveTarget::TorqueOff) {
             return self.disable(now);
         }
         match status {
-            None | Some(STATUS_ENABLED) => {}
-            Some(STATUS_DISABLED) => return self.go(DamiaoFault::DroppedOut),
+            None | Some(PowerWord::On) => {}
+            Some(PowerWord::Off) => return self.go(MotorFault::DroppedOut),
             Some(_) => {
                 self.stage = MotorStage::Ready;
-                return Some(Request::Refresh);
+                return Some(Ask::Refresh);
             }
         }
         if age(now, self.measured_at) >= NO_REPLY.0 {
             // A motor without feedback may still receive: it gets its commands until the target is `Disabled`.
-            self.fault.get_or_insert(DamiaoFault::NoReply);
+            self.fault.get_or_insert(MotorFault::NoReply);
         }
-        let ramped = |since| ratio(age(now, since), self.plan.ramp_ns());
+        let ramped = |since| ratio(age(now, since), self.motor.ramp_ns());
         let share = if let MotorStage::Ramp { since } = self.stage { ramped(since) } else { 1.0 };
         if share >= 1.0 {
             self.stage = MotorStage::On;
         }
-        self.command(target, share)
+        Some(self.command(target, share))
     }
 
-    pub(super) fn disabling(&mut self, now: Nanos, status: Option<u8>, since: Nanos) -> Option<Request> {
-        if status.is_some_and(|status| status != STATUS_ENABLED) {
+    pub(super) fn disabling(&mut self, now: Nanos, status: Option<PowerWord>, since: Nanos) -> Option<Ask> {
+        if status.is_some_and(|status| status != PowerWord::On) {
             self.stage = if self.fault.is_some() { MotorStage::Gone } else { MotorStage::Ready };
-            return Some(Request::Refresh);
+            return Some(Ask::Refresh);
         }
         if age(now, since) >= NO_REPLY.0 && age(now, self.measured_at) >= NO_REPLY.0 {
             self.received = false;
-            self.observe(now, Some(DamiaoFault::NoReply));
+            self.observe(now, Some(MotorFault::NoReply));
             return None;
         }
-        Some(Request::Special(Special::Disable, 0))
+        Some(Ask::Disable)
     }
 
-    pub(super) fn gone(&mut self, cycle: BringUpCycle) -> Option<Request> {
+    pub(super) fn gone(&mut self, cycle: BringUpCycle) -> Option<Ask> {
         if cycle.drive_target == DriveTarget::Disabled {
             self.observe(cycle.now, self.fault);
         }
         // It was ours: should it be energised after all, it is not left to its last command.
-        let energised = self.feedback.status == STATUS_ENABLED;
-        Some(if energised { Request::Special(Special::Disable, 0) } else { Request::Refresh })
+        let energised = self.feedback.power == PowerWord::On;
+        Some(if energised { Ask::Disable } else { Ask::Refresh })
     }
 
     /// The emergency: in any stage, before anything else.
-    pub(super) fn torque_off(&mut self, now: Nanos) -> Option<Request> {
+    pub(super) fn torque_off(&mut self, now: Nanos) -> Option<Ask> {
         match self.stage {
             MotorStage::Observe { .. }
             | MotorStage::Unowned
@@ -155,7 +146,7 @@ impl Motor {
             | MotorStage::Gone
             | MotorStage::Refused { .. } => {
                 self.requested = None;
-                Some(Request::Special(Special::Disable, 0))
+                Some(Ask::Disable)
             }
             MotorStage::Ready
             | MotorStage::Verify { .. }
@@ -167,36 +158,25 @@ impl Motor {
         }
     }
 
-    pub(super) fn disable(&mut self, now: Nanos) -> Option<Request> {
+    pub(super) fn disable(&mut self, now: Nanos) -> Option<Ask> {
         (self.requested, self.answer, self.clearing) = (None, None, None);
         self.stage = MotorStage::Disable { since: now };
-        Some(Request::Special(Special::Disable, 0))
+        Some(Ask::Disable)
     }
 
     /// The command of this cycle with this share of the gains. What is no number never becomes one: the last good
     /// angle stays.
-    fn command(&mut self, target: Option<MotorTarget>, share: f64) -> Option<Request> {
+    fn command(&mut self, target: Option<MotorTarget>, gain_share: f64) -> Ask {
         if let Some(target) = target {
             self.sent_rad = target.position_rad;
         }
         let (velocity_rad_s, torque_nm) = target.map_or((0.0, 0.0), |t| (t.velocity_rad_s, t.torque_nm));
-        match self.plan.damiao.mode {
-            DamiaoMode::Mit { stiffness_nm_rad, damping_nm_s_rad, .. } => {
-                let command = MitCommand {
-                    position_rad: self.sent_rad,
-                    velocity_rad_s,
-                    stiffness_nm_rad: share * stiffness_nm_rad,
-                    damping_nm_s_rad: share * damping_nm_s_rad,
-                    torque_nm: share * torque_nm,
-                };
-                command.encode(&self.plan.ranges()).map(Request::Mit)
-            }
-            DamiaoMode::PosVel => {
-                #[expect(clippy::cast_possible_truncation, reason = "the frame has this width")]
-                let (position_rad, velocity_rad_s) = (self.sent_rad as f32, self.plan.speed_rad_s as f32);
-                Some(Request::PosVel { position_rad, velocity_rad_s })
-            }
-        }
+        Ask::Command(MotorCommand {
+            position_rad: self.sent_rad,
+            velocity_rad_s,
+            torque_nm: gain_share * torque_nm,
+            gain_share,
+        })
     }
 }
 

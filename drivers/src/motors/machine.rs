@@ -1,20 +1,16 @@
-//! One Damiao motor from silence to following commands.
+//! One motor from silence to following commands.
 //!
 //! First it is only asked for feedback: a motor that is energised before this master has configured it is left as it is.
-//! Then its registers are compared with the settings, mode and watchdog written, and both looked at once more before
-//! every energising. A motor speaks only when it is spoken to, so every cycle has one frame for it: a command while it
-//! is energised, a request for feedback or a register else. Registers are never asked for while it follows commands.
+//! Then its parameters are compared with the settings, mode and watchdog written, and both looked at once more before
+//! every energising. Parameters are never asked for while it follows commands.
 //! All times are on the driver's stall-free clock, which does not advance while the master itself is stalled.
+mod configuration;
 mod power;
-mod registers;
 
-use crate::bring_up::damiao_fault::{DamiaoFault, status_code};
-use crate::bring_up::damiao_plan::MotorPlan;
+use super::{AnsweringMotor, Ask, MotorFault, MotorFeedback, Outbox, PowerWord, Reply};
 use crate::bring_up::timing::{BringUpCycle, Timeouts};
-use crate::codec::damiao_frames::{
-    Feedback, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, STATUS_LOST_COMMUNICATION,
-};
 use crate::codec::mit::MitState;
+use crate::frame::CanFrame;
 use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// Pause between two looks at a motor that is waited for.
@@ -25,7 +21,7 @@ const OBSERVE_MIN: Nanos = Nanos(100_000_000);
 const REQUEST_AGAIN: Nanos = Nanos(20_000_000);
 /// A special command is repeated after this, until the motor's status shows it.
 const REPEAT: Nanos = Nanos(20_000_000);
-/// What a change of mode takes (vendor's library).
+/// What a change of mode takes (Damiao's library).
 const SETTLE: Nanos = Nanos(100_000_000);
 /// Without feedback for so long, at one request a cycle, the motor is gone.
 const NO_REPLY: Nanos = Nanos(350_000_000);
@@ -37,11 +33,11 @@ enum MotorStage {
     Observe { since: Nanos },
     /// Found energised; watched, left alone.
     Unowned,
-    /// At this job of [`crate::bring_up::damiao_plan::CONFIGURE`].
+    /// At this job of [`AnsweringMotor::configure`].
     Configure { job: usize, since: Nanos },
     /// Configured, not energised.
     Ready,
-    /// At this job of [`crate::bring_up::damiao_plan::VERIFY`], on the way to energised.
+    /// At this job of [`AnsweringMotor::verify`], on the way to energised.
     Verify { job: usize, since: Nanos },
     /// Waiting for a fresh position.
     Arm { since: Nanos },
@@ -55,14 +51,11 @@ enum MotorStage {
     Disable { since: Nanos },
     /// Without torque, or not as it was left; waits for the drive target to be disabled.
     Gone,
-    /// A register does not fit.
+    /// A parameter does not fit.
     Refused { code: u32, object: u32 },
 }
 
-const NO_FEEDBACK: Feedback =
-    Feedback { status: STATUS_DISABLED, state: [0; 5], stage_celsius: 0, winding_celsius: 0 };
-const NOT_MEASURED: MitState =
-    MitState { position_rad: f64::NAN, velocity_rad_s: f64::NAN, torque_nm: f64::NAN };
+const NOT_MEASURED: MitState = MotorFeedback::NONE.state;
 
 /// The command for a motor in this cycle, motor side.
 #[derive(Clone, Copy, Debug)]
@@ -77,22 +70,22 @@ pub struct MotorTarget {
 
 /// The master's image of one motor.
 #[derive(Clone, Debug)]
-pub struct Motor {
-    plan: MotorPlan,
+pub struct Machine<M> {
+    motor: M,
     timeouts: Timeouts,
     near_rad: f64,
     stage: MotorStage,
     last_target: DriveTarget,
-    fault: Option<DamiaoFault>,
+    fault: Option<MotorFault>,
     /// What was asked last and not answered yet.
-    requested: Option<Request>,
+    requested: Option<Ask>,
     requested_at: Nanos,
-    /// The newest register that was answered.
-    answer: Option<(u8, bool, [u8; 4])>,
+    /// The newest parameter that was answered.
+    answer: Option<[u8; 4]>,
     /// A feedback has come since this was looked at.
     looked: bool,
     received: bool,
-    feedback: Feedback,
+    feedback: MotorFeedback,
     measured: MitState,
     measured_at: Nanos,
     /// Clearing an error since, and when to repeat it.
@@ -101,12 +94,12 @@ pub struct Motor {
     sent_rad: f64,
 }
 
-impl Motor {
+impl<M: AnsweringMotor> Machine<M> {
     /// A motor of which nothing is known. Energised only when its command is within `near_rad` of where it stands.
     #[must_use]
-    pub const fn new(plan: MotorPlan, timeouts: Timeouts, near_rad: f64) -> Self {
+    pub const fn new(motor: M, timeouts: Timeouts, near_rad: f64) -> Self {
         Self {
-            plan,
+            motor,
             timeouts,
             near_rad,
             stage: MotorStage::Observe { since: Nanos(0) },
@@ -117,7 +110,7 @@ impl Motor {
             answer: None,
             looked: false,
             received: false,
-            feedback: NO_FEEDBACK,
+            feedback: MotorFeedback::NONE,
             measured: NOT_MEASURED,
             measured_at: Nanos(0),
             clearing: None,
@@ -132,17 +125,28 @@ impl Motor {
         self.measured
     }
 
-    /// Status nibble, then the temperatures of power stage and winding, a byte each.
+    /// Its states, as its protocol packs them.
     #[must_use]
     pub const fn status_word(&self) -> u32 {
-        let Feedback { status, stage_celsius, winding_celsius, .. } = self.feedback;
-        status as u32 | (stage_celsius as u32) << 8 | (winding_celsius as u32) << 16
+        self.feedback.status_word
+    }
+
+    /// It warns.
+    #[must_use]
+    pub const fn warning(&self) -> bool {
+        self.feedback.warning
     }
 
     /// It disabled itself because no command came for longer than its watchdog.
     #[must_use]
     pub const fn lost_master(&self) -> bool {
-        self.received && self.feedback.status == STATUS_LOST_COMMUNICATION
+        self.received && self.feedback.lost_master
+    }
+
+    /// True for a frame by which a master speaks to this motor.
+    #[must_use]
+    pub fn is_to(&self, frame: &CanFrame) -> bool {
+        self.motor.is_to(frame)
     }
 
     /// Where the motor is.
@@ -166,40 +170,44 @@ impl Motor {
         }
     }
 
-    /// The code to report, and the register that it concerns.
+    /// The code to report, and the parameter that it concerns.
     #[must_use]
     pub fn error(&self) -> (u32, u32) {
         match (self.stage, self.fault) {
             (MotorStage::Refused { code, object }, _) => (code, object),
-            // Its target and gains came in frames: no register tells what it holds, so no hold can be adopted.
-            (MotorStage::Unowned, _) => (DamiaoFault::Unowned.code(), 0),
-            _ if self.received && self.in_error() => (status_code(self.feedback.status), 0),
-            (_, Some(fault)) => (fault.code(), 0),
+            // Its target and gains came in frames: no parameter tells what it holds, so no hold can be adopted.
+            (MotorStage::Unowned, _) => (MotorFault::Unowned.code(M::CODES), 0),
+            _ if self.received && self.in_error() => {
+                (u32::from(M::CODES) << 16 | u32::from(self.feedback.error), 0)
+            }
+            (_, Some(fault)) => (fault.code(M::CODES), 0),
             (_, None) => (0, 0),
         }
     }
 
-    /// Takes what the motor sends. True when it was a feedback whose scale is known.
+    /// Takes a frame; none when it is not this motor's, true when it was a feedback whose scale is known.
     ///
     /// Real time: arithmetic only.
-    pub fn take(&mut self, now: Nanos, reply: Reply) -> bool {
+    pub fn take(&mut self, now: Nanos, frame: &CanFrame) -> Option<bool> {
+        let reply = self.motor.decode(frame)?;
         self.received = true;
         let feedback = match reply {
             Reply::Feedback(feedback) => feedback,
-            Reply::Register { number, written, value } => {
+            Reply::Value { parameter, written, value } => {
                 let awaited = match self.requested {
-                    Some(Request::Read(requested)) => requested == number && !written,
-                    Some(Request::Write(requested, _)) => requested == number && written,
+                    Some(Ask::Read(requested)) => requested == parameter && !written,
+                    Some(Ask::Write(requested, _)) => requested == parameter && written,
                     _ => false,
                 };
                 if awaited {
-                    (self.answer, self.requested) = (Some((number, written, value)), None);
+                    (self.answer, self.requested) = (Some(value), None);
                 }
-                return false;
+                return Some(false);
             }
+            Reply::Noted => return Some(false),
         };
         (self.feedback, self.looked) = (feedback, true);
-        if self.requested == Some(Request::Refresh) {
+        if self.requested == Some(Ask::Refresh) {
             self.requested = None;
         }
         // Its scale is unknown before the ranges were read.
@@ -211,9 +219,9 @@ impl Motor {
                 | MotorStage::Refused { .. }
         );
         if known {
-            (self.measured, self.measured_at) = (feedback.values(&self.plan.ranges()), now);
+            (self.measured, self.measured_at) = (feedback.state, now);
         }
-        known
+        Some(known)
     }
 
     /// Clears findings, clears an error of the motor, and tries a refused motor again from the start.
@@ -240,13 +248,16 @@ impl Motor {
     /// Real time: no allocation.
     pub fn start_over(&mut self, now: Nanos) {
         self.observe(now, None);
-        (self.received, self.feedback, self.measured) = (false, NO_FEEDBACK, NOT_MEASURED);
+        self.motor.forget();
+        (self.received, self.feedback, self.measured) = (false, MotorFeedback::NONE, NOT_MEASURED);
     }
 
     /// Makes the angle where it stands its zero, in the next cycle; false unless it is configured and not energised.
     pub fn set_zero(&mut self) -> bool {
-        let able =
-            self.stage == MotorStage::Ready && !self.in_error() && self.last_target == DriveTarget::Disabled;
+        let able = self.motor.sets_zero()
+            && self.stage == MotorStage::Ready
+            && !self.in_error()
+            && self.last_target == DriveTarget::Disabled;
         self.set_zero |= able;
         able
     }
@@ -254,7 +265,13 @@ impl Motor {
     /// This cycle's request to the motor: one at most.
     ///
     /// Real time: no allocation, bounded work.
-    pub fn request(&mut self, cycle: BringUpCycle, target: Option<MotorTarget>) -> Option<Request> {
+    pub fn request(&mut self, cycle: BringUpCycle, target: Option<MotorTarget>, out: &mut Outbox<'_>) {
+        if let Some(ask) = self.ask(cycle, target) {
+            self.motor.encode(ask, out);
+        }
+    }
+
+    fn ask(&mut self, cycle: BringUpCycle, target: Option<MotorTarget>) -> Option<Ask> {
         let before = std::mem::replace(&mut self.last_target, cycle.drive_target);
         if cycle.drive_target == DriveTarget::TorqueOff && before != DriveTarget::TorqueOff {
             return self.torque_off(cycle.now);
@@ -262,7 +279,7 @@ impl Motor {
         let rises = cycle.drive_target == DriveTarget::Enabled
             && matches!(before, DriveTarget::Disabled | DriveTarget::Keep);
         let looked = std::mem::take(&mut self.looked);
-        let status = looked.then_some(self.feedback.status);
+        let status = looked.then_some(self.feedback.power);
         match self.stage {
             MotorStage::Observe { since } => self.observing(cycle, since, status),
             MotorStage::Unowned => self.unowned(cycle, status),
@@ -283,32 +300,32 @@ impl Motor {
         }
     }
 
-    fn go(&mut self, fault: DamiaoFault) -> Option<Request> {
+    fn go(&mut self, fault: MotorFault) -> Option<Ask> {
         (self.requested, self.answer, self.clearing) = (None, None, None);
         self.fault = Some(fault);
         self.stage = MotorStage::Gone;
-        Some(Request::Refresh)
+        Some(Ask::Refresh)
     }
 
     /// Back to the start, where nothing is changed before the motor has been looked at.
-    fn observe(&mut self, now: Nanos, fault: Option<DamiaoFault>) {
+    fn observe(&mut self, now: Nanos, fault: Option<MotorFault>) {
         (self.requested, self.answer, self.clearing) = (None, None, None);
         (self.fault, self.set_zero, self.looked) = (fault, false, false);
         self.stage = MotorStage::Observe { since: now };
     }
 
-    fn look(&mut self, now: Nanos) -> Option<Request> {
+    fn look(&mut self, now: Nanos) -> Option<Ask> {
         let due = self.requested_at == Nanos(0) || age(now, self.requested_at) >= OBSERVE_AGAIN.0;
-        due.then(|| self.send_request(now, Request::Refresh))
+        due.then(|| self.send_request(now, Ask::Refresh))
     }
 
-    fn send_request(&mut self, now: Nanos, request: Request) -> Request {
+    fn send_request(&mut self, now: Nanos, request: Ask) -> Ask {
         (self.requested, self.requested_at) = (Some(request), now);
         request
     }
 
     const fn in_error(&self) -> bool {
-        self.feedback.status > STATUS_ENABLED
+        matches!(self.feedback.power, PowerWord::Error)
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Source: the firmware's register table. Values of registers that nothing here acts on are
 //! plausible ones of a DM-J4310.
-use super::motor::MotorParameters;
-use crate::codec::damiao_frames::{Register, TIMEOUT_UNITS_A_MS, is_integer};
+use super::frames::{Register, TIMEOUT_UNITS_A_MS, is_integer};
+use super::sim::MotorParameters;
 use std::collections::BTreeMap;
 
 /// Registers of floats that a master may write: number, value, least and greatest that is taken.

@@ -6,18 +6,19 @@
 //!
 //! A motor remembers its newest MIT command while it is not energised and takes it up when it is: that is the worst
 //! that the manual leaves open.
-use super::controller::{Controller, LoopParameters};
-use super::disturbance::Disturbance;
-use super::mechanics::Mechanics;
-use super::motor_registers::Registers;
-use super::plant::PlantParameters;
-use crate::codec::damiao_frames::{
+use super::frames::{
     Feedback, Register, Reply, Request, STATUS_DISABLED, STATUS_ENABLED, STATUS_LOST_COMMUNICATION, Special,
     TIMEOUT_UNITS_A_MS, Wire,
 };
+use super::sim_registers::Registers;
 use crate::codec::mit::{MitCommand, MitRanges, MitState};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
+use crate::sim::controller::Controller;
+use crate::sim::mechanics::Mechanics;
+use crate::sim::settings::SimulatedJoint;
+use crate::sim::{Disturbance, LoopParameters, ModelParameters, PlantParameters, PlantedObject, ServoModel};
+use taustream_arm::{Damiao, DamiaoMode};
 
 /// Register 10: MIT commands.
 const MODE_MIT: u32 = 1;
@@ -29,6 +30,51 @@ const OVER_CURRENT: u8 = 0xA;
 const WARM_CELSIUS: [u8; 2] = [35, 105];
 /// Least time in which a `POS_VEL` command is carried out.
 const POS_VEL_PERIOD_S: f64 = 1e-3;
+
+/// Its own keys of the section `[simulator]`.
+pub(super) const KEYS: [&str; 7] = [
+    "motor_position_range_rad",
+    "motor_velocity_range_rad_s",
+    "motor_torque_range_nm",
+    "motor_mode",
+    "motor_timeout_ms",
+    "mode_offset_ids",
+    "continuous_feedback_ms",
+];
+
+/// A motor as it is sold: its flash holds the ranges that the settings state, MIT mode, and no watchdog.
+pub(super) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
+    let servo = joint.servo;
+    let damiao = servo.protocol.get::<Damiao>();
+    let [position_rad, velocity_rad_s, torque_nm] =
+        damiao.map_or([1.0; 3], |d| [d.ranges.position_rad, d.ranges.velocity_rad_s, d.ranges.torque_nm]);
+    let gains = damiao.and_then(|damiao| match damiao.mode {
+        DamiaoMode::Mit(gains) => Some(gains),
+        DamiaoMode::PosVel => None,
+    });
+    let reach = |key, stated| joint.number(key, stated, 1e-3..=1e6);
+    Box::new(MotorParameters {
+        node_id: servo.node_id,
+        feedback_id: damiao.map_or(0, |damiao| damiao.feedback_id),
+        wire: joint.bus_kind().map_or(Wire::Classic, super::wire_of),
+        sign: servo.sign,
+        zero_offset_rad: servo.zero_offset_rad,
+        start_rad: joint.start_rad(),
+        plant: joint.plant(joint.load_for(torque_nm, gains)),
+        loops: joint.loops(),
+        ranges: [
+            reach("motor_position_range_rad", position_rad),
+            reach("motor_velocity_range_rad_s", velocity_rad_s),
+            reach("motor_torque_range_nm", torque_nm),
+        ],
+        mode: joint.whole("motor_mode", 1, 1..=4),
+        timeout_ms: joint.whole("motor_timeout_ms", 0, 0..=65_535),
+        mode_offset_ids: joint.flag("mode_offset_ids", false),
+        continuous_ms: joint.whole("continuous_feedback_ms", 0, 0..=10_000),
+        boot_s: joint.boot_s(),
+        step_ns: joint.step_ns(),
+    })
+}
 
 /// What a simulated motor is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,98 +156,10 @@ impl Motor {
         }
     }
 
-    /// Lets time pass up to `now`, and pushes what the motor sends by itself.
-    pub fn advance(&mut self, now: Nanos, out: &mut Vec<CanFrame>) {
-        self.now = now;
-        self.powered.get_or_insert(now);
-        self.move_on(now);
-        let timeout_s = self.registers.timeout_s();
-        if self.is_enabled() && timeout_s > 0.0 && now.since_s(self.fed) > timeout_s {
-            self.disable(STATUS_LOST_COMMUNICATION);
-        }
-        let every_s = f64::from(self.parameters.continuous_ms) * 1e-3;
-        if every_s > 0.0 && self.receives() && now.since_s(self.sent) >= every_s {
-            out.push(self.feedback());
-        }
-    }
-
-    /// Takes a frame from the bus and pushes the answer. Frames for others, and malformed ones, change nothing.
-    pub fn receive(&mut self, now: Nanos, frame: &CanFrame, out: &mut Vec<CanFrame>) {
-        if now > self.now || self.powered.is_none() {
-            self.advance(now, out);
-        }
-        // A classic controller would not even acknowledge an FD frame.
-        let foreign = frame.is_fd() && self.parameters.wire == Wire::Classic;
-        let request = Request::decode(frame, self.parameters.node_id).filter(|_| self.receives() && !foreign);
-        let answer = match request {
-            None => None,
-            Some(Request::Special(special, mode)) => self.special(special, mode),
-            Some(Request::Mit(bytes)) => self.mit(bytes),
-            Some(Request::PosVel { position_rad, velocity_rad_s }) => {
-                self.pos_vel(f64::from(position_rad), f64::from(velocity_rad_s))
-            }
-            Some(Request::OtherMode(mode)) => {
-                (self.registers.mode() == u32::from(mode)).then(|| self.feedback())
-            }
-            Some(Request::Read(number)) => {
-                self.registers.get(number).map(|value| self.register(number, false, value))
-            }
-            Some(Request::Write(number, value)) => self.write(number, value),
-            Some(Request::Store) => {
-                if self.status == STATUS_DISABLED {
-                    self.registers.store();
-                }
-                None
-            }
-            Some(Request::Refresh) => Some(self.feedback()),
-        };
-        out.extend(answer);
-    }
-
-    /// Puts a fault into the motor.
-    pub fn disturb(&mut self, disturbance: Disturbance) {
-        match disturbance {
-            Disturbance::Fault(code) => {
-                let named = u8::try_from(code).ok().filter(|code| (0x8..=0xE).contains(code));
-                self.disable(named.unwrap_or(OVER_CURRENT));
-            }
-            Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
-            Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
-            Disturbance::Warning(warm) => self.warm = warm,
-            Disturbance::RefuseWrites(code) => self.registers.locked = code != 0,
-            Disturbance::Restart => {
-                self.disable(STATUS_DISABLED);
-                self.registers.restart();
-                self.commanded = MitCommand::default();
-                self.powered = Some(self.now);
-            }
-        }
-    }
-
-    /// Identifier of its commands.
-    #[must_use]
-    pub const fn node_id(&self) -> u8 {
-        self.parameters.node_id
-    }
     /// Status nibble.
     #[must_use]
     pub const fn status(&self) -> u8 {
         self.status
-    }
-    /// It carries torque.
-    #[must_use]
-    pub const fn is_enabled(&self) -> bool {
-        self.status == STATUS_ENABLED
-    }
-    /// True angle of the link, which no encoder fault can bend.
-    #[must_use]
-    pub const fn position_rad(&self) -> f64 {
-        self.mechanics.plant.position_rad
-    }
-    /// True angular velocity of the link.
-    #[must_use]
-    pub const fn velocity_rad_s(&self) -> f64 {
-        self.mechanics.plant.velocity_rad_s
     }
 
     /// It has started up.
@@ -343,6 +301,104 @@ impl Motor {
     fn reply(&self, reply: Reply) -> CanFrame {
         let MotorParameters { node_id, feedback_id, wire, .. } = self.parameters;
         reply.encode(node_id, feedback_id, wire)
+    }
+}
+
+impl ModelParameters for MotorParameters {
+    fn build(&self, _: &[PlantedObject]) -> Box<dyn ServoModel> {
+        Box::new(Motor::new(*self))
+    }
+    fn plant_mut(&mut self) -> &mut PlantParameters {
+        &mut self.plant
+    }
+    fn start_rad_mut(&mut self) -> &mut f64 {
+        &mut self.start_rad
+    }
+}
+
+impl ServoModel for Motor {
+    fn advance(&mut self, now: Nanos, out: &mut Vec<CanFrame>) {
+        self.now = now;
+        self.powered.get_or_insert(now);
+        self.move_on(now);
+        let timeout_s = self.registers.timeout_s();
+        if self.is_enabled() && timeout_s > 0.0 && now.since_s(self.fed) > timeout_s {
+            self.disable(STATUS_LOST_COMMUNICATION);
+        }
+        let every_s = f64::from(self.parameters.continuous_ms) * 1e-3;
+        if every_s > 0.0 && self.receives() && now.since_s(self.sent) >= every_s {
+            out.push(self.feedback());
+        }
+    }
+
+    fn receive(&mut self, now: Nanos, frame: &CanFrame, out: &mut Vec<CanFrame>) {
+        if now > self.now || self.powered.is_none() {
+            self.advance(now, out);
+        }
+        // A classic controller would not even acknowledge an FD frame.
+        let foreign = frame.is_fd() && self.parameters.wire == Wire::Classic;
+        let request = Request::decode(frame, self.parameters.node_id).filter(|_| self.receives() && !foreign);
+        let answer = match request {
+            None => None,
+            Some(Request::Special(special, mode)) => self.special(special, mode),
+            Some(Request::Mit(bytes)) => self.mit(bytes),
+            Some(Request::PosVel { position_rad, velocity_rad_s }) => {
+                self.pos_vel(f64::from(position_rad), f64::from(velocity_rad_s))
+            }
+            Some(Request::OtherMode(mode)) => {
+                (self.registers.mode() == u32::from(mode)).then(|| self.feedback())
+            }
+            Some(Request::Read(number)) => {
+                self.registers.get(number).map(|value| self.register(number, false, value))
+            }
+            Some(Request::Write(number, value)) => self.write(number, value),
+            Some(Request::Store) => {
+                if self.status == STATUS_DISABLED {
+                    self.registers.store();
+                }
+                None
+            }
+            Some(Request::Refresh) => Some(self.feedback()),
+        };
+        out.extend(answer);
+    }
+
+    fn disturb(&mut self, disturbance: Disturbance, _: &mut Vec<CanFrame>) {
+        match disturbance {
+            Disturbance::Fault(code) => {
+                let named = u8::try_from(code).ok().filter(|code| (0x8..=0xE).contains(code));
+                self.disable(named.unwrap_or(OVER_CURRENT));
+            }
+            Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
+            Disturbance::Warning(warm) => self.warm = warm,
+            Disturbance::RefuseWrites(code) => self.registers.locked = code != 0,
+            Disturbance::Restart => {
+                self.disable(STATUS_DISABLED);
+                self.registers.restart();
+                self.commanded = MitCommand::default();
+                self.powered = Some(self.now);
+            }
+        }
+    }
+
+    fn is_enabled(&self) -> bool {
+        self.status == STATUS_ENABLED
+    }
+    fn position_rad(&self) -> f64 {
+        self.mechanics.plant.position_rad
+    }
+    fn velocity_rad_s(&self) -> f64 {
+        self.mechanics.plant.velocity_rad_s
+    }
+    fn node_id(&self) -> u8 {
+        self.parameters.node_id
+    }
+    fn describe(&self) -> String {
+        format!("status=0x{:X}", self.status)
+    }
+    fn boxed_clone(&self) -> Box<dyn ServoModel> {
+        Box::new(self.clone())
     }
 }
 

@@ -1,0 +1,157 @@
+//! CANopen CiA 402, cyclic synchronous position.
+use super::identifiers::Use;
+use super::{FdUse, Protocol, Registration, ServoProtocol};
+use crate::bus_load::flow::{Cia402Bus, Flow};
+use crate::bus_load::frame::Format;
+use crate::drive_scale::{self, Overruled, ScaleObject};
+use crate::reader::{Bounds, FaultList, Table};
+use crate::robot::RobotJoint;
+use crate::settings::{Bus, Servo, Settings};
+use crate::trust::Reaction;
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// How a CiA 402 drive counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cia402 {
+    /// Motor revolutions a link revolution.
+    pub gear_ratio: f64,
+    /// Encoder counts a motor revolution.
+    pub counts_per_rev: f64,
+    /// The drive's home offset (0x607C) with which the joint's zero was determined, counts.
+    pub home_offset_counts: i32,
+    /// Objects of the drive that are not compared with these settings.
+    pub overruled: Overruled,
+}
+
+pub(super) const REGISTRATION: Registration = Registration {
+    name: "cia402",
+    words: "CANopen CiA 402, cyclic synchronous position",
+    keys: &["gear_ratio", "counts_per_rev", "home_offset_counts", "overruled_objects"],
+    // 127 is refused later, because it is this master.
+    node_id: [1, 127],
+    read: |table| read(table).map(Protocol::from),
+};
+
+const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
+const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
+const HOME_OFFSET_COUNTS: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
+/// Control or status word and a 32-bit position.
+const PDO_BYTES: u32 = 6;
+
+/// Identifiers with which a CANopen node sends and receives, each plus its node id.
+///
+/// Source: CiA 301 (predefined connection set).
+const NODE: [(u16, &str); 12] = [
+    (0x080, "the emergency message"),
+    (0x180, "TPDO 1"),
+    (0x200, "RPDO 1"),
+    (0x280, "TPDO 2"),
+    (0x300, "RPDO 2"),
+    (0x380, "TPDO 3"),
+    (0x400, "RPDO 3"),
+    (0x480, "TPDO 4"),
+    (0x500, "RPDO 4"),
+    (0x580, "the SDO reply"),
+    (0x600, "the SDO request"),
+    (0x700, "the heartbeat"),
+];
+/// What all CANopen nodes of a bus share.
+const SHARED: [(u16, &str); 3] = [(0x000, "NMT"), (0x080, "SYNC"), (0x77F, "the master's heartbeat")];
+
+fn read(table: &mut Table<'_>) -> Option<Cia402> {
+    let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
+    let counts_per_rev = table.number("counts_per_rev", &COUNTS_PER_REV);
+    let [low, high] = HOME_OFFSET_COUNTS;
+    let home_offset = table.integer_or("home_offset_counts", 0, low, high);
+    let overruled = drive_scale::read_overruled(table);
+    Some(Cia402 {
+        gear_ratio: gear_ratio?,
+        counts_per_rev: counts_per_rev?,
+        home_offset_counts: i32::try_from(home_offset?).ok()?,
+        overruled: overruled?,
+    })
+}
+
+impl ServoProtocol for Cia402 {
+    fn name(&self) -> &'static str {
+        REGISTRATION.name
+    }
+
+    fn gear_ratio(&self) -> f64 {
+        self.gear_ratio
+    }
+
+    fn reactions(&self) -> &'static [Reaction] {
+        &Reaction::ALL
+    }
+
+    fn shapes_traffic(&self) -> bool {
+        true
+    }
+
+    fn identifiers(&self, node_id: u8) -> Vec<Use> {
+        let shared = SHARED.map(|(id, what)| Use::standard(id, what, "node_id").shared());
+        let own = NODE.map(|(base, what)| Use::standard(base + u16::from(node_id), what, "node_id"));
+        shared.into_iter().chain(own).collect()
+    }
+
+    /// Both ends of the joint's range as a target position (0x607A), which is an i32.
+    fn check_joint(&self, table: &Table<'_>, joint: &RobotJoint, [sign, zero_rad]: [f64; 2]) {
+        let counts_per_rad = sign * self.gear_ratio * self.counts_per_rev / TAU;
+        for position_rad in joint.limits.position_rad {
+            // The same arithmetic as the codec's; rounding moves it by half a count at most.
+            let counts = (position_rad - zero_rad) * counts_per_rad;
+            if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts.round()) {
+                let value = format!("{:?}", self.counts_per_rev);
+                let expected = format!(
+                    "counts that fit 32 bits: joint {} at {position_rad} rad would be {counts:.0} counts",
+                    joint.name
+                );
+                table.fault("counts_per_rev", &value, &expected);
+                return;
+            }
+        }
+    }
+
+    /// Times and traffic are those of the whole arm, which are checked for all of it.
+    fn check_settings(&self, _: &FaultList, _: usize, _: &Servo, _: &Settings) {}
+
+    fn flows(&self, servos: &[Protocol], bus: &Bus, cycle_hz: f64, format: Format) -> Vec<Flow> {
+        let cia402 = Cia402Bus {
+            drives: u32::try_from(servos.len()).unwrap_or(u32::MAX),
+            cycle_hz,
+            traffic: bus.traffic,
+            setpoint_bytes: PDO_BYTES,
+            answer_bytes: PDO_BYTES,
+            format,
+        };
+        [cia402.process_data(), cia402.service()].concat()
+    }
+
+    fn fd(&self) -> FdUse {
+        FdUse::Planned
+    }
+
+    fn entries(&self) -> Vec<(&'static str, Value)> {
+        let overruled: Vec<u16> = self.overruled.objects().map(ScaleObject::index).collect();
+        vec![
+            ("gear_ratio", self.gear_ratio.into()),
+            ("counts_per_rev", self.counts_per_rev.into()),
+            ("home_offset_counts", self.home_offset_counts.into()),
+            ("overruled_objects", overruled.into()),
+        ]
+    }
+
+    fn sentence(&self) -> String {
+        let mut text = format!("gear {}, {} counts/rev", self.gear_ratio, self.counts_per_rev);
+        if self.home_offset_counts != 0 {
+            let _ = write!(text, ", home offset {} counts", self.home_offset_counts);
+        }
+        for object in self.overruled.objects() {
+            let _ = write!(text, ", 0x{:04X} ({}) of the drive NOT COMPARED", object.index(), object.name());
+        }
+        text
+    }
+}
