@@ -26,7 +26,7 @@ fn shipped_file_of_every_kind_loads() {
     for file in scenes.iter().filter(|file| file.extension().is_some_and(|e| e == "toml")) {
         Scene::load(file).unwrap_or_else(|faults| panic!("{faults}"));
     }
-    for file in settings.iter().filter(|file| !file.ends_with("piper.toml")) {
+    for file in &settings {
         Settings::load(file).unwrap_or_else(|faults| panic!("{faults}"));
     }
     // An empty folder would make this pass without a look at anything.
@@ -34,24 +34,6 @@ fn shipped_file_of_every_kind_loads() {
         !robots.is_empty() && scenes.len() >= 3 && !settings.is_empty(),
         "{robots:?} {scenes:?} {settings:?}"
     );
-}
-
-/// The arm is there before its protocol is: it must not be taken for supported, nor for a misspelt name.
-#[test]
-fn piper_settings_are_refused_for_their_protocol_alone_and_the_robot_is_reported_valid() {
-    let faults = Settings::load(&config().join("settings/piper.toml")).unwrap_err();
-    assert_eq!(faults.0.len(), 6, "{faults}");
-    for (i, fault) in faults.0.iter().enumerate() {
-        let words = fault.to_string();
-        assert_eq!(fault.key, format!("servo[{i}].protocol"), "{words}");
-        for part in [
-            "\"piper\"",
-            "comes in a later version",
-            "the robot itself is valid (piper: 6 joints, 10 collision shapes)",
-        ] {
-            assert!(words.contains(part), "{part:?} is missing in {words}");
-        }
-    }
 }
 
 /// Goal: the rows are read in the vendor's convention, and the file holds the vendor's numbers.

@@ -15,7 +15,7 @@ pub fn explain_refusal_on(refusal: &Refusal, has_cable: bool) -> String {
         return explain_on(refusal.code, has_cable);
     }
     match protocols::of_object(refusal.object) {
-        Some(words) => (words.explain_refusal)(refusal.code, refusal.object),
+        Some(words) => (words.explain_refusal)(refusal),
         None => fault::explain_refusal(refusal, has_cable),
     }
 }

@@ -80,6 +80,8 @@ fn kinds() -> Vec<Kind> {
                 shipped("config/settings/vcan6.toml", &[]),
                 shipped("config/settings/damiao6.toml", &[]),
                 shipped("config/settings/one-bus.toml", &[]),
+                shipped("config/settings/odrive6.toml", &[]),
+                shipped("config/settings/piper.toml", &[]),
             ],
             load: settings,
         },

@@ -9,6 +9,8 @@ pub mod cia402;
 pub mod damiao;
 pub(crate) mod identifiers;
 pub(crate) mod motors;
+pub mod odrive;
+pub mod piper;
 
 use crate::bus_load::flow::Flow;
 use crate::bus_load::frame::Format;
@@ -26,7 +28,8 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Every protocol.
-const REGISTRY: [Registration; 2] = [cia402::REGISTRATION, damiao::REGISTRATION];
+const REGISTRY: [Registration; 4] =
+    [cia402::REGISTRATION, damiao::REGISTRATION, odrive::REGISTRATION, piper::REGISTRATION];
 
 /// How a protocol is found in settings files.
 pub(crate) struct Registration {
@@ -183,7 +186,7 @@ fn expected() -> String {
 }
 
 /// What is known by name and not spoken yet: not a slip of the pen, so it is not called unknown.
-const LATER: [&str; 5] = ["piper", "robstride", "myactuator", "cubemars", "odrive"];
+const LATER: [&str; 3] = ["robstride", "myactuator", "cubemars"];
 
 fn later_words(name: &str, robot: Option<&Robot>) -> String {
     let sound = robot.map_or_else(String::new, |robot| {

@@ -10,7 +10,10 @@
 //! abort codes begin at 0x503.
 mod cia402;
 pub mod damiao;
+pub mod odrive;
+pub mod piper;
 
+use crate::bring_up::Refusal;
 use crate::frame::{CanFrame, CanId, FrameBatch};
 use crate::motors::fault::codes_of;
 use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
@@ -20,7 +23,8 @@ use taustream_arm::Settings;
 use taustream_motion::MAX_JOINTS;
 
 /// Every protocol.
-pub(crate) const REGISTRY: [Registration; 2] = [cia402::REGISTRATION, damiao::REGISTRATION];
+pub(crate) const REGISTRY: [Registration; 4] =
+    [cia402::REGISTRATION, damiao::REGISTRATION, odrive::REGISTRATION, piper::REGISTRATION];
 
 /// What a protocol brings.
 pub(crate) struct Registration {
@@ -44,8 +48,8 @@ pub(crate) struct CodeWords {
     pub(crate) codes: u16,
     /// The sentence for a code, on a link that has a cable or none.
     pub(crate) explain: fn(u32, bool) -> String,
-    /// The sentence for a refused parameter: code and object.
-    pub(crate) explain_refusal: fn(u32, u32) -> String,
+    /// The sentence for a refused parameter.
+    pub(crate) explain_refusal: fn(&Refusal) -> String,
 }
 
 /// Words for an error code; none for those of CiA 402.

@@ -7,8 +7,10 @@ use super::model::ModelParameters;
 use super::plant::PlantParameters;
 use super::planted::{self, PlantedObject};
 use crate::protocols::REGISTRY;
+use std::any::Any;
 use std::cell::RefCell;
 use std::path::Path;
+use std::sync::Arc;
 use taustream_arm::{BusKind, Fault, Faults, MitGains, Servo, Settings};
 use taustream_motion::JointLimits;
 use toml::{Table, Value};
@@ -34,7 +36,13 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let empty = Table::new();
     let table = settings.simulator.as_ref().unwrap_or(&empty);
     let joints = settings.robot.joints.len();
-    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let section = Section {
+        table,
+        file: &settings.file,
+        joints,
+        faults: RefCell::default(),
+        shared: RefCell::default(),
+    };
     let mut setups: Vec<DriveSetup> =
         settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
@@ -58,7 +66,13 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
     let empty = Table::new();
     let table = settings.simulator.as_ref().unwrap_or(&empty);
     let joints = settings.robot.joints.len();
-    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let section = Section {
+        table,
+        file: &settings.file,
+        joints,
+        faults: RefCell::default(),
+        shared: RefCell::default(),
+    };
     let frames: u32 = section.whole("bus_queue_frames", 0, QUEUE_FRAMES, 1..=4096);
     let faults = section.faults.into_inner();
     if faults.is_empty() { Ok(frames as usize) } else { Err(Faults(faults)) }
@@ -110,6 +124,8 @@ struct Section<'a> {
     file: &'a Path,
     joints: usize,
     faults: RefCell<Vec<Fault>>,
+    /// What servos of one controller have in common, by bus.
+    shared: RefCell<Vec<(usize, Arc<dyn Any + Send + Sync>)>>,
 }
 
 /// One joint's part of the section while it is being read.
@@ -145,6 +161,18 @@ impl SimulatedJoint<'_> {
     /// True or false, or `default`.
     pub(crate) fn flag(&self, key: &'static str, default: bool) -> bool {
         self.section.flag(key, self.servo.joint, default)
+    }
+
+    /// What all servos of one controller on this bus have in common: the same for each of them.
+    pub(crate) fn shared<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
+        let mut shared = self.section.shared.borrow_mut();
+        let mut on_bus = shared.iter().filter(|(bus, _)| *bus == self.servo.bus);
+        let found = on_bus.find_map(|(_, any)| Arc::clone(any).downcast().ok());
+        found.unwrap_or_else(|| {
+            let new = Arc::<T>::default();
+            shared.push((self.servo.bus, new.clone()));
+            new
+        })
     }
 
     /// Kind of its bus.

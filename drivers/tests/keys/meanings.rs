@@ -208,11 +208,14 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: bus[].packed", "Two joints' setpoints in one frame; without it false."),
     ("Settings files: servo[].joint", "Joint of the robot that it moves."),
     ("Settings files: servo[].bus", "Name of its bus."),
-    ("Settings files: servo[].node_id", "Its node id (CANopen) or motor id (Damiao)."),
+    (
+        "Settings files: servo[].node_id",
+        "Its number on the bus: CANopen node 1 to 126, Damiao motor 1 to 15, ODrive node 0 to 62, Piper joint 1 to 6.",
+    ),
     ("Settings files: servo[].protocol", "Its protocol."),
     ("Settings files: servo[].sign", "Direction of the drive's position against the joint's."),
     ("Settings files: servo[].zero_offset_rad", "Joint angle where the drive's position is 0."),
-    ("Settings files: servo[].gear_ratio", "CiA 402: motor revolutions for one of the joint."),
+    ("Settings files: servo[].gear_ratio", "CiA 402, ODrive: motor revolutions for one of the joint."),
     ("Settings files: servo[].counts_per_rev", "CiA 402: position counts for one motor revolution."),
     (
         "Settings files: servo[].home_offset_counts",
@@ -248,7 +251,32 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: servo[].position_range_rad", "Damiao: PMAX of the motor."),
     ("Settings files: servo[].velocity_range_rad_s", "Damiao: VMAX of the motor."),
     ("Settings files: servo[].torque_range_nm", "Damiao: TMAX of the motor."),
-    ("Settings files: servo[].watchdog_ms", "Damiao: its TIMEOUT register, ms."),
+    (
+        "Settings files: servo[].watchdog_ms",
+        "Damiao: its TIMEOUT register; ODrive: its watchdog_timeout, ms.",
+    ),
+    ("Settings files: servo[].hardware", "ODrive: product line, version and variant that the drive states."),
+    (
+        "Settings files: servo[].firmware",
+        "Release that the servo states: ODrive three numbers (\"0.6.10\"), Piper eight characters (\"S-V1.6-3\").",
+    ),
+    ("Settings files: servo[].encoder_period_ms", "ODrive: its encoder_msg_rate_ms."),
+    ("Settings files: servo[].heartbeat_period_ms", "ODrive: its heartbeat_msg_rate_ms."),
+    ("Settings files: servo[].watchdog", "ODrive: who sets its watchdog."),
+    (
+        "Settings files: servo[].endpoint_watchdog_timeout",
+        "ODrive: endpoint id of axis0.config.watchdog_timeout for this firmware.",
+    ),
+    (
+        "Settings files: servo[].endpoint_enable_watchdog",
+        "ODrive: endpoint id of axis0.config.enable_watchdog for this firmware.",
+    ),
+    (
+        "Settings files: servo[].endpoint_velocity_limit",
+        "ODrive: endpoint id of axis0.controller.config.vel_limit for this firmware.",
+    ),
+    ("Settings files: servo[].speed_percent", "Piper: speed of the arm's own profile."),
+    ("Settings files: servo[].follow", "Piper: how the arm follows targets."),
     ("Settings files: servo[].stiffness_nm_rad", "Damiao, MIT mode: Kp."),
     ("Settings files: servo[].damping_nm_s_rad", "Damiao, MIT mode: Kd."),
     ("Settings files: servo[].gain_ramp_ms", "Damiao, MIT mode: time in which the gains rise at enable, ms."),
@@ -309,6 +337,22 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     (
         "Settings files: simulator.motor_torque_range_nm",
         "Damiao: TMAX in the motor's flash; as the servo states.",
+    ),
+    (
+        "Settings files: simulator.odrive_velocity_limit_turns_s",
+        "ODrive: velocity limit in the drive; 1.25 of what the joint may do.",
+    ),
+    (
+        "Settings files: simulator.odrive_confirms_writes",
+        "ODrive: it confirms writes, as from firmware 0.6.11; false.",
+    ),
+    (
+        "Settings files: simulator.odrive_firmware_revision",
+        "ODrive: revision of the firmware that the drive states; as the servo states.",
+    ),
+    (
+        "Settings files: simulator.piper_speed_rad_s",
+        "Piper: speed limit that the arm states of the joint; as the robot file.",
     ),
     ("Settings files: simulator.motor_mode", "Damiao: control mode in the motor's flash; 1."),
     ("Settings files: simulator.motor_timeout_ms", "Damiao: TIMEOUT in the motor's flash, ms; 0."),

@@ -18,6 +18,8 @@ pub(super) const STEPS: &[Step] = &[
     step("optimisers step by step", walks),
     step("optimisers by their results", optimisers),
     step("frames of Damiao motors", damiao_frames),
+    step("frames of ODrive drives", odrive_frames),
+    step("frames of the Piper", piper_frames),
 ];
 
 /// Where the published planning problems are, if they are at hand: their files stay outside of this project.
@@ -86,5 +88,25 @@ fn damiao_frames(place: &Place) -> Result<Outcome> {
     frames.arg(place.peers().join("damiao_frames.py")).arg("--check");
     frames.arg(place.root.join("drivers/tests/damiao_suite/frames.csv"));
     perform("frames of Damiao motors by an independent library", &mut frames)?;
+    Ok(Outcome::Passed)
+}
+
+/// Frames of `ODrive` drives as an independent encoder packs them from the tables of the firmware.
+fn odrive_frames(place: &Place) -> Result<Outcome> {
+    let what = "frames of ODrive drives by an independent encoder";
+    frames(place, what, "odrive_frames.py", "drivers/tests/odrive_suite/frames.csv")
+}
+
+/// Frames of the Piper as its maker's library packs them.
+fn piper_frames(place: &Place) -> Result<Outcome> {
+    let what = "frames of the Piper by its maker's library";
+    frames(place, what, "piper_frames.py", "drivers/tests/piper_suite/frames.csv")
+}
+
+fn frames(place: &Place, what: &str, program: &str, held: &str) -> Result<Outcome> {
+    let python = place.python("venv-frames", "frames-requirements.txt", &["--no-deps"])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join(program)).arg("--check").arg(place.root.join(held));
+    perform(what, &mut command)?;
     Ok(Outcome::Passed)
 }
