@@ -1,7 +1,7 @@
 //! A long table of bad files: each is refused under the key that is wrong, with words that help.
 mod bad_files_cases;
 mod common;
-use bad_files_cases::{Case, damiao, settings};
+use bad_files_cases::{Case, cubemars, damiao, robstride, settings};
 use common::Reader::{Robot, Scene, Settings, Trajectory};
 use common::{Reader, edited, faults_of};
 
@@ -316,7 +316,8 @@ const TRAJECTORY_CASES: &[Case] = &[
 
 #[test]
 fn bad_file_is_refused_under_its_key_with_words_that_help() {
-    for table in [ROBOT_CASES, SCENE_CASES, settings::CASES, damiao::CASES, TRAJECTORY_CASES] {
+    let protocols = [damiao::CASES, robstride::CASES, cubemars::CASES];
+    for table in [ROBOT_CASES, SCENE_CASES, settings::CASES, TRAJECTORY_CASES].into_iter().chain(protocols) {
         for (reader, from, to, key, words) in table {
             let faults = faults_of(*reader, &edited(&reader.good_text(), from, to));
             let hit = faults.0.iter().any(|fault| fault.key == *key && fault.to_string().contains(words));
@@ -327,7 +328,8 @@ fn bad_file_is_refused_under_its_key_with_words_that_help() {
 
 #[test]
 fn good_file_behind_the_table_has_no_fault() {
-    for reader in [Robot, Scene, Settings, Reader::Damiao, Trajectory] {
+    let motors = [Reader::Damiao, Reader::RobStride, Reader::CubeMars];
+    for reader in [Robot, Scene, Settings, Trajectory].into_iter().chain(motors) {
         assert_eq!(reader.read(&reader.good_text()), Ok(()), "{reader:?}");
     }
 }

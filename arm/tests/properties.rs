@@ -8,8 +8,15 @@ use taustream_arm::TrajectoryFile;
 use taustream_motion::stroke::{DURATION_S_MIN, END_S_MAX};
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
-const READERS: [Reader; 5] =
-    [Reader::Robot, Reader::Scene, Reader::Settings, Reader::Damiao, Reader::Trajectory];
+const READERS: [Reader; 7] = [
+    Reader::Robot,
+    Reader::Scene,
+    Reader::Settings,
+    Reader::Damiao,
+    Reader::RobStride,
+    Reader::CubeMars,
+    Reader::Trajectory,
+];
 
 /// Pieces that hostile files are made of.
 const PIECES: [&str; 28] = [

@@ -79,6 +79,8 @@ fn kinds() -> Vec<Kind> {
             samples: vec![
                 shipped("config/settings/vcan6.toml", &[]),
                 shipped("config/settings/damiao6.toml", &[]),
+                shipped("config/settings/robstride6.toml", &[]),
+                shipped("config/settings/ak6.toml", &[]),
                 shipped("config/settings/one-bus.toml", &[]),
                 shipped("config/settings/odrive6.toml", &[]),
                 shipped("config/settings/piper.toml", &[]),

@@ -23,6 +23,10 @@ impl Use {
     pub(crate) const fn standard(id: u16, what: &'static str, key: &'static str) -> Self {
         Self { id: id as u32, mask: 0x7FF, is_extended: false, what, key, is_shared: false }
     }
+    /// The 29-bit identifiers that agree with the first number in the bits of the second.
+    pub(crate) const fn extended([id, mask]: [u32; 2], what: &'static str, key: &'static str) -> Self {
+        Self { id, mask, is_extended: true, what, key, is_shared: false }
+    }
     /// The same, in common with every servo of the protocol.
     pub(crate) const fn shared(self) -> Self {
         Self { is_shared: true, ..self }

@@ -6,11 +6,13 @@
 //! A protocol is one file here (its keys, its checks, what it puts on a bus) and one line in [`REGISTRY`]; its frames,
 //! bring-up and simulated servo are a folder of `drivers`.
 pub mod cia402;
+pub mod cubemars;
 pub mod damiao;
 pub(crate) mod identifiers;
 pub(crate) mod motors;
 pub mod odrive;
 pub mod piper;
+pub mod robstride;
 
 use crate::bus_load::flow::Flow;
 use crate::bus_load::frame::Format;
@@ -28,8 +30,14 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Every protocol.
-const REGISTRY: [Registration; 4] =
-    [cia402::REGISTRATION, damiao::REGISTRATION, odrive::REGISTRATION, piper::REGISTRATION];
+const REGISTRY: [Registration; 6] = [
+    cia402::REGISTRATION,
+    damiao::REGISTRATION,
+    odrive::REGISTRATION,
+    piper::REGISTRATION,
+    robstride::REGISTRATION,
+    cubemars::REGISTRATION,
+];
 
 /// How a protocol is found in settings files.
 pub(crate) struct Registration {

@@ -1,7 +1,9 @@
 //! Cases of the larger files.
 use crate::common::Reader;
 
+pub(crate) mod cubemars;
 pub(crate) mod damiao;
+pub(crate) mod robstride;
 pub(crate) mod settings;
 
 /// Reader, text to replace, replacement, key of the fault, words that its sentence must have.

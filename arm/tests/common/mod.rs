@@ -11,6 +11,10 @@ pub(crate) enum Reader {
     Settings,
     /// Settings of Damiao motors.
     Damiao,
+    /// Settings of `RobStride` motors.
+    RobStride,
+    /// Settings of `CubeMars` motors.
+    CubeMars,
     Trajectory,
 }
 
@@ -31,6 +35,8 @@ impl Reader {
             Self::Scene => config().join("scenes/shelf.toml"),
             Self::Settings => config().join("settings/vcan6.toml"),
             Self::Damiao => config().join("settings/damiao6.toml"),
+            Self::RobStride => config().join("settings/robstride6.toml"),
+            Self::CubeMars => config().join("settings/ak6.toml"),
             Self::Trajectory => config().join("trajectory.json"),
         }
     }
@@ -38,7 +44,7 @@ impl Reader {
     pub(crate) fn good_text(self) -> String {
         match self {
             Self::Trajectory => TRAJECTORY.to_owned(),
-            Self::Robot | Self::Scene | Self::Settings | Self::Damiao => {
+            Self::Robot | Self::Scene | Self::Settings | Self::Damiao | Self::RobStride | Self::CubeMars => {
                 std::fs::read_to_string(self.file()).expect("shipped files are readable")
             }
         }
@@ -49,7 +55,9 @@ impl Reader {
         match self {
             Self::Robot => Robot::from_toml(&file, text).map(drop),
             Self::Scene => Scene::from_toml(&file, text).map(drop),
-            Self::Settings | Self::Damiao => Settings::from_toml(&file, text).map(drop),
+            Self::Settings | Self::Damiao | Self::RobStride | Self::CubeMars => {
+                Settings::from_toml(&file, text).map(drop)
+            }
             Self::Trajectory => TrajectoryFile::from_json(&file, text).map(drop),
         }
     }

@@ -173,6 +173,16 @@ impl MitState {
     }
 }
 
+/// A packed command that does not read as a special one. Seven 0xFF and one of the bytes that mean something do, which is
+/// everything at its highest; one step less of the angle does not.
+#[must_use]
+pub const fn unlike_special(bytes: [u8; 8]) -> [u8; 8] {
+    match bytes {
+        [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last] => [0xFF, 0xFE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last],
+        other => other,
+    }
+}
+
 /// Two numbers of 12 bits in three bytes, the first one's high bits first.
 fn pack_twice_12(first: u16, second: u16) -> [u8; 3] {
     let both = u32::from(first & 0xFFF) << 12 | u32::from(second & 0xFFF);

@@ -9,9 +9,11 @@
 //! master finds wrong with such a drive, 2 and more those of the protocols here in the order of their arrival, and SDO
 //! abort codes begin at 0x503.
 mod cia402;
+pub mod cubemars;
 pub mod damiao;
 pub mod odrive;
 pub mod piper;
+pub mod robstride;
 
 use crate::bring_up::Refusal;
 use crate::frame::{CanFrame, CanId, FrameBatch};
@@ -23,8 +25,14 @@ use taustream_arm::Settings;
 use taustream_motion::MAX_JOINTS;
 
 /// Every protocol.
-pub(crate) const REGISTRY: [Registration; 4] =
-    [cia402::REGISTRATION, damiao::REGISTRATION, odrive::REGISTRATION, piper::REGISTRATION];
+pub(crate) const REGISTRY: [Registration; 6] = [
+    cia402::REGISTRATION,
+    damiao::REGISTRATION,
+    odrive::REGISTRATION,
+    piper::REGISTRATION,
+    robstride::REGISTRATION,
+    cubemars::REGISTRATION,
+];
 
 /// What a protocol brings.
 pub(crate) struct Registration {

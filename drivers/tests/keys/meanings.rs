@@ -210,7 +210,7 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: servo[].bus", "Name of its bus."),
     (
         "Settings files: servo[].node_id",
-        "Its number on the bus: CANopen node 1 to 126, Damiao motor 1 to 15, ODrive node 0 to 62, Piper joint 1 to 6.",
+        "Its number on the bus: CANopen node 1 to 126, Damiao motor 1 to 15, MyActuator 1 to 32, RobStride and CubeMars up to 127, ODrive node 0 to 62, Piper joint 1 to 6.",
     ),
     ("Settings files: servo[].protocol", "Its protocol."),
     ("Settings files: servo[].sign", "Direction of the drive's position against the joint's."),
@@ -246,15 +246,9 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "A pair of links with a margin of its own: `links = [\"link1\", \"link4\"]`, `margin_m`.",
     ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
-    ("Settings files: servo[].feedback_id", "Damiao: identifier of its feedback (master id)."),
+    ("Settings files: servo[].feedback_id", "Damiao, CubeMars: identifier of its feedback."),
+    ("Settings files: servo[].host_id", "RobStride: identifier of this master; 253."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
-    ("Settings files: servo[].position_range_rad", "Damiao: PMAX of the motor."),
-    ("Settings files: servo[].velocity_range_rad_s", "Damiao: VMAX of the motor."),
-    ("Settings files: servo[].torque_range_nm", "Damiao: TMAX of the motor."),
-    (
-        "Settings files: servo[].watchdog_ms",
-        "Damiao: its TIMEOUT register; ODrive: its watchdog_timeout, ms.",
-    ),
     ("Settings files: servo[].hardware", "ODrive: product line, version and variant that the drive states."),
     (
         "Settings files: servo[].firmware",
@@ -277,9 +271,40 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ),
     ("Settings files: servo[].speed_percent", "Piper: speed of the arm's own profile."),
     ("Settings files: servo[].follow", "Piper: how the arm follows targets."),
-    ("Settings files: servo[].stiffness_nm_rad", "Damiao, MIT mode: Kp."),
-    ("Settings files: servo[].damping_nm_s_rad", "Damiao, MIT mode: Kd."),
-    ("Settings files: servo[].gain_ramp_ms", "Damiao, MIT mode: time in which the gains rise at enable, ms."),
+    (
+        "Settings files: servo[].position_range_rad",
+        "Motors with packed frames: positions that the wire spans, plus and minus (Damiao: PMAX).",
+    ),
+    (
+        "Settings files: servo[].velocity_range_rad_s",
+        "Motors with packed frames: velocities that the wire spans (Damiao: VMAX).",
+    ),
+    (
+        "Settings files: servo[].torque_range_nm",
+        "Motors with packed frames: torques that the wire spans (Damiao: TMAX).",
+    ),
+    (
+        "Settings files: servo[].watchdog_ms",
+        "Time without a frame after which the motor is limp, ms. Damiao, RobStride, MyActuator: written to it; CubeMars: as set in it; ODrive: its watchdog_timeout.",
+    ),
+    (
+        "Settings files: servo[].stiffness_range_nm_rad",
+        "RobStride: Kp that the wire spans, from 0: of the model.",
+    ),
+    (
+        "Settings files: servo[].damping_range_nm_s_rad",
+        "RobStride: Kd that the wire spans, from 0: of the model.",
+    ),
+    (
+        "Settings files: servo[].torque_limit_nm",
+        "RobStride: `limit_torque` (0x700B) as the motor holds it; another model holds another.",
+    ),
+    ("Settings files: servo[].stiffness_nm_rad", "Motors with gains in their commands: Kp."),
+    ("Settings files: servo[].damping_nm_s_rad", "Motors with gains in their commands: Kd."),
+    (
+        "Settings files: servo[].gain_ramp_ms",
+        "Motors with gains in their commands: time in which these rise at enable, ms.",
+    ),
     (
         "Settings files: simulator.bus_queue_frames",
         "Frames that the master's side of a bus with a bit rate holds; 64.",
@@ -328,15 +353,19 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: simulator.step_us", "Step of the simulated mechanics, us; 250."),
     (
         "Settings files: simulator.motor_position_range_rad",
-        "Damiao: PMAX in the motor's flash; as the servo states.",
+        "Packed frames: what the motor takes positions to span; as the servo states.",
     ),
     (
         "Settings files: simulator.motor_velocity_range_rad_s",
-        "Damiao: VMAX in the motor's flash; as the servo states.",
+        "Packed frames: what the motor takes velocities to span; as the servo states.",
     ),
     (
         "Settings files: simulator.motor_torque_range_nm",
-        "Damiao: TMAX in the motor's flash; as the servo states.",
+        "Packed frames: what the motor takes torques to span; as the servo states.",
+    ),
+    (
+        "Settings files: simulator.motor_torque_limit_nm",
+        "RobStride: `limit_torque` in the motor's flash; as the servo states.",
     ),
     (
         "Settings files: simulator.odrive_velocity_limit_turns_s",
@@ -355,11 +384,14 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Piper: speed limit that the arm states of the joint; as the robot file.",
     ),
     ("Settings files: simulator.motor_mode", "Damiao: control mode in the motor's flash; 1."),
-    ("Settings files: simulator.motor_timeout_ms", "Damiao: TIMEOUT in the motor's flash, ms; 0."),
+    (
+        "Settings files: simulator.motor_timeout_ms",
+        "Watchdog in the motor's flash, ms: Damiao, RobStride 0, CubeMars as the servo states.",
+    ),
     ("Settings files: simulator.mode_offset_ids", "Damiao: identifiers are offset by mode; false."),
     (
         "Settings files: simulator.continuous_feedback_ms",
-        "Damiao: period of feedback without a command, 0 for none; 0.",
+        "Damiao, RobStride: period of feedback without a command, 0 for none; 0.",
     ),
     ("Path files: profile", "Name of the profile that the path is meant for."),
     ("Path files: point", "One table for each point of the path."),

@@ -20,6 +20,8 @@ pub(super) const STEPS: &[Step] = &[
     step("frames of Damiao motors", damiao_frames),
     step("frames of ODrive drives", odrive_frames),
     step("frames of the Piper", piper_frames),
+    step("frames of RobStride motors", robstride_frames),
+    step("frames of CubeMars motors", cubemars_frames),
 ];
 
 /// Where the published planning problems are, if they are at hand: their files stay outside of this project.
@@ -101,6 +103,19 @@ fn odrive_frames(place: &Place) -> Result<Outcome> {
 fn piper_frames(place: &Place) -> Result<Outcome> {
     let what = "frames of the Piper by its maker's library";
     frames(place, what, "piper_frames.py", "drivers/tests/piper_suite/frames.csv")
+}
+
+
+/// Frames of `RobStride` motors as two independent libraries pack and read them.
+fn robstride_frames(place: &Place) -> Result<Outcome> {
+    let what = "frames of RobStride motors by two independent libraries";
+    frames(place, what, "robstride_frames.py", "drivers/tests/robstride_suite/frames.csv")
+}
+
+/// Frames of `CubeMars` motors as an independent library packs and reads them.
+fn cubemars_frames(place: &Place) -> Result<Outcome> {
+    let what = "frames of CubeMars motors by an independent library";
+    frames(place, what, "cubemars_frames.py", "drivers/tests/cubemars_suite/frames.csv")
 }
 
 fn frames(place: &Place, what: &str, program: &str, held: &str) -> Result<Outcome> {

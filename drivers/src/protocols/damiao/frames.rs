@@ -8,7 +8,7 @@
 //! Settings keep joints out of there, so such a frame is an answer, whatever was asked.
 //!
 //! Source: Damiao DM-J43xx manual and the firmware's register table.
-use crate::codec::mit::{MitRanges, MitState};
+use crate::codec::mit::{self, MitRanges, MitState};
 use crate::frame::{CanFrame, CanId};
 use taustream_arm::DamiaoMode;
 
@@ -198,12 +198,7 @@ impl Request {
                 bytes[7] = special as u8;
                 wire.frame(id + MODE_STEP * u16::from(mode & 3), &bytes)
             }
-            Self::Mit([0xFF, 0xFF, rest @ ..]) if rest[..5] == [0xFF; 5] => {
-                // Everything at its highest reads as a special command: one step less of the angle does not.
-                let [a, b, c, d, e, f] = rest;
-                wire.frame(id, &[0xFF, 0xFE, a, b, c, d, e, f])
-            }
-            Self::Mit(bytes) => wire.frame(id, &bytes),
+            Self::Mit(bytes) => wire.frame(id, &mit::unlike_special(bytes)),
             Self::PosVel { position_rad, velocity_rad_s } => {
                 let [a, b, c, d] = position_rad.to_le_bytes();
                 let [e, f, g, h] = velocity_rad_s.to_le_bytes();
