@@ -51,6 +51,20 @@ fn cycle_with_damiao_motors_never_allocates() {
     assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
 }
 
+#[test]
+fn cycle_with_robstride_motors_never_allocates() {
+    let mut arm = counted("no-alloc-robstride", shipped("robstride6.toml", str::to_owned));
+    live_through(&mut arm, 25_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+#[test]
+fn cycle_with_cubemars_motors_never_allocates() {
+    let mut arm = counted("no-alloc-cubemars", shipped("ak6.toml", str::to_owned));
+    live_through(&mut arm, 25_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
 /// The same over two buses with a bit rate, setpoints that share frames and take turns, and rarer answers.
 #[test]
 fn cycle_over_two_buses_packed_and_staggered_never_allocates() {

@@ -1,4 +1,4 @@
-//! The checker of a recording of Damiao motors in MIT mode: was every command on the bus the one that the log claims?
+//! The checker of a recording of motors in MIT mode (Damiao, `CubeMars`): was every command on the bus the one that the log claims?
 //!
 //! It shares no packing with the product: bits are taken from the bytes by their printed places, and a value is right when
 //! it lies at most half a step from what the bits say. There is no SYNC on such a bus, so the log's
@@ -10,7 +10,7 @@
 use crate::cycle_log::{Event, LoggedCycle};
 use crate::on_path::PathCheck;
 use crate::setpoints::{BusFrame, CheckResult, Flaw, may_be_off};
-use taustream_arm::{Damiao, DamiaoMode, Settings};
+use taustream_arm::{CubeMars, Damiao, DamiaoMode, Settings};
 
 /// Registers and requests for feedback.
 const REGISTERS: u32 = 0x7FF;
@@ -52,15 +52,20 @@ impl MotorEncoding {
 #[must_use]
 pub fn encodings(settings: &Settings) -> Option<Vec<MotorEncoding>> {
     let encoding = |servo: &taustream_arm::Servo| {
-        let damiao = servo.protocol.get::<Damiao>()?;
-        let DamiaoMode::Mit(gains) = damiao.mode else { return None };
+        let (feedback_id, ranges, gains) = if let Some(damiao) = servo.protocol.get::<Damiao>() {
+            let DamiaoMode::Mit(gains) = damiao.mode else { return None };
+            (damiao.feedback_id, damiao.ranges, gains)
+        } else {
+            let cubemars = servo.protocol.get::<CubeMars>()?;
+            (cubemars.feedback_id, cubemars.ranges, cubemars.gains)
+        };
         Some(MotorEncoding {
             joint: servo.joint,
             node_id: servo.node_id,
-            feedback_id: damiao.feedback_id,
+            feedback_id,
             sign: servo.sign,
             zero_rad: servo.zero_offset_rad,
-            reach: [damiao.ranges.position_rad, damiao.ranges.velocity_rad_s],
+            reach: [ranges.position_rad, ranges.velocity_rad_s],
             gains: [gains.stiffness_nm_rad, gains.damping_nm_s_rad],
         })
     };

@@ -73,6 +73,16 @@ fn damiao6_fd() {
 }
 
 #[test]
+fn robstride6() {
+    seeds_of("robstride6");
+}
+
+#[test]
+fn ak6() {
+    seeds_of("ak6");
+}
+
+#[test]
 fn pos_vel() {
     seeds_of("pos-vel");
 }

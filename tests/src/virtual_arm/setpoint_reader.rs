@@ -1,7 +1,7 @@
 //! The setpoints that a frame holds for each joint, read by decoders that share nothing with the product's.
 use crate::mit_setpoints::MotorEncoding;
 use crate::setpoints::{Encoding, target};
-use taustream_arm::{Cia402, Damiao, DamiaoMode, Settings};
+use taustream_arm::{Cia402, Damiao, DamiaoMode, RobStride, Settings};
 use taustream_drivers::CanFrame;
 use taustream_drivers::sim::{ServoModel, ServoSimulator};
 
@@ -10,6 +10,9 @@ const RPDO1: u32 = 0x200;
 const RPDO2: u32 = 0x300;
 /// Identifiers of the `POS_VEL` mode begin here.
 const POS_VEL: u32 = 0x100;
+/// Flag of a 29-bit identifier, type 1 (operation command) and receiver of `RobStride` frames, and the bits that are theirs.
+const OPERATION: u32 = 0x8100_0000;
+const OPERATION_BITS: u32 = 0xFF00_00FF;
 /// Half the distance between two neighbouring numbers of 32 bits below 8 rad.
 const FLOAT_HALF_RAD: f64 = 2.4e-7;
 
@@ -29,6 +32,8 @@ enum Kind {
     Counts(Encoding),
     /// 16 bits of an MIT command.
     Mit(MotorEncoding),
+    /// 16 bits of a `RobStride` operation command.
+    Operation { node_id: u8, reach_rad: f64, sign: f64, zero_rad: f64 },
     /// A number of 32 bits.
     PosVel { node_id: u8, sign: f64, zero_rad: f64 },
 }
@@ -63,15 +68,17 @@ impl SetpointReader {
                         / std::f64::consts::TAU,
                     zero_rad: servo.zero_offset_rad,
                 })
-            } else {
-                match servo.protocol.get::<Damiao>()?.mode {
-                    DamiaoMode::Mit(_) => Kind::Mit(*motors.iter().find(|motor| motor.joint == servo.joint)?),
-                    DamiaoMode::PosVel => Kind::PosVel {
-                        node_id: servo.node_id,
-                        sign: servo.sign,
-                        zero_rad: servo.zero_offset_rad,
-                    },
+            } else if let Some(robstride) = servo.protocol.get::<RobStride>() {
+                Kind::Operation {
+                    node_id: servo.node_id,
+                    reach_rad: robstride.ranges.position_rad,
+                    sign: servo.sign,
+                    zero_rad: servo.zero_offset_rad,
                 }
+            } else if servo.protocol.get::<Damiao>().is_some_and(|damiao| damiao.mode == DamiaoMode::PosVel) {
+                Kind::PosVel { node_id: servo.node_id, sign: servo.sign, zero_rad: servo.zero_offset_rad }
+            } else {
+                Kind::Mit(*motors.iter().find(|motor| motor.joint == servo.joint)?)
             };
             Some(Reading { joint: servo.joint, bus: servo.bus, kind })
         };
@@ -92,7 +99,7 @@ impl SetpointReader {
             let counts: Vec<(usize, Encoding)> = own
                 .filter_map(|servo| match servo.kind {
                     Kind::Counts(encoding) => Some((servo.joint, encoding)),
-                    Kind::Mit(_) | Kind::PosVel { .. } => None,
+                    Kind::Mit(_) | Kind::Operation { .. } | Kind::PosVel { .. } => None,
                 })
                 .collect();
             let pair = counts.chunks_exact(2).find(|pair| RPDO2 + u32::from(pair[0].1.node_id) == id);
@@ -112,6 +119,7 @@ impl SetpointReader {
             Kind::Counts(encoding) => 0.5 / encoding.counts_per_rad.abs(),
             // The range is twice the reach, in 65535 steps.
             Kind::Mit(motor) => motor.reach[0] / 65_535.0,
+            Kind::Operation { reach_rad, .. } => reach_rad / 65_535.0,
             Kind::PosVel { .. } => FLOAT_HALF_RAD,
         })
     }
@@ -138,6 +146,12 @@ impl Reading {
                 (id == RPDO1 + u32::from(encoding.node_id)).then(|| target(data))?.map(|at| encoding.rad(at))
             }
             Kind::Mit(motor) => (id == u32::from(motor.node_id)).then(|| motor.commanded_rad(data)).flatten(),
+            Kind::Operation { node_id, reach_rad, sign, zero_rad } => {
+                let bytes: [u8; 2] = data.get(..2)?.try_into().ok()?;
+                let is_setpoint = id & OPERATION_BITS == OPERATION | u32::from(node_id) && data.len() == 8;
+                let part = f64::from(u16::from_be_bytes(bytes)) / 65_535.0;
+                is_setpoint.then(|| (2.0 * part - 1.0) * reach_rad * sign + zero_rad)
+            }
             Kind::PosVel { node_id, sign, zero_rad } => {
                 let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
                 let is_setpoint = id == POS_VEL + u32::from(node_id) && data.len() == 8;

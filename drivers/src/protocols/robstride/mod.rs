@@ -1,5 +1,5 @@
 //! `RobStride` motors (RS00 to RS06) in their private protocol.
-mod fault;
+mod fault_words;
 pub mod frames;
 mod parameters;
 mod sim;

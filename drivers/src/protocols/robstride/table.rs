@@ -6,7 +6,7 @@
 //!
 //! Nothing is kept in the motor's flash: what was written is gone with the power, and is looked at again before the motor
 //! is energised.
-use super::fault::fault_words;
+use super::fault_words::fault_words;
 use super::frames::{
     Feedback, Mode, Operation, Parameter, Reply as FrameReply, Request, TIMEOUT_UNITS_A_MS, ranges,
 };
