@@ -17,6 +17,7 @@ mod description;
 pub mod digest;
 mod document;
 pub mod drive_epochs;
+pub mod drive_features;
 pub mod drive_scale;
 pub mod fault;
 mod hull;
@@ -54,6 +55,7 @@ pub mod trust;
 mod urdf;
 
 pub use bus_load::BusLoad;
+pub use drive_features::{AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject};
 pub use drive_scale::{Overruled, ScaleObject};
 pub use fault::{Fault, Faults};
 pub use lookup::{Kind, find};

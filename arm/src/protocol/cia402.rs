@@ -3,6 +3,7 @@ use super::identifiers::Use;
 use super::{FdUse, Protocol, Registration, ServoProtocol};
 use crate::bus_load::flow::{Cia402Bus, Flow};
 use crate::bus_load::frame::Format;
+use crate::drive_features::{self, DriveFeatures, OptionalObject};
 use crate::drive_scale::{self, Overruled, ScaleObject};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::RobotJoint;
@@ -23,12 +24,23 @@ pub struct Cia402 {
     pub home_offset_counts: i32,
     /// Objects of the drive that are not compared with these settings.
     pub overruled: Overruled,
+    /// What the drive lacks or does in its own time.
+    pub features: DriveFeatures,
 }
 
 pub(super) const REGISTRATION: Registration = Registration {
     name: "cia402",
     words: "CANopen CiA 402, cyclic synchronous position",
-    keys: &["gear_ratio", "counts_per_rev", "home_offset_counts", "overruled_objects"],
+    keys: &[
+        "gear_ratio",
+        "counts_per_rev",
+        "home_offset_counts",
+        "overruled_objects",
+        "absent_objects",
+        "master_supervision",
+        "boot_timeout_s",
+        "late_mode_display",
+    ],
     // 127 is refused later, because it is this master.
     node_id: [1, 127],
     read: |table| read(table).map(Protocol::from),
@@ -66,11 +78,13 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
     let [low, high] = HOME_OFFSET_COUNTS;
     let home_offset = table.integer_or("home_offset_counts", 0, low, high);
     let overruled = drive_scale::read_overruled(table);
+    let features = drive_features::read(table);
     Some(Cia402 {
         gear_ratio: gear_ratio?,
         counts_per_rev: counts_per_rev?,
         home_offset_counts: i32::try_from(home_offset?).ok()?,
         overruled: overruled?,
+        features: features?,
     })
 }
 
@@ -136,11 +150,16 @@ impl ServoProtocol for Cia402 {
 
     fn entries(&self) -> Vec<(&'static str, Value)> {
         let overruled: Vec<u16> = self.overruled.objects().map(ScaleObject::index).collect();
+        let absent: Vec<u16> = self.features.absent.objects().map(OptionalObject::index).collect();
         vec![
             ("gear_ratio", self.gear_ratio.into()),
             ("counts_per_rev", self.counts_per_rev.into()),
             ("home_offset_counts", self.home_offset_counts.into()),
             ("overruled_objects", overruled.into()),
+            ("absent_objects", absent.into()),
+            ("master_supervision", self.features.master_supervision.word().into()),
+            ("boot_timeout_s", self.features.boot_timeout_s.into()),
+            ("late_mode_display", self.features.late_mode_display.into()),
         ]
     }
 
@@ -151,6 +170,9 @@ impl ServoProtocol for Cia402 {
         }
         for object in self.overruled.objects() {
             let _ = write!(text, ", 0x{:04X} ({}) of the drive NOT COMPARED", object.index(), object.name());
+        }
+        for sentence in self.features.sentences() {
+            let _ = write!(text, ", {sentence}");
         }
         text
     }

@@ -3,10 +3,11 @@
 //! A streamer that was killed leaves drives that hold. The next one may take the hold over only if every object that it
 //! would have written says what it would have written, and the drive's own target rests. Nothing is written here.
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::plan::{Check, NodePlan, Step};
+use crate::bring_up::plan::NodePlan;
 use crate::bring_up::scale::{Contradiction, ExpectedScale, StatedScale};
+use crate::bring_up::steps::{self, Check, Need, Step};
 use crate::codec::cia402_words::DriveStep;
-use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX};
+use crate::codec::error_text::is_of_the_transfer;
 use crate::codec::object::{self, Address};
 use crate::codec::sdo_client::{SdoJob, SdoOutcome};
 use crate::servo::Nanos;
@@ -108,16 +109,8 @@ impl Adoption {
                 None => Finding::Foreign(BringUpFault::WrongWidth, object),
             };
         }
-        let fits = value.as_unsigned(step.width).is_some_and(|number| match step.check {
-            Check::Equals { value, mask } => number & mask == value & mask,
-            Check::Profile402 => number & 0xFFFF == u32::from(object::PROFILE_402),
-            Check::Present
-            | Check::OffersCsp
-            | Check::NotEnergised
-            | Check::BecomesCsp
-            | Check::Position
-            | Check::Scale => true,
-        });
+        let number = value.as_unsigned(step.width);
+        let fits = number.is_some_and(|number| steps::passes(step.check, number).is_ok());
         if !fits {
             return Finding::Foreign(BringUpFault::Foreign, object);
         }
@@ -134,10 +127,10 @@ impl Adoption {
     }
 
     fn missing(&mut self, code: u32, address: Address) -> Finding {
-        let absent = matches!(code, ABORT_NO_OBJECT | ABORT_NO_SUBINDEX);
+        let absent = !is_of_the_transfer(code);
         match self.steps.get(self.at) {
             Some(step) if absent && step.check == Check::Scale => return self.scale(address, None),
-            Some(step) if absent && step.optional => self.at += 1,
+            Some(step) if absent && step.need != Need::Demanded => self.at += 1,
             None if absent && self.source + 1 < self.sources.len() => self.source += 1,
             _ => return Finding::Foreign(BringUpFault::Foreign, address.packed()),
         }

@@ -5,20 +5,21 @@
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan, Step};
+use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan};
 use crate::bring_up::power::{Power, Received, TargetSource};
 use crate::bring_up::scale::StatedScale;
-use crate::bring_up::timing::{BringUpCycle, Timeouts};
-use crate::codec::canopen::{Emcy, Nmt, NmtCommand, NmtState};
+use crate::bring_up::steps::{Parts, Step};
+use crate::bring_up::timing::{BringUpCycle, Timeouts, nanos};
+use crate::codec::canopen::{Nmt, NmtCommand};
 use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_WARNING};
-use crate::codec::emcy::{HEARTBEAT, RESET};
+use crate::codec::emcy::HEARTBEAT;
 use crate::codec::object;
-use crate::codec::sdo::{SdoBytes, SdoRequest, SdoResponse};
-use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome};
+use crate::codec::sdo::{SdoBytes, SdoRequest};
+use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
 use crate::servo::{DriveState, DriveTarget, Nanos};
 
-/// How long a boot-up may take.
-const BOOT_UP_TIMEOUT: Nanos = Nanos(5_000_000_000);
+/// Pause between two looks at the modes display of a drive that is being energised.
+const MODE_AGAIN: Nanos = Nanos(20_000_000);
 /// Pause between two looks at a drive that is waited for.
 pub(super) const OBSERVE_AGAIN: Nanos = Nanos(100_000_000);
 /// How long the bus is listened to before anything is reset: a foreign SYNC shows itself in this time.
@@ -30,10 +31,18 @@ const START_TIMEOUT: Nanos = Nanos(500_000_000);
 const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
 /// NMT start is sent this often before the drive counts as refusing.
 const START_TRIES: u8 = 3;
-/// Heartbeats in a row that deny "operational" before it is believed: one may have been queued before the start.
-const DENIALS_MAX: u8 = 2;
 
 pub(super) const SCALE_DIFFERS: u32 = BringUpFault::ScaleDiffers.code();
+const NOT_TAKEN: u32 = BringUpFault::NotTaken.code();
+
+/// What the modes display (0x6061) has said.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ModeDisplay {
+    /// It says cyclic synchronous position.
+    pub(super) is_csp: bool,
+    /// When it was asked last.
+    pub(super) asked: Nanos,
+}
 
 /// State of the bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,24 +104,32 @@ pub struct Node {
     pub(super) plan: NodePlan,
     pub(super) steps: Vec<Step>,
     pub(super) timeouts: Timeouts,
+    boot_timeout: Nanos,
     pub(super) stage: NodeStage,
     pub(super) sdo: SdoClient,
     pub(super) adoption: Adoption,
     pub(super) held: Option<i32>,
     pub(super) nmt: Option<NmtCommand>,
-    power: Power,
-    last_target: DriveTarget,
+    pub(super) power: Power,
+    pub(super) last_target: DriveTarget,
     pub(super) received: bool,
     pub(super) status: u16,
     pub(super) position: Option<i32>,
-    commanded: Option<i32>,
-    tpdo_at: Nanos,
-    heartbeat_at: Nanos,
-    denials: u8,
-    emcy: u16,
+    pub(super) commanded: Option<i32>,
+    pub(super) tpdo_at: Nanos,
+    pub(super) heartbeat_at: Nanos,
+    pub(super) denials: u8,
+    pub(super) emcy: u16,
     /// The newest emergency message that was no "error reset", and how many came.
-    emergency: (u16, u32),
-    requested_error: bool,
+    pub(super) emergency: (u16, u32),
+    pub(super) requested_error: bool,
+    /// A communication reset was sent and its boot-up has not come yet.
+    pub(super) reset_sent: bool,
+    /// What differs in the group of steps that is at work.
+    pub(super) differs: Parts,
+    /// The object that was compared last let itself be read.
+    pub(super) there: bool,
+    pub(super) mode: ModeDisplay,
     pub(super) stated: StatedScale,
     /// What the drive states of the object that contradicts the settings, and what they say.
     pub(super) numbers: [f64; 2],
@@ -126,6 +143,7 @@ impl Node {
             plan,
             steps: plan.steps(),
             timeouts,
+            boot_timeout: nanos(plan.features.boot_timeout_s).unwrap_or(Nanos(u64::MAX)),
             stage: NodeStage::Observe { since: Nanos(0), next: Nanos(0), fault: None },
             sdo: SdoClient::default(),
             adoption: Adoption::new(&plan),
@@ -143,6 +161,10 @@ impl Node {
             emcy: 0,
             emergency: (0, 0),
             requested_error: false,
+            reset_sent: false,
+            differs: Parts::NONE,
+            there: false,
+            mode: ModeDisplay::default(),
             stated: StatedScale::default(),
             numbers: [0.0; 2],
         }
@@ -229,11 +251,11 @@ impl Node {
         }
     }
 
-    /// The numbers that belong to a contradiction of the drive's scale; 0 where there is none.
+    /// What the drive states and what it should, where they contradict each other; 0 elsewhere.
     #[must_use]
     pub fn refused_numbers(&self) -> [f64; 2] {
         match self.error().0 {
-            SCALE_DIFFERS => self.numbers,
+            SCALE_DIFFERS | NOT_TAKEN => self.numbers,
             _ => [0.0; 2],
         }
     }
@@ -257,6 +279,7 @@ impl Node {
             status: self.status,
             fresh: self.age(cycle.now, self.tpdo_at) <= self.timeouts.feedback.0,
             command_near: target.near,
+            in_mode: self.mode.is_csp,
         };
         let control = match self.stage {
             NodeStage::Operational { .. } => self.power.control(cycle.now, cycle.drive_target, received),
@@ -319,89 +342,6 @@ impl Node {
         Service { nmt, sdo: self.sdo.poll(cycle.now) }
     }
 
-    /// Takes process data: statusword and position.
-    ///
-    /// Real time: arithmetic only. True when it was taken: before the mapping is ours its meaning is not known.
-    pub fn take_tpdo(&mut self, now: Nanos, status: u16, position: i32) -> bool {
-        self.received = true;
-        match self.stage {
-            NodeStage::Start { .. } => {
-                self.stage = NodeStage::Operational { shutdown_since: None };
-                self.heartbeat_at = now;
-                self.denials = 0;
-            }
-            NodeStage::Rejoin { .. } => {
-                self.stage = NodeStage::Operational { shutdown_since: None };
-                self.heartbeat_at = now;
-                self.denials = 0;
-                self.power.adopt();
-            }
-            NodeStage::Operational { .. } => {}
-            NodeStage::Observe { .. }
-            | NodeStage::Verify
-            | NodeStage::Held { .. }
-            | NodeStage::Unowned { .. }
-            | NodeStage::Reset { .. }
-            | NodeStage::Configure { .. }
-            | NodeStage::Gone(_)
-            | NodeStage::Refused { .. } => return false,
-        }
-        if self.in_fault() && DriveStep::from_status(status) != Some(DriveStep::Fault) {
-            (self.emcy, self.requested_error) = (0, false);
-        }
-        (self.status, self.position, self.tpdo_at) = (status, Some(position), now);
-        true
-    }
-
-    /// Takes an SDO answer.
-    ///
-    /// Real time: no allocation.
-    pub fn take_sdo(&mut self, response: SdoResponse) {
-        self.received = true;
-        self.sdo.accept(response);
-    }
-
-    /// Takes an emergency message.
-    ///
-    /// Real time: arithmetic only.
-    pub fn take_emcy(&mut self, emcy: Emcy) {
-        self.received = true;
-        self.emcy = emcy.code;
-        if emcy.code != RESET {
-            self.emergency = (emcy.code, self.emergency.1.wrapping_add(1));
-        }
-    }
-
-    /// Code of the newest emergency message, "error reset" not counted, and how many came.
-    #[must_use]
-    pub const fn emergency(&self) -> (u16, u32) {
-        self.emergency
-    }
-
-    /// Takes a heartbeat or boot-up.
-    ///
-    /// Real time: arithmetic only.
-    pub fn take_heartbeat(&mut self, now: Nanos, state: NmtState) {
-        self.received = true;
-        self.heartbeat_at = now;
-        self.denials = if state == NmtState::Operational { 0 } else { self.denials.saturating_add(1) };
-        match (state, self.stage) {
-            (NmtState::BootUp, NodeStage::Reset { .. }) => {
-                self.stage = NodeStage::Configure { step: 0, since: now }
-            }
-            (NmtState::BootUp, NodeStage::Operational { .. }) => self.leave(now, BringUpFault::Restarted),
-            (NmtState::BootUp, NodeStage::Gone(_)) => {}
-            // It has just started: whatever was asked before is lost, and it can be asked at once.
-            (NmtState::BootUp, _) => self.observe(now, None),
-            // SDO does not work in NMT stopped; pre-operational does not touch the power stage.
-            (NmtState::Stopped, NodeStage::Observe { .. }) => self.nmt = Some(NmtCommand::PreOperational),
-            (_, NodeStage::Operational { .. }) if self.denials >= DENIALS_MAX => {
-                self.leave(now, BringUpFault::LeftOperational);
-            }
-            _ => {}
-        }
-    }
-
     /// Clears findings, resets a drive in fault, and tries a refused drive again from the start.
     ///
     /// Real time: no allocation.
@@ -422,10 +362,10 @@ impl Node {
     pub fn start_over(&mut self, now: Nanos) {
         self.observe(now, None);
         (self.received, self.status, self.position) = (false, 0, None);
-        (self.nmt, self.denials) = (None, 0);
+        (self.nmt, self.denials, self.reset_sent) = (None, 0, false);
     }
 
-    fn in_fault(&self) -> bool {
+    pub(super) fn in_fault(&self) -> bool {
         matches!(DriveStep::from_status(self.status), Some(DriveStep::Fault | DriveStep::FaultReaction))
     }
 
@@ -441,15 +381,6 @@ impl Node {
         self.power.watch(self.last_target);
         (self.emcy, self.requested_error) = (0, false);
         self.stage = NodeStage::Observe { since: now, next: now, fault };
-    }
-
-    fn leave(&mut self, now: Nanos, fault: BringUpFault) {
-        if self.last_target == DriveTarget::Disabled {
-            self.observe(now, Some(fault));
-        } else {
-            self.sdo.cancel();
-            self.stage = NodeStage::Gone(fault);
-        }
     }
 
     pub(super) fn torque_off_by_sdo(&mut self) {
@@ -490,7 +421,7 @@ impl Node {
                 }
             }
             NodeStage::Reset { since } => {
-                if self.age(now, since) >= BOOT_UP_TIMEOUT.0 {
+                if self.age(now, since) >= self.boot_timeout.0 {
                     self.observe(now, Some(BringUpFault::NoBootUp));
                 }
             }
@@ -542,8 +473,20 @@ impl Node {
                     self.observe(now, Some(BringUpFault::HeartbeatLost));
                 }
             }
-        } else {
-            self.request_error();
+        } else if !self.request_error() {
+            self.request_mode(now);
+        }
+    }
+
+    /// Looks at the modes display of a drive that shows its mode only in operation enabled.
+    fn request_mode(&mut self, now: Nanos) {
+        let enabled = DriveStep::from_status(self.status) == Some(DriveStep::OperationEnabled);
+        if !enabled {
+            // It shows it anew each time.
+            self.mode.is_csp &= !self.plan.features.late_mode_display;
+        } else if !self.mode.is_csp && self.sdo.is_idle() && self.age(now, self.mode.asked) >= MODE_AGAIN.0 {
+            self.mode.asked = now;
+            self.sdo.begin(SdoJob::Read(object::MODE_DISPLAY));
         }
     }
 
@@ -578,12 +521,23 @@ impl Node {
             }
             NodeStage::Verify => self.settle_verify(cycle.now, job, outcome),
             NodeStage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
+            NodeStage::Operational { .. } => {
+                if let SdoOutcome::Value(value) = outcome
+                    && job.address() == object::MODE_DISPLAY
+                {
+                    self.mode.is_csp = is_csp(value);
+                }
+            }
             NodeStage::Reset { .. }
             | NodeStage::Start { .. }
             | NodeStage::Rejoin { .. }
-            | NodeStage::Operational { .. }
             | NodeStage::Gone(_)
             | NodeStage::Refused { .. } => {}
         }
     }
+}
+
+/// The value of a modes display is that of cyclic synchronous position.
+pub(super) fn is_csp(display: SdoValue) -> bool {
+    display.as_unsigned(1) == Some(u32::from(object::MODE_CSP.cast_unsigned()))
 }

@@ -1,11 +1,10 @@
 //! What the answers to the configuration steps of a node mean.
-use crate::bring_up::cia402::{Node, NodeStage, SCALE_DIFFERS};
+use crate::bring_up::cia402::{Node, NodeStage, SCALE_DIFFERS, is_csp};
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::plan::{Check, Step};
 use crate::bring_up::scale::Contradiction;
+use crate::bring_up::steps::{self, Check, Parts, Step};
 use crate::codec::cia402_words::STATUS_ENERGISED;
-use crate::codec::error_text::{ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, ABORT_TIMEOUT};
-use crate::codec::object;
+use crate::codec::error_text::{ABORT_TIMEOUT, is_of_the_transfer};
 use crate::codec::sdo_client::{SdoOutcome, SdoValue};
 use crate::servo::Nanos;
 
@@ -14,14 +13,11 @@ impl Node {
         let (index, since) = at;
         let Some(step) = self.steps.get(index).copied() else { return };
         match outcome {
-            SdoOutcome::Written => self.next_step(now, index),
-            SdoOutcome::Aborted(ABORT_NO_OBJECT | ABORT_NO_SUBINDEX) if step.check == Check::Scale => {
-                self.compare(now, step, index, None);
-            }
-            SdoOutcome::Aborted(ABORT_NO_OBJECT | ABORT_NO_SUBINDEX) if step.optional => {
+            SdoOutcome::Written => {
+                self.differs = self.differs.with(step.marks);
                 self.next_step(now, index);
             }
-            SdoOutcome::Aborted(code) => self.refuse(code, step.job),
+            SdoOutcome::Aborted(code) => self.step_refused(now, step, index, code),
             SdoOutcome::TimedOut => self.refuse(ABORT_TIMEOUT, step.job),
             SdoOutcome::Value(value) if step.check == Check::Scale => {
                 match value.as_unsigned_of_any_width() {
@@ -37,8 +33,33 @@ impl Node {
         }
     }
 
+    /// An abort: no code says reliably whether the object is absent, fixed or of another kind.
+    fn step_refused(&mut self, now: Nanos, step: Step, index: usize, code: u32) {
+        if is_of_the_transfer(code) {
+            self.refuse(code, step.job);
+        } else if step.check == Check::Scale {
+            self.compare(now, step, index, None);
+        } else if let Check::Compare { part, first, .. } = step.check {
+            self.note_difference(part, first);
+            self.there = false;
+            self.next_step(now, index);
+        } else if step.may_be_refused(self.there) {
+            self.next_step(now, index);
+        } else {
+            self.refuse(code, step.job);
+        }
+    }
+
+    /// To the next step that is due.
     fn next_step(&mut self, now: Nanos, index: usize) {
-        self.stage = NodeStage::Configure { step: index + 1, since: now };
+        let rest = self.steps.iter().enumerate().skip(index + 1);
+        let due = rest.filter(|(_, step)| self.differs.meets(step.when)).map(|(at, _)| at).next();
+        self.stage = NodeStage::Configure { step: due.unwrap_or(self.steps.len()), since: now };
+    }
+
+    fn note_difference(&mut self, part: Parts, first: bool) {
+        let earlier = if first { Parts::NONE } else { self.differs };
+        self.differs = earlier.with(part);
     }
 
     /// Holds what the drive states about its scale against the settings; none where it does not have the object.
@@ -61,12 +82,11 @@ impl Node {
         value: SdoValue,
     ) -> Result<bool, BringUpFault> {
         let Some(number) = value.as_unsigned(step.width) else { return Err(BringUpFault::WrongWidth) };
+        if let Check::Equals { value: expected, .. } = step.check {
+            self.numbers = [f64::from(number), f64::from(expected)];
+        }
+        steps::passes(step.check, number)?;
         match step.check {
-            Check::Present | Check::Scale => Ok(true),
-            Check::Profile402 if number & 0xFFFF == u32::from(object::PROFILE_402) => Ok(true),
-            Check::Profile402 => Err(BringUpFault::NotCia402),
-            Check::OffersCsp if number & object::SUPPORTS_CSP != 0 => Ok(true),
-            Check::OffersCsp => Err(BringUpFault::NoCsp),
             Check::NotEnergised => {
                 self.status = (number & 0xFFFF) as u16;
                 if self.status & STATUS_ENERGISED == 0 {
@@ -75,19 +95,26 @@ impl Node {
                 self.stage = NodeStage::Unowned { next: now, fault: BringUpFault::Foreign, object: 0 };
                 Ok(false)
             }
-            Check::BecomesCsp if number == u32::from(object::MODE_CSP.cast_unsigned()) => Ok(true),
-            Check::BecomesCsp if self.age(now, since) < self.timeouts.step.0 => Ok(false),
-            Check::BecomesCsp => Err(BringUpFault::ModeNotTaken),
+            Check::BecomesCsp | Check::MayBeCsp => {
+                self.mode.is_csp = is_csp(value);
+                let waits = step.check == Check::BecomesCsp && !self.mode.is_csp;
+                if waits && self.age(now, since) >= self.timeouts.step.0 {
+                    return Err(BringUpFault::ModeNotTaken);
+                }
+                Ok(!waits)
+            }
             Check::Position => {
                 self.position = Some(number.cast_signed());
                 Ok(true)
             }
-            Check::Equals { value, mask } => {
-                if number & mask == value & mask {
-                    Ok(true)
-                } else {
-                    Err(BringUpFault::Foreign)
-                }
+            Check::Compare { value, mask, part, first } => {
+                self.there = true;
+                let differs = number & mask != value & mask;
+                self.note_difference(if differs { part } else { Parts::NONE }, first);
+                Ok(true)
+            }
+            Check::Present | Check::Profile402 | Check::OffersCsp | Check::Scale | Check::Equals { .. } => {
+                Ok(true)
             }
         }
     }

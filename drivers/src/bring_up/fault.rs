@@ -5,6 +5,7 @@
 use crate::bring_up::scale;
 use crate::codec::cia402_words::{DriveStep, STATUS_WARNING};
 use crate::codec::{emcy, error_text, object};
+use taustream_arm::OptionalObject;
 
 /// A finding of the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,11 +47,13 @@ pub enum BringUpFault {
     Foreign = 0x0001_0011,
     /// An object that states its scale, direction or range contradicts the settings.
     ScaleDiffers = 0x0001_0012,
+    /// It confirmed a write and holds another value.
+    NotTaken = 0x0001_0013,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -69,6 +72,7 @@ impl BringUpFault {
         Self::OtherMaster,
         Self::Foreign,
         Self::ScaleDiffers,
+        Self::NotTaken,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -85,16 +89,23 @@ impl BringUpFault {
                 "the drive does not answer; check its power, the wiring, the bit rate and its node id (a drive in \
                  NMT stopped that sends no heartbeat needs a power cycle)"
             }
-            Self::NoBootUp => "no boot-up message within 5 s of the communication reset; trying again",
+            Self::NoBootUp => {
+                "no boot-up message in time after the communication reset; still waiting, and a drive that takes longer \
+                 needs boot_timeout_s in its [[servo]]"
+            }
             Self::HeartbeatLost => "the drive's heartbeat stopped; check its power and the wiring",
             Self::Restarted => "the drive restarted by itself; check its supply",
             Self::LeftOperational => "the drive left NMT operational by itself",
             Self::NotOperational => "the drive did not become operational after NMT start",
             Self::NotCia402 => "the device is no CiA 402 drive (object 0x1000); check the node id",
             Self::NoCsp => "the drive does not offer cyclic synchronous position (object 0x6502, bit 7)",
-            Self::ModeNotTaken => "the drive did not take mode 8 (object 0x6061)",
+            Self::ModeNotTaken => {
+                "the drive did not take mode 8 (object 0x6061); one that shows its mode only in operation enabled needs \
+                 late_mode_display = true in its [[servo]]"
+            }
             Self::EnableTimeout => {
-                "the drive did not confirm a step of enabling in time; check its motor supply and its enable input"
+                "the drive did not confirm a step of enabling in time; check its motor supply and its enable input; one \
+                 that takes longer needs a longer supervision.drive_timeout_s"
             }
             Self::CommandFar => "not energised: the command lies too far from the measured position",
             Self::DroppedOut => "the drive left operation enabled by itself; check its safe torque off input",
@@ -110,6 +121,7 @@ impl BringUpFault {
                 "what the drive states about its scale, direction or range contradicts the settings; correct the one that \
                  is wrong"
             }
+            Self::NotTaken => "the drive confirmed a write and holds another value",
         }
     }
 }
@@ -138,7 +150,8 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::WrongWidth
         | BringUpFault::OtherMaster
         | BringUpFault::Foreign
-        | BringUpFault::ScaleDiffers => None,
+        | BringUpFault::ScaleDiffers
+        | BringUpFault::NotTaken => None,
     }
 }
 
@@ -163,13 +176,42 @@ pub fn explain_refusal(refusal: &Refusal, has_cable: bool) -> String {
         return sentence;
     }
     let (index, sub) = (object >> 8, object & 0xFF);
-    // The mapping of the second RPDO is written for shared setpoint frames alone.
-    let advice = if index == u32::from(object::RPDO_MAPPING) + 1 {
-        "; the drive does not skip the other drive's part of a shared setpoint frame: take `packed` off its bus"
+    let advice = advice(code, u16::try_from(index).unwrap_or(0));
+    let what = if code == BringUpFault::NotTaken.code() {
+        format!("the drive confirmed the write of {expected} and holds {stated}")
     } else {
-        ""
+        explain(code, has_cable)
     };
-    format!("object 0x{index:04X}:{sub:02}: {}{advice}", explain(code, has_cable))
+    format!("object 0x{index:04X}:{sub:02}: {what}{advice}")
+}
+
+/// What to do about an object that was refused.
+fn advice(code: u32, index: u16) -> String {
+    let by_drive = code > u32::from(u16::MAX) && !error_text::is_of_the_transfer(code);
+    let not_taken = code == BringUpFault::NotTaken.code();
+    if !(by_drive || not_taken) {
+        return String::new();
+    }
+    if let Some(object) = OptionalObject::from_index(index) {
+        return format!(
+            " ({name}): if the drive lacks it, or has the right value fixed in it, state absent_objects = [0x{index:04X}] for \
+             this servo; then {without}",
+            name = object.name(),
+            without = object.without()
+        );
+    }
+    match index {
+        // The mapping of the second RPDO is written for shared setpoint frames alone.
+        _ if index == object::RPDO_MAPPING + 1 => {
+            "; the drive does not skip the other drive's part of a shared setpoint frame: take `packed` off its bus".into()
+        }
+        _ if index == object::CONSUMER_HEARTBEAT.index => {
+            " (consumer heartbeat): without it the drive does not notice that its master is gone; if it notices otherwise, state \
+             master_supervision = \"setpoint-timer\" (0x1400:05) or \"drive\" (set in the drive) for this servo"
+                .into()
+        }
+        _ => String::new(),
+    }
 }
 
 /// The sentence for a code of a drive, on a link that has a cable or none.

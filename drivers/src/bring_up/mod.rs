@@ -8,7 +8,9 @@ pub mod fault;
 mod observe;
 pub mod plan;
 pub mod power;
+mod receive;
 pub mod scale;
+mod steps;
 pub mod timing;
 
 pub use cia402::Node;

@@ -40,6 +40,8 @@ impl Node {
     fn looked(&mut self, cycle: BringUpCycle, status: u16) {
         let BringUpCycle { now, drive_target, other_master } = cycle;
         self.status = status;
+        // A drive that answers has not been restarting: a boot-up from here on is another one.
+        self.reset_sent = false;
         let next = Nanos(now.0.saturating_add(OBSERVE_AGAIN.0));
         if status & STATUS_ENERGISED != 0 {
             self.looked_energised(cycle, next);
@@ -53,6 +55,7 @@ impl Node {
         let observed = self.age(now, since) >= OBSERVE_MIN.0;
         if drive_target == DriveTarget::Disabled && observed && !other_master {
             self.nmt = Some(NmtCommand::ResetCommunication);
+            self.reset_sent = true;
             self.stage = NodeStage::Reset { since: now };
         } else {
             let fault = other_master.then_some(BringUpFault::OtherMaster);

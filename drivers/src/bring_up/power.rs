@@ -12,6 +12,11 @@ use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// Cycles for which 0 is sent before the rising edge of fault reset, so that a latched RPDO has surely passed.
 const RESET_LOW_CYCLES: u8 = 3;
+/// Time that an edge of fault reset has to act before the next one: some drives take the first one for the fault's
+/// acknowledgement and the second for the reset.
+const RESET_EDGE: Nanos = Nanos(250_000_000);
+/// How often a drive may fall back on its way up while it has no torque: a supply that charges lets drives do so.
+const FALLS_MAX: u8 = 2;
 /// Answers in a row without "follows the target" that make a fault.
 const NOT_FOLLOWING_MAX: u8 = 3;
 
@@ -24,14 +29,16 @@ pub struct Received {
     pub fresh: bool,
     /// The command is close enough to the measured position to energise.
     pub command_near: bool,
+    /// The drive has said that it is in cyclic synchronous position.
+    pub in_mode: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Not to be energised.
     Off,
-    /// Climbing; since when at this rung.
-    Enabling { since: Nanos, rung: u8 },
+    /// Climbing; since when at this rung, and how often it has fallen back.
+    Enabling { since: Nanos, rung: u8, falls: u8 },
     /// Energised, following.
     On,
     /// Stepping down; since when at this rung.
@@ -56,11 +63,15 @@ pub enum TargetSource {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reset {
     Idle,
-    /// Sending 0 before the edge.
-    Low(u8),
-    /// Sending the edge until the fault is gone.
+    /// Sending 0 before an edge; when the first edge came.
+    Low {
+        left: u8,
+        began: Option<Nanos>,
+    },
+    /// Sending the edge until the fault is gone, or the next edge is due.
     High {
         since: Nanos,
+        began: Nanos,
     },
 }
 
@@ -155,7 +166,7 @@ impl Power {
         self.fault = None;
         self.not_following = 0;
         if DriveStep::from_status(status) == Some(DriveStep::Fault) {
-            self.reset = Reset::Low(RESET_LOW_CYCLES);
+            self.reset = Reset::Low { left: RESET_LOW_CYCLES, began: None };
         }
     }
 
@@ -226,7 +237,7 @@ impl Power {
         if self.phase == Phase::Off && self.reset == Reset::Idle && ready && untroubled {
             self.fault = None;
             self.not_following = 0;
-            self.phase = Phase::Enabling { since: now, rung: rung(step) };
+            self.phase = Phase::Enabling { since: now, rung: rung(step), falls: 0 };
         }
     }
 
@@ -244,8 +255,8 @@ impl Power {
         }
         match self.phase {
             Phase::Off => {}
-            Phase::Enabling { since, rung: reached } => {
-                self.advance_up(now, step, received, (since, reached));
+            Phase::Enabling { since, rung: reached, falls } => {
+                self.advance_up(now, step, received, (since, reached, falls));
             }
             Phase::On => self.advance_on(step, received),
             Phase::Kept => self.advance_kept(step),
@@ -262,20 +273,24 @@ impl Power {
         }
     }
 
-    fn advance_up(&mut self, now: Nanos, step: Option<DriveStep>, received: Received, at: (Nanos, u8)) {
-        let (since, reached) = at;
+    fn advance_up(&mut self, now: Nanos, step: Option<DriveStep>, received: Received, at: (Nanos, u8, u8)) {
+        let (since, reached, falls) = at;
         let rung = rung(step);
-        if rung < reached || matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction)) {
+        if step == Some(DriveStep::SwitchOnDisabled) && (1..=2).contains(&reached) && falls < FALLS_MAX {
+            // Its time goes on: it may not climb and fall for ever.
+            self.phase = Phase::Enabling { since, rung, falls: falls + 1 };
+        } else if rung < reached || matches!(step, Some(DriveStep::Fault | DriveStep::FaultReaction)) {
             self.drop_out(step);
         } else if step == Some(DriveStep::SwitchedOn) && received.fresh && !received.command_near {
             self.note(BringUpFault::CommandFar);
             self.phase = Phase::Off;
-        } else if rung == 3 && received.status & STATUS_FOLLOWS != 0 {
+        } else if rung == 3 && received.in_mode && received.status & STATUS_FOLLOWS != 0 {
             self.phase = Phase::On;
         } else if rung > reached {
-            self.phase = Phase::Enabling { since: now, rung };
+            self.phase = Phase::Enabling { since: now, rung, falls };
         } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
-            self.note(BringUpFault::EnableTimeout);
+            let wrong_mode = rung == 3 && !received.in_mode;
+            self.note(if wrong_mode { BringUpFault::ModeNotTaken } else { BringUpFault::EnableTimeout });
             self.phase = Phase::Off;
         }
     }
@@ -307,7 +322,10 @@ impl Power {
         } else if !received.command_near {
             self.note(BringUpFault::CommandFar);
             self.phase = Phase::Kept;
-        } else if step == Some(DriveStep::OperationEnabled) && received.status & STATUS_FOLLOWS != 0 {
+        } else if step == Some(DriveStep::OperationEnabled)
+            && received.in_mode
+            && received.status & STATUS_FOLLOWS != 0
+        {
             self.phase = Phase::On;
         } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
             self.note(BringUpFault::EnableTimeout);
@@ -327,12 +345,16 @@ impl Power {
 
     fn control_off(&mut self, now: Nanos, drive_target: DriveTarget, step: Option<DriveStep>) -> u16 {
         match self.reset {
-            Reset::Low(0) => self.reset = Reset::High { since: now },
-            Reset::Low(left) => self.reset = Reset::Low(left - 1),
-            Reset::High { since } => {
-                let late = now.0.saturating_sub(since.0) >= self.step_timeout.0;
-                if late || step != Some(DriveStep::Fault) {
+            Reset::Low { left: 0, began } => {
+                self.reset = Reset::High { since: now, began: began.unwrap_or(now) };
+            }
+            Reset::Low { left, began } => self.reset = Reset::Low { left: left - 1, began },
+            Reset::High { since, began } => {
+                let passed = |then: Nanos| now.0.saturating_sub(then.0);
+                if step != Some(DriveStep::Fault) || passed(began) >= self.step_timeout.0 {
                     self.reset = Reset::Idle;
+                } else if passed(since) >= RESET_EDGE.0 {
+                    self.reset = Reset::Low { left: RESET_LOW_CYCLES, began: Some(began) };
                 }
             }
             Reset::Idle => {}

@@ -15,7 +15,7 @@ use crate::codec::sdo::SdoResponse;
 use crate::codec::setpoint_frames::{Group, SendSchedule, encode_control, encode_pair, groups};
 use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
 use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
-use taustream_arm::{Servo, Settings};
+use taustream_arm::{Cia402, Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
 pub use crate::codec::cia402_words::{
@@ -161,7 +161,9 @@ impl Cia402Driver {
                 target: target_pdo(&driver.groups, &nodes, at),
                 heartbeat_lost_ms: settings.cycle.heartbeat_lost_ms,
                 feedback_every,
+                setpoints_lost_ms: u16::try_from(settings.cycle.drive_watchdog_ms).unwrap_or(u16::MAX),
                 scale: expected,
+                features: servo.protocol.get::<Cia402>().map(|cia402| cia402.features).unwrap_or_default(),
             };
             driver.add(servo, scale, Node::new(plan, timeouts))?;
         }

@@ -49,6 +49,15 @@ pub const ABORT_DEVICE_STATE: u32 = 0x0800_0022;
 /// SDO abort: there is no data, as in an empty error history.
 pub const ABORT_NO_DATA: u32 = 0x0800_0024;
 
+/// Whether an abort code says that the transfer failed, not what the drive makes of the object.
+///
+/// Of all others no code is distinguished from another where a drive is asked for what it may lack: drives say "no such object",
+/// "unsupported access", "general error" or "cannot be stored" for one and the same.
+#[must_use]
+pub const fn is_of_the_transfer(code: u32) -> bool {
+    code < ABORT_ACCESS || code == ABORT_TOO_LONG
+}
+
 /// What an SDO abort code says.
 #[must_use]
 pub fn sdo_abort(code: u32) -> &'static str {
@@ -77,5 +86,22 @@ pub fn sdo_abort(code: u32) -> &'static str {
         ABORT_DEVICE_STATE => "not in the present state of the device",
         ABORT_NO_DATA => "no data there",
         _ => "abort code that CiA 301 does not list",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_of_the_object_are_distinguished_from_those_of_the_transfer() {
+        for code in [ABORT_TOGGLE, ABORT_TIMEOUT, ABORT_COMMAND, 0x0504_0005, ABORT_TOO_LONG, 0] {
+            assert!(is_of_the_transfer(code), "0x{code:08X}");
+        }
+        for code in
+            [ABORT_ACCESS, ABORT_READ_ONLY, ABORT_NO_OBJECT, ABORT_GENERAL, ABORT_STORE, ABORT_NO_DATA]
+        {
+            assert!(!is_of_the_transfer(code), "0x{code:08X}");
+        }
     }
 }

@@ -210,6 +210,17 @@ impl SdoRequest {
 }
 
 impl SdoResponse {
+    /// The object that it names; none for the answer to a segment.
+    #[must_use]
+    pub const fn address(&self) -> Option<Address> {
+        match *self {
+            Self::Value(address, _)
+            | Self::ValueSegmented(address, _)
+            | Self::Written(address)
+            | Self::Abort(address, _) => Some(address),
+            Self::Segment { .. } | Self::SegmentWritten { .. } => None,
+        }
+    }
     /// The response of `node`.
     #[must_use]
     pub fn encode(self, node: u8) -> CanFrame {

@@ -45,24 +45,23 @@ impl SdoJob {
 pub struct SdoValue {
     bytes: [u8; SDO_VALUE_MAX],
     len: usize,
-    sized: bool,
 }
 
 impl SdoValue {
-    const EMPTY: Self = Self { bytes: [0; SDO_VALUE_MAX], len: 0, sized: true };
+    const EMPTY: Self = Self { bytes: [0; SDO_VALUE_MAX], len: 0 };
 
     /// The bytes, least significant first.
     #[must_use]
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&self.bytes)
     }
-    /// The value of an unsigned object of `width` bytes; `None` when the drive sent another width.
+    /// The value of an unsigned object of `width` bytes; `None` when the drive sent fewer.
     ///
-    /// A drive that does not state the size sends four bytes, of which the first `width` count.
+    /// Of a wider answer the first `width` bytes count: drives that do not state the size send four, and some keep an object
+    /// in more bytes than the profile gives it.
     #[must_use]
     pub fn as_unsigned(&self, width: usize) -> Option<u32> {
-        let fits = if self.sized { self.len == width } else { self.len >= width };
-        if !fits || width > 4 {
+        if self.len < width || width > 4 {
             return None;
         }
         let mut number = [0; 4];
@@ -126,6 +125,11 @@ struct Transfer {
 #[derive(Clone, Debug, Default)]
 pub struct SdoClient {
     transfer: Option<Transfer>,
+    /// The object that was asked for last, and how many requests for it were not answered yet.
+    asked: Option<(Address, u8)>,
+    /// Requests of earlier transfers of the same object whose answers may still come. Only an abort could be taken for one
+    /// of the transfer that is open.
+    stale: u8,
 }
 
 impl SdoClient {
@@ -141,6 +145,9 @@ impl SdoClient {
     /// Real time: no allocation.
     pub fn begin(&mut self, job: SdoJob) {
         let state = TransferState::Ours(job.request());
+        let unanswered =
+            self.asked.filter(|(asked, _)| *asked == job.address()).map_or(0, |(_, count)| count);
+        (self.asked, self.stale) = (Some((job.address(), unanswered)), unanswered);
         self.transfer = Some(Transfer { job, state, tries: 0, toggle: None, value: SdoValue::EMPTY });
     }
 
@@ -162,7 +169,11 @@ impl SdoClient {
         match transfer.state {
             TransferState::Ours(request) => {
                 // Only initiating requests count as tries: a long value has many segments.
-                transfer.tries += u8::from(transfer.toggle.is_none());
+                let initiates = u8::from(transfer.toggle.is_none());
+                transfer.tries += initiates;
+                if let Some((_, unanswered)) = self.asked.as_mut() {
+                    *unanswered = unanswered.saturating_add(initiates);
+                }
                 transfer.state = TransferState::Theirs { since: now };
                 Some(request)
             }
@@ -178,6 +189,16 @@ impl SdoClient {
     ///
     /// Real time: no allocation.
     pub fn accept(&mut self, response: SdoResponse) {
+        if let Some((asked, unanswered)) = self.asked.as_mut()
+            && response.address() == Some(*asked)
+        {
+            *unanswered = unanswered.saturating_sub(1);
+            let is_stale = self.stale > 0;
+            self.stale = self.stale.saturating_sub(1);
+            if is_stale && matches!(response, SdoResponse::Abort(..)) {
+                return;
+            }
+        }
         if let Some(transfer) = self.transfer.as_mut()
             && matches!(transfer.state, TransferState::Theirs { .. })
         {
@@ -218,7 +239,7 @@ impl Transfer {
                 self.state = TransferState::Done(SdoOutcome::Written);
             }
             (SdoResponse::Value(address, bytes), SdoJob::Read(_), None) if address == wanted => {
-                self.value = SdoValue { sized: bytes.is_sized(), ..SdoValue::EMPTY };
+                self.value = SdoValue::EMPTY;
                 self.value.append(bytes.as_slice());
                 self.state = TransferState::Done(SdoOutcome::Value(self.value));
             }

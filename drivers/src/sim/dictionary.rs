@@ -3,7 +3,7 @@
 //! What ties objects together (PDO rules, device states) is `drive_objects`' business.
 //! Source: CiA 301 section 7.2.4.3.17 (abort codes).
 use super::objects::{Access, Kind, Spec, objects};
-use super::planted::PlantedObject;
+use super::planted::{ObjectChange, PlantedObject};
 use crate::codec::Address;
 use crate::codec::error_text;
 
@@ -48,6 +48,10 @@ pub(crate) struct Dictionary {
     values: Vec<i64>,
     /// Values that a reset brings back: the defaults, or what 0x1010 stored.
     stored: Vec<i64>,
+    /// Objects that are refused with another code than CiA 301 has for it.
+    codes: Vec<(Address, AbortCode)>,
+    /// Objects that are read in more bytes than their type has.
+    wide: Vec<(Address, u8)>,
 }
 
 impl Dictionary {
@@ -55,7 +59,7 @@ impl Dictionary {
     pub(crate) fn new(node: u8) -> Self {
         let specs = objects(node);
         let values: Vec<i64> = specs.iter().map(|spec| spec.default).collect();
-        Self { specs, stored: values.clone(), values }
+        Self { specs, stored: values.clone(), values, codes: Vec::new(), wide: Vec::new() }
     }
 
     /// Changes the value that a power-up gives an object; for set-up.
@@ -72,22 +76,54 @@ impl Dictionary {
         }
     }
 
-    /// Gives an object another value as shipped, or takes it away; false when there is none, or it cannot hold that.
+    /// Changes an object as shipped; false when there is none, or it cannot be changed so.
     pub(crate) fn plant(&mut self, object: PlantedObject) -> bool {
-        let Some(at) = self.find(object.address) else { return false };
-        match object.value {
-            Some(value) if self.specs.get(at).is_some_and(|spec| narrow(value, spec.kind) == value) => {
-                self.ship(object.address, value);
+        let address = object.address;
+        let Some(at) = self.find(address) else { return false };
+        let Some(kind) = self.specs.get(at).map(|spec| spec.kind) else { return false };
+        match object.change {
+            ObjectChange::Value(value) => {
+                let fits = narrow(value, kind) == value;
+                if fits {
+                    self.ship(address, value);
+                }
+                fits
+            }
+            ObjectChange::ReadOnly => {
+                self.fix_where(|spec| (spec.index, spec.sub) == (address.index, address.sub));
                 true
             }
-            Some(_) => false,
-            None => {
+            ObjectChange::Refused(code) => {
+                self.codes.push((address, code));
+                true
+            }
+            ObjectChange::Bytes(bytes) => {
+                self.wide.push((address, bytes));
+                bytes > kind.bits() / 8 && kind.bits() > 0
+            }
+            ObjectChange::Absent => {
                 self.specs.remove(at);
                 self.values.remove(at);
                 self.stored.remove(at);
                 true
             }
         }
+    }
+
+    /// Makes objects of these indices read-only.
+    pub(crate) fn fix(&mut self, indices: std::ops::RangeInclusive<u16>) {
+        self.fix_where(|spec| indices.contains(&spec.index));
+    }
+
+    fn fix_where(&mut self, holds: impl Fn(&Spec) -> bool) {
+        for spec in self.specs.iter_mut().filter(|spec| holds(spec)) {
+            spec.access = Access::ReadOnly;
+        }
+    }
+
+    /// The code with which an object is refused, in place of the one of CiA 301.
+    fn refusal(&self, address: Address, code: AbortCode) -> AbortCode {
+        self.codes.iter().find(|(other, _)| *other == address).map_or(code, |(_, own)| *own)
     }
 
     /// The value of an object; 0 when there is none.
@@ -109,9 +145,9 @@ impl Dictionary {
         match self.find(address).and_then(|at| self.specs.get(at)) {
             Some(spec) => Ok(spec),
             None if self.specs.iter().any(|spec| spec.index == address.index) => {
-                Err(error_text::ABORT_NO_SUBINDEX)
+                Err(self.refusal(address, error_text::ABORT_NO_SUBINDEX))
             }
-            None => Err(error_text::ABORT_NO_OBJECT),
+            None => Err(self.refusal(address, error_text::ABORT_NO_OBJECT)),
         }
     }
 
@@ -126,7 +162,8 @@ impl Dictionary {
             out.extend(text.as_bytes());
         } else {
             let all = self.get(address.index, address.sub).to_le_bytes();
-            out.extend(all.get(..usize::from(spec.kind.bits() / 8)).unwrap_or(&[]));
+            let wide = self.wide.iter().find(|(other, _)| *other == address).map(|(_, bytes)| *bytes);
+            out.extend(all.get(..usize::from(wide.unwrap_or(spec.kind.bits() / 8))).unwrap_or(&[]));
         }
         Ok(out)
     }
@@ -137,7 +174,7 @@ impl Dictionary {
     pub(crate) fn check_write(&self, address: Address, bytes: &[u8], sized: bool) -> Result<i64, AbortCode> {
         let spec = self.spec(address)?;
         if spec.access == Access::ReadOnly {
-            return Err(error_text::ABORT_READ_ONLY);
+            return Err(self.refusal(address, error_text::ABORT_READ_ONLY));
         }
         let size = usize::from(spec.kind.bits() / 8);
         let value = bytes.get(..size).ok_or(error_text::ABORT_TOO_SHORT)?;

@@ -13,6 +13,7 @@ use super::network::{Consumers, Errors, Nmt};
 use super::pdo::{Pdos, Received};
 use super::plant::PlantParameters;
 use super::power::{Power, PowerState};
+use super::quirks::{DriveQuirks, QuirkState};
 use super::sdo_server::SdoServer;
 use crate::codec::canopen::{NmtCommand, decode_sync};
 use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, emcy};
@@ -62,6 +63,8 @@ pub struct DriveParameters {
     pub boot_s: f64,
     /// Step of the simulated mechanics, 10,000 to 1,000,000 ns.
     pub step_ns: u64,
+    /// What it does otherwise than masters expect.
+    pub quirks: DriveQuirks,
 }
 
 /// A simulated drive.
@@ -97,6 +100,7 @@ pub struct Drive {
     pub(super) moving: Nanos,
     pub(super) warning: bool,
     pub(super) refuse_writes: u32,
+    pub(super) quirks: QuirkState,
 }
 
 /// Emergency code for a connection that was ended by command, not lost.
@@ -131,6 +135,7 @@ impl Drive {
             moving: Nanos(0),
             warning: false,
             refuse_writes: 0,
+            quirks: QuirkState::default(),
             parameters,
             shipped_parameters: parameters,
         }
@@ -147,6 +152,10 @@ impl Drive {
         if self.nmt.state() == NmtState::BootUp {
             return;
         }
+        if self.has_switched_on(now) {
+            self.commanded(now, out);
+        }
+        self.send_late_answers(now, out);
         self.supervise(now, out);
         if let Some(abort) = self.sdo.expire(now) {
             out.push(abort.encode(self.parameters.node_id));
@@ -271,6 +280,7 @@ impl Drive {
             (self.held, self.halted, self.limited, self.astray) = (false, false, false, None);
             self.errors = Errors::default();
         }
+        self.forget_quirks(communication_only);
         self.dictionary.reset(communication_only);
         self.pdos = Pdos::compile(&self.dictionary);
         self.watch_heartbeats();
@@ -289,7 +299,9 @@ impl Drive {
         let mut session = super::drive_objects::Session { drive: self, out };
         let answer = server.answer(now, session.drive.parameters.node_id, frame, &mut session);
         self.sdo = server;
-        out.extend(answer.map(|answer| answer.encode(self.parameters.node_id)));
+        if let Some(answer) = answer {
+            self.send_answer(now, answer, out);
+        }
     }
 
     /// SYNC and RPDOs.

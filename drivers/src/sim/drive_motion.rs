@@ -46,7 +46,8 @@ impl Drive {
     pub(super) fn commanded(&mut self, now: Nanos, out: &mut Vec<CanFrame>) {
         let word = self.dictionary.get(0x6040, 0);
         let before = self.power.state();
-        let action = self.power.command(u16::try_from(word).unwrap_or(0), &self.options());
+        let acting = self.acting_controlword(now, u16::try_from(word).unwrap_or(0));
+        let action = self.power.command(acting, &self.options());
         self.perform(action);
         if before == PowerState::Fault && self.power.state() != PowerState::Fault {
             (self.held, self.astray) = (false, None);

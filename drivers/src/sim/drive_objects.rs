@@ -4,8 +4,9 @@ use super::drive::{Drive, DriveParameters};
 use super::drive_motion::{counts, reaction_code};
 use super::objects::{Access, CONSUMERS, HISTORY};
 use super::pdo::{self, Pdos};
-use super::planted::{PlantedObject, as_ratio};
+use super::planted::{ObjectChange, PlantedObject, as_ratio};
 use super::power::PowerState;
+use super::quirks::fixed_pdos;
 use super::sdo_server::Objects;
 use crate::codec::object::{RPDO_COMMUNICATION, TPDO_MAPPING};
 use crate::codec::{Address, error_text};
@@ -85,9 +86,15 @@ impl Drive {
             for (at, sub) in [1, 2].into_iter().enumerate() {
                 let part = as_ratio(value).and_then(|ratio| ratio.get(at).copied());
                 // A drive that cannot state a number does not have the object.
-                let _has_it =
-                    dictionary.plant(PlantedObject { address: Address::new(index, sub), value: part });
+                let change = part.map_or(ObjectChange::Absent, ObjectChange::Value);
+                let _has_it = dictionary.plant(PlantedObject { address: Address::new(index, sub), change });
             }
+        }
+        if parameters.quirks.fixed_pdos {
+            for (address, value) in fixed_pdos(parameters.node_id) {
+                dictionary.ship(address, value);
+            }
+            dictionary.fix(RPDO_COMMUNICATION..=0x1AFF);
         }
         dictionary
     }
@@ -103,7 +110,7 @@ impl Drive {
             (0x1001, i64::from(self.errors.register())),
             (0x603F, i64::from(self.errors.code())),
             (0x6041, i64::from(self.statusword())),
-            (0x6061, self.dictionary.get(0x6060, 0)),
+            (0x6061, self.mode_display()),
             (0x6062, i64::from(demand)),
             (0x6064, i64::from(self.counts(ahead_s))),
             (0x606C, velocity),
@@ -112,6 +119,12 @@ impl Drive {
         ] {
             self.dictionary.set(index, 0, value);
         }
+    }
+
+    fn mode_display(&self) -> i64 {
+        let hidden =
+            self.parameters.quirks.late_mode_display && self.power.state() != PowerState::OperationEnabled;
+        if hidden { 0 } else { self.dictionary.get(0x6060, 0) }
     }
 
     /// The statusword.

@@ -5,13 +5,14 @@ use super::model::{ModelParameters, ServoModel};
 use super::plant::PlantParameters;
 use super::planted::PlantedObject;
 use super::power::PowerState;
+use super::quirks::DriveQuirks;
 use super::settings::{Load, SimulatedJoint};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use taustream_arm::Cia402;
 
 /// Its own keys.
-pub(crate) const KEYS: [&str; 8] = [
+pub(crate) const KEYS: [&str; 14] = [
     "objects",
     "dummy_mapping",
     "following_window_rad",
@@ -20,6 +21,12 @@ pub(crate) const KEYS: [&str; 8] = [
     "slow_rad_s2",
     "quick_stop_rad_s2",
     "watchdog_ms",
+    "fixed_pdos",
+    "late_mode_display",
+    "sdo_answer_ms",
+    "switch_on_ms",
+    "reset_edges",
+    "falls_back",
 ];
 
 pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
@@ -50,7 +57,19 @@ pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
         reaction: servo.reaction,
         boot_s: joint.boot_s(),
         step_ns: joint.step_ns(),
+        quirks: quirks(joint),
     })
+}
+
+fn quirks(joint: &SimulatedJoint<'_>) -> DriveQuirks {
+    DriveQuirks {
+        fixed_pdos: joint.flag("fixed_pdos", false),
+        late_mode_display: joint.flag("late_mode_display", false),
+        sdo_answer_s: joint.number("sdo_answer_ms", 0.0, 0.0..=10_000.0) * 1e-3,
+        switch_on_s: joint.number("switch_on_ms", 0.0, 0.0..=60_000.0) * 1e-3,
+        reset_edges: joint.whole::<u8>("reset_edges", 1, 1..=10).saturating_sub(1),
+        falls_back: joint.whole("falls_back", 0, 0..=10),
+    }
 }
 
 impl ModelParameters for DriveParameters {

@@ -1,5 +1,7 @@
 //! Objects of a simulated CiA 402 drive that hold another value than its settings make, or that it does not have:
-//! `joint=elbow,object=0x6091:01,value=50`, `object=0x6092,value=absent`.
+//! `joint=elbow,object=0x6091:01,value=50`, `object=0x6092,value=absent`; or one that cannot be written, that is refused with
+//! another abort code, or that is read in more bytes than its type has: `object=0x6007,access=read-only,abort=0x08000020`,
+//! `object=0x6041,bytes=4`.
 //!
 //! A drive with another gear, feed, direction or range then counts so: the joint moves by another angle than commanded,
 //! with feedback that agrees. The same text serves `--object` and the key `objects` of `[simulator]`.
@@ -9,13 +11,28 @@ use super::settings::DriveSetup;
 use crate::codec::{Address, object};
 use std::f64::consts::TAU;
 
-/// One object with its value, or without.
+/// One object and a change of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlantedObject {
     /// The object.
     pub address: Address,
-    /// Its value; none: the drive does not have it.
-    pub value: Option<i64>,
+    /// What is changed.
+    pub change: ObjectChange,
+}
+
+/// What is changed of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ObjectChange {
+    /// It holds this value.
+    Value(i64),
+    /// It cannot be written.
+    ReadOnly,
+    /// Where it is refused, it is with this SDO abort code.
+    Refused(u32),
+    /// It is read in so many bytes.
+    Bytes(u8),
+    /// The drive does not have it.
+    Absent,
 }
 
 /// Why an object cannot be planted.
@@ -23,7 +40,8 @@ pub struct PlantedObject {
 pub enum PlantError {
     /// A piece without an equals sign, an unknown key, or one that appears twice.
     #[error(
-        "{0:?} is no part of an object: expected joint= (all joints without it), object=0xINDEX:SUB, value=NUMBER|absent"
+        "{0:?} is no part of an object: expected joint= (all joints without it), object=0xINDEX:SUB, value=NUMBER|absent, \
+         access=read-only, abort=0xCODE, bytes=NUMBER"
     )]
     Piece(String),
     /// A key that must be there.
@@ -48,7 +66,7 @@ pub enum PlantError {
     )]
     NoDrive(String),
     /// The drive does not have the object, or it holds no such value.
-    #[error("the simulated drive has no object {0}, or it cannot hold this value")]
+    #[error("the simulated drive has no object {0}, or it cannot be changed so")]
     Object(Address),
 }
 
@@ -57,13 +75,17 @@ pub enum PlantError {
 /// # Errors
 /// What was not understood, and what was expected.
 pub fn plant(text: &str, setups: &mut [DriveSetup]) -> Result<(), PlantError> {
-    let (mut joint, mut address, mut value) = (None, None, None);
+    let (mut joint, mut address) = (None, None);
+    let (mut value, mut access, mut abort, mut bytes) = (None, None, None, None);
     for piece in text.split(',').map(str::trim) {
         let (key, given) = piece.split_once('=').ok_or_else(|| PlantError::Piece(piece.to_owned()))?;
         let slot = match key {
             "joint" => &mut joint,
             "object" => &mut address,
             "value" => &mut value,
+            "access" => &mut access,
+            "abort" => &mut abort,
+            "bytes" => &mut bytes,
             _ => return Err(PlantError::Piece(piece.to_owned())),
         };
         if slot.replace(given).is_some() {
@@ -71,25 +93,51 @@ pub fn plant(text: &str, setups: &mut [DriveSetup]) -> Result<(), PlantError> {
         }
     }
     let address = read_address(address.ok_or(PlantError::Missing("object"))?)?;
-    let value = read_value(value.ok_or(PlantError::Missing("value"))?)?;
-    let object = PlantedObject { address, value };
+    let changes = read_changes([value, access, abort, bytes])?;
     let Some(name) = joint else {
-        return setups.iter_mut().try_for_each(|setup| add(setup, object));
+        return setups.iter_mut().try_for_each(|setup| add(setup, address, &changes));
     };
     let by_number = name.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
     let at = setups.iter().position(|setup| setup.joint == name).or(by_number);
     let setup = at.and_then(|at| setups.get_mut(at)).ok_or_else(|| PlantError::Joint(name.to_owned()))?;
-    add(setup, object)
+    add(setup, address, &changes)
 }
 
-fn add(setup: &mut DriveSetup, object: PlantedObject) -> Result<(), PlantError> {
-    match setup.parameters.takes_object(object) {
-        None => return Err(PlantError::NoDrive(setup.joint.clone())),
-        Some(false) => return Err(PlantError::Object(object.address)),
-        Some(true) => {}
+fn add(setup: &mut DriveSetup, address: Address, changes: &[ObjectChange]) -> Result<(), PlantError> {
+    for change in changes {
+        let object = PlantedObject { address, change: *change };
+        match setup.parameters.takes_object(object) {
+            None => return Err(PlantError::NoDrive(setup.joint.clone())),
+            Some(false) => return Err(PlantError::Object(address)),
+            Some(true) => setup.objects.push(object),
+        }
     }
-    setup.objects.push(object);
     Ok(())
+}
+
+/// What is changed, the absence last: what is gone cannot be changed any more.
+fn read_changes(given: [Option<&str>; 4]) -> Result<Vec<ObjectChange>, PlantError> {
+    let [value, access, abort, bytes] = given;
+    let mut changes = Vec::new();
+    if let Some(text) = access {
+        let wrong = || PlantError::Number { key: "access", given: text.to_owned(), expected: "read-only" };
+        changes.push((text == "read-only").then_some(ObjectChange::ReadOnly).ok_or_else(wrong)?);
+    }
+    if let Some(text) = abort {
+        let expected = "an SDO abort code in hexadecimal, for example 0x08000020";
+        let wrong = || PlantError::Number { key: "abort", given: text.to_owned(), expected };
+        let code = text.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+        changes.push(ObjectChange::Refused(code.ok_or_else(wrong)?));
+    }
+    if let Some(text) = bytes {
+        let wrong = || PlantError::Number { key: "bytes", given: text.to_owned(), expected: "1 to 4" };
+        let number = text.parse().ok().filter(|number| (1..=4).contains(number));
+        changes.push(ObjectChange::Bytes(number.ok_or_else(wrong)?));
+    }
+    if let Some(text) = value {
+        changes.push(read_value(text)?.map_or(ObjectChange::Absent, ObjectChange::Value));
+    }
+    if changes.is_empty() { Err(PlantError::Missing("value")) } else { Ok(changes) }
 }
 
 fn read_address(text: &str) -> Result<Address, PlantError> {

@@ -4,7 +4,8 @@ use taustream_arm::{Cia402, Overruled, Reaction, ScaleObject};
 use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 
-/// Every frame that node 1 is sent from the first look to NMT start, written out from CiA 301 and CiA 402-2.
+/// Every frame that node 1 is sent from the first look to NMT start, written out from CiA 301 and CiA 402-2: each object is
+/// read, written because this drive does not have it yet, and read back where nothing else will show it.
 const BRING_UP_OF_NODE_1: &str = "
 601 40 41 60 00 00 00 00 00
 000 82 01
@@ -26,13 +27,32 @@ const BRING_UP_OF_NODE_1: &str = "
 601 40 7D 60 02 00 00 00 00
 601 40 7B 60 01 00 00 00 00
 601 40 7B 60 02 00 00 00 00
+601 40 17 10 00 00 00 00 00
 601 2B 17 10 00 64 00 00 00
+601 40 17 10 00 00 00 00 00
+601 40 16 10 01 00 00 00 00
 601 23 16 10 01 5E 01 7F 00
+601 40 16 10 01 00 00 00 00
+601 40 07 60 00 00 00 00 00
 601 2B 07 60 00 03 00 00 00
+601 40 07 60 00 00 00 00 00
+601 40 C2 60 01 00 00 00 00
 601 2F C2 60 01 01 00 00 00
+601 40 C2 60 01 00 00 00 00
+601 40 C2 60 02 00 00 00 00
 601 2F C2 60 02 FD 00 00 00
+601 40 C2 60 02 00 00 00 00
+601 40 06 10 00 00 00 00 00
 601 23 06 10 00 E8 03 00 00
+601 40 06 10 00 00 00 00 00
+601 40 5A 60 00 00 00 00 00
 601 2B 5A 60 00 06 00 00 00
+601 40 5A 60 00 00 00 00 00
+601 40 00 14 01 00 00 00 00
+601 40 00 14 02 00 00 00 00
+601 40 00 16 00 00 00 00 00
+601 40 00 16 01 00 00 00 00
+601 40 00 16 02 00 00 00 00
 601 23 00 14 01 01 02 00 80
 601 2F 00 14 02 01 00 00 00
 601 2F 00 16 00 00 00 00 00
@@ -40,6 +60,11 @@ const BRING_UP_OF_NODE_1: &str = "
 601 23 00 16 02 20 00 7A 60
 601 2F 00 16 00 02 00 00 00
 601 23 00 14 01 01 02 00 00
+601 40 00 18 01 00 00 00 00
+601 40 00 18 02 00 00 00 00
+601 40 00 1A 00 00 00 00 00
+601 40 00 1A 01 00 00 00 00
+601 40 00 1A 02 00 00 00 00
 601 23 00 18 01 81 01 00 C0
 601 2F 00 18 02 01 00 00 00
 601 2F 00 1A 00 00 00 00 00
@@ -47,12 +72,19 @@ const BRING_UP_OF_NODE_1: &str = "
 601 23 00 1A 02 20 00 64 60
 601 2F 00 1A 00 02 00 00 00
 601 23 00 18 01 81 01 00 40
+601 40 01 14 01 00 00 00 00
 601 23 01 14 01 01 03 00 80
+601 40 01 18 01 00 00 00 00
 601 23 01 18 01 81 02 00 C0
+601 40 02 14 01 00 00 00 00
 601 23 02 14 01 01 04 00 80
+601 40 02 18 01 00 00 00 00
 601 23 02 18 01 81 03 00 C0
+601 40 03 14 01 00 00 00 00
 601 23 03 14 01 01 05 00 80
+601 40 03 18 01 00 00 00 00
 601 23 03 18 01 81 04 00 C0
+601 40 60 60 00 00 00 00 00
 601 2F 60 60 00 08 00 00 00
 601 40 61 60 00 00 00 00 00
 601 40 64 60 00 00 00 00 00
@@ -256,7 +288,7 @@ fn starting_over_asks_before_it_changes_anything() {
 fn bring_up_of_a_drive_that_answers_after_the_repetition_takes_time_but_succeeds() {
     let mut bench = Bench::new(1);
     bench.drives[0].answer_ms = 700;
-    bench.until(DriveState::Disabled, 60_000);
+    bench.until(DriveState::Disabled, 200_000);
     assert!(bench.ms > 20_000, "the answers were not late: {} ms", bench.ms);
     for write in ["601 2F 00 16 00 02", "601 2F 00 1A 00 02", "601 2F 60 60 00 08"] {
         let count = bench.drives[0].seen.iter().filter(|sent| hex(sent).starts_with(write)).count();

@@ -9,6 +9,7 @@ use taustream_drivers::{
     CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
 
+mod as_they_are;
 mod bring_up;
 #[path = "../counting/mod.rs"]
 mod counting;

@@ -33,6 +33,18 @@ pub(crate) struct Scripted {
     pub(crate) objects: BTreeMap<(u16, u8), (usize, u32)>,
     /// Objects that are refused, with the abort code.
     pub(crate) refused: BTreeMap<(u16, u8), u32>,
+    /// Every write is refused with this code, when it is not 0.
+    pub(crate) read_only: u32,
+    /// What objects hold once they were written, in place of what was written.
+    pub(crate) stuck: BTreeMap<(u16, u8), u32>,
+    /// Objects that cannot be written.
+    pub(crate) fixed: Vec<(u16, u8)>,
+    /// A reset of its communication leaves its objects as they are.
+    pub(crate) keeps: bool,
+    /// The modes display follows the mode.
+    pub(crate) shows_mode: bool,
+    /// Bytes of the statusword in an SDO answer.
+    pub(crate) status_bytes: usize,
     /// Sends and takes nothing.
     pub(crate) silent: bool,
     /// Follows the controlword through the state machine; otherwise `status` is the test's.
@@ -72,6 +84,12 @@ impl Scripted {
             position: 1_000 * i32::from(id),
             objects,
             refused: BTreeMap::new(),
+            read_only: 0,
+            stuck: BTreeMap::new(),
+            fixed: Vec::new(),
+            keeps: false,
+            shows_mode: true,
+            status_bytes: 2,
             silent: false,
             responds: true,
             segments: false,
@@ -134,6 +152,10 @@ impl Scripted {
     pub(crate) fn boot(&mut self, out: &mut Vec<CanFrame>) {
         self.nmt = 0x7F;
         self.heartbeat_ms = 0;
+        // A reset of communication forgets what was written there.
+        if self.read_only == 0 && !self.keeps {
+            self.objects.retain(|(index, _), _| matches!(index, 0x1000 | 0x1018 | 0x2000..));
+        }
         out.push(frame(self.mine(0x700), &[0x00]));
     }
 
@@ -190,6 +212,9 @@ impl Scripted {
         if let Some(code) = self.refused.get(&(index, sub)) {
             return answer(head(0x80), *code);
         }
+        if data[0] != 0x40 && self.fixed.contains(&(index, sub)) {
+            return answer(head(0x80), 0x0601_0002);
+        }
         match data[0] {
             0x40 => match self.read(index, sub) {
                 Some((4, value)) if self.segments => {
@@ -203,9 +228,13 @@ impl Scripted {
                 let [a, b, c, d] = self.segment.take().unwrap().to_le_bytes();
                 out.push(frame(reply, &[0x07, a, b, c, d, 0, 0, 0]));
             }
+            0x23 | 0x27 | 0x2B | 0x2F if self.read_only != 0 => answer(head(0x80), self.read_only),
             0x23 | 0x27 | 0x2B | 0x2F => {
+                let width = 4 - usize::from(data[0] >> 2 & 3);
+                let held = self.stuck.get(&(index, sub)).copied().unwrap_or(number);
+                self.objects.insert((index, sub), (width, held));
                 match (index, sub) {
-                    (0x6060, 0) => drop(self.objects.insert((0x6061, 0), (1, number))),
+                    (0x6060, 0) if self.shows_mode => drop(self.objects.insert((0x6061, 0), (1, number))),
                     (0x6040, 0) if self.responds => self.apply(u16::try_from(number).unwrap()),
                     (0x1017, 0) => self.heartbeat_ms = u64::from(number),
                     _ => {}
@@ -218,7 +247,7 @@ impl Scripted {
 
     fn read(&self, index: u16, sub: u8) -> Option<(usize, u32)> {
         match (index, sub) {
-            (0x6041, 0) => Some((2, u32::from(self.status))),
+            (0x6041, 0) => Some((self.status_bytes, 0xA5A5_0000 | u32::from(self.status))),
             (0x6064, 0) => Some((4, self.position.cast_unsigned())),
             other => self.objects.get(&other).copied(),
         }

@@ -237,8 +237,42 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "CiA 402: objects of the drive that are not compared with these settings, for example `[0x6091]`; none.",
     ),
     (
+        "Settings files: servo[].absent_objects",
+        "CiA 402: objects that the drive lacks or has fixed, neither read nor written, for example `[0x6007]`; none.",
+    ),
+    (
+        "Settings files: servo[].master_supervision",
+        "CiA 402: how the drive finds out that its master is gone; without it `heartbeat`.",
+    ),
+    (
+        "Settings files: servo[].boot_timeout_s",
+        "CiA 402: longest time from the reset of communication to the boot-up message, s; 5.",
+    ),
+    (
+        "Settings files: servo[].late_mode_display",
+        "CiA 402: true: the modes display (0x6061) follows only in operation enabled, and is looked at there; false.",
+    ),
+    (
         "Settings files: simulator.objects",
-        "Other values of objects of the drives, for example `[\"joint=3,object=0x6091:01,value=50\"]`; none.",
+        "Objects of the drives changed, for example `[\"joint=3,object=0x6091:01,value=50\"]`; also `value=absent`, `access=read-only`, `abort=0x08000020`, `bytes=4`; none.",
+    ),
+    (
+        "Settings files: simulator.fixed_pdos",
+        "CiA 402: true: PDO 1 is mapped and on as this master needs it, and no PDO can be changed; false.",
+    ),
+    (
+        "Settings files: simulator.late_mode_display",
+        "CiA 402: true: the modes display (0x6061) follows only in operation enabled; false.",
+    ),
+    ("Settings files: simulator.sdo_answer_ms", "CiA 402: time that an SDO answer takes; 0."),
+    (
+        "Settings files: simulator.switch_on_ms",
+        "CiA 402: time from the command to switch on to the state switched on; 0.",
+    ),
+    ("Settings files: simulator.reset_edges", "CiA 402: rising edges that a fault reset takes; 1."),
+    (
+        "Settings files: simulator.falls_back",
+        "CiA 402: how often the drive falls from ready-to-switch-on to switch-on-disabled on its way up; 0.",
     ),
     ("Robot files: link_margin_m", "Least distance of links that may not touch; 0.003."),
     (

@@ -1,5 +1,7 @@
 //! A drive on a bench, with frames written out by hand, byte by byte, so that a mistake in the shared encoders shows.
-use taustream_drivers::sim::{Drive, DriveParameters, LoopParameters, PlantParameters, PowerState};
+use taustream_drivers::sim::{
+    Drive, DriveParameters, DriveQuirks, LoopParameters, PlantParameters, PowerState,
+};
 use taustream_drivers::{CanFrame, CanId, Nanos};
 
 pub(crate) const NODE: u8 = 3;
@@ -45,6 +47,7 @@ pub(crate) fn parameters() -> DriveParameters {
         reaction: taustream_arm::Reaction::Ramp,
         boot_s: 0.02,
         step_ns: 250_000,
+        quirks: DriveQuirks::default(),
     }
 }
 

@@ -7,4 +7,5 @@ mod motion;
 mod network;
 mod power;
 mod process;
+mod quirks;
 mod scale;

@@ -1,0 +1,276 @@
+//! What a CiA 402 drive lacks or does in its own time, as the settings of its servo state it.
+//!
+//! The profile demands little beside the state machine, and drives differ in the rest. What a drive lacks is never skipped
+//! in silence: bring-up refuses it by object, and its owner states here that the drive has it solved by other means.
+use crate::document::{Value, shown};
+use crate::reader::{Bounds, Table};
+
+/// Object of a CiA 402 drive that is configured or read during bring-up, and that drives may lack or not let write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub enum OptionalObject {
+    /// Communication cycle period.
+    SyncPeriod = 0x1006,
+    /// Producer heartbeat time.
+    ProducerHeartbeat = 0x1017,
+    /// Abort connection option: the reaction to a lost master.
+    AbortConnection = 0x6007,
+    /// Quick stop option: how a quick stop ends.
+    QuickStopOption = 0x605A,
+    /// Interpolation time period.
+    InterpolationPeriod = 0x60C2,
+    /// Supported drive modes.
+    SupportedModes = 0x6502,
+}
+
+impl OptionalObject {
+    /// Every object.
+    pub const ALL: [Self; 6] = [
+        Self::SyncPeriod,
+        Self::ProducerHeartbeat,
+        Self::AbortConnection,
+        Self::QuickStopOption,
+        Self::InterpolationPeriod,
+        Self::SupportedModes,
+    ];
+
+    /// Its index in the object dictionary.
+    #[must_use]
+    pub const fn index(self) -> u16 {
+        self as u16
+    }
+    /// The object at an index.
+    #[must_use]
+    pub fn from_index(index: u16) -> Option<Self> {
+        Self::ALL.into_iter().find(|object| object.index() == index)
+    }
+    /// Its name in CiA 301 or CiA 402.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SyncPeriod => "communication cycle period",
+            Self::ProducerHeartbeat => "producer heartbeat time",
+            Self::AbortConnection => "abort connection option",
+            Self::QuickStopOption => "quick stop option",
+            Self::InterpolationPeriod => "interpolation time period",
+            Self::SupportedModes => "supported drive modes",
+        }
+    }
+    /// What is left to the drive without it.
+    #[must_use]
+    pub const fn without(self) -> &'static str {
+        match self {
+            Self::SyncPeriod => "the drive does not know the period of SYNC",
+            Self::ProducerHeartbeat => "only missing feedback shows that the drive is gone",
+            Self::AbortConnection => "what the drive does when its master is lost is the drive's own setting",
+            Self::QuickStopOption => "whether the drive holds after a quick stop is the drive's own setting",
+            Self::InterpolationPeriod => "the drive does not know the time between two setpoints",
+            Self::SupportedModes => "only its modes display (0x6061) confirms cyclic synchronous position",
+        }
+    }
+    const fn bit(self) -> u8 {
+        match self {
+            Self::SyncPeriod => 1,
+            Self::ProducerHeartbeat => 2,
+            Self::AbortConnection => 4,
+            Self::QuickStopOption => 8,
+            Self::InterpolationPeriod => 16,
+            Self::SupportedModes => 32,
+        }
+    }
+}
+
+/// Objects that are neither read nor written, because the drive does not have them or they are fixed in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AbsentObjects(u8);
+
+impl AbsentObjects {
+    /// Every object is there.
+    pub const NONE: Self = Self(0);
+
+    /// The same, with one more object.
+    #[must_use]
+    pub const fn with(self, object: OptionalObject) -> Self {
+        Self(self.0 | object.bit())
+    }
+    /// Whether an object is listed.
+    #[must_use]
+    pub const fn holds(self, object: OptionalObject) -> bool {
+        self.0 & object.bit() != 0
+    }
+    /// The objects, lowest index first.
+    pub fn objects(self) -> impl Iterator<Item = OptionalObject> {
+        OptionalObject::ALL.into_iter().filter(move |object| self.holds(*object))
+    }
+}
+
+/// How a drive finds out that its master is gone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MasterSupervision {
+    /// It watches the master's heartbeat (0x1016).
+    #[default]
+    Heartbeat,
+    /// It watches the setpoints by the event timer of their RPDO (0x1400:05).
+    SetpointTimer,
+    /// By means of its own that are set in the drive; neither written nor read.
+    Drive,
+}
+
+impl MasterSupervision {
+    /// Every choice.
+    pub const ALL: [Self; 3] = [Self::Heartbeat, Self::SetpointTimer, Self::Drive];
+
+    /// Its word in settings files.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Heartbeat => "heartbeat",
+            Self::SetpointTimer => "setpoint-timer",
+            Self::Drive => "drive",
+        }
+    }
+}
+
+/// What a drive lacks or does in its own time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveFeatures {
+    /// Objects that it does not have, or that cannot be written.
+    pub absent: AbsentObjects,
+    /// How it finds out that its master is gone.
+    pub master_supervision: MasterSupervision,
+    /// Longest time from a reset of its communication to its boot-up message.
+    pub boot_timeout_s: f64,
+    /// Its modes display (0x6061) follows only in operation enabled.
+    pub late_mode_display: bool,
+}
+
+impl Default for DriveFeatures {
+    fn default() -> Self {
+        Self {
+            absent: AbsentObjects::NONE,
+            master_supervision: MasterSupervision::Heartbeat,
+            boot_timeout_s: BOOT_TIMEOUT_S,
+            late_mode_display: false,
+        }
+    }
+}
+
+impl DriveFeatures {
+    /// What `check` says of them: nothing of a drive as the profiles describe it.
+    #[must_use]
+    pub fn sentences(&self) -> Vec<String> {
+        let mut all: Vec<String> = self
+            .absent
+            .objects()
+            .map(|object| {
+                format!("0x{:04X} ({}) NOT SET: {}", object.index(), object.name(), object.without())
+            })
+            .collect();
+        match self.master_supervision {
+            MasterSupervision::Heartbeat => {}
+            MasterSupervision::SetpointTimer => {
+                all.push("0x1016 (consumer heartbeat) NOT SET: the drive watches its setpoints by 0x1400:05".into());
+            }
+            MasterSupervision::Drive => all.push(
+                "0x1016 (consumer heartbeat) NOT SET: that the drive stops without its master is the drive's own setting"
+                    .into(),
+            ),
+        }
+        if self.late_mode_display {
+            all.push("0x6061 (modes display) is looked at only in operation enabled".into());
+        }
+        if self.boot_timeout_s > BOOT_TIMEOUT_S {
+            all.push(format!("boot-up within {} s", self.boot_timeout_s));
+        }
+        all
+    }
+}
+
+const BOOT_TIMEOUT_S: f64 = 5.0;
+const BOOT_TIMEOUTS_S: Bounds = Bounds::within(0.1, 300.0, "s");
+
+/// Reads the keys of [`DriveFeatures`]; `None` only after a fault.
+pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
+    let absent = read_absent(table);
+    let master_supervision = read_supervision(table);
+    let boot_timeout_s = table.number_or("boot_timeout_s", BOOT_TIMEOUT_S, &BOOT_TIMEOUTS_S);
+    let late_mode_display = table.flag_or("late_mode_display", false);
+    Some(DriveFeatures {
+        absent: absent?,
+        master_supervision: master_supervision?,
+        boot_timeout_s: boot_timeout_s?,
+        late_mode_display: late_mode_display?,
+    })
+}
+
+fn read_absent(table: &mut Table<'_>) -> Option<AbsentObjects> {
+    const KEY: &str = "absent_objects";
+    let Some(node) = table.take(KEY) else { return Some(AbsentObjects::NONE) };
+    let indices: Vec<String> =
+        OptionalObject::ALL.map(|o| format!("0x{:04X} ({})", o.index(), o.name())).into();
+    let expected = format!(
+        "a list, without repetition, of objects among {}; a drive without 0x1016 (consumer heartbeat) needs \
+         master_supervision instead",
+        indices.join(", ")
+    );
+    let Value::List(items) = &node.value else {
+        table.fault(KEY, &node.to_string(), &expected);
+        return None;
+    };
+    let mut absent = AbsentObjects::NONE;
+    for item in items {
+        let index = if let Value::Integer(index) = item.value { u16::try_from(index).ok() } else { None };
+        let object = index.and_then(OptionalObject::from_index).filter(|object| !absent.holds(*object));
+        let Some(object) = object else {
+            table.fault(KEY, &item.to_string(), &expected);
+            return None;
+        };
+        absent = absent.with(object);
+    }
+    Some(absent)
+}
+
+fn read_supervision(table: &mut Table<'_>) -> Option<MasterSupervision> {
+    const KEY: &str = "master_supervision";
+    const EXPECTED: &str = "\"heartbeat\" (0x1016), \"setpoint-timer\" (the event timer of its RPDO, 0x1400:05) or \"drive\" \
+                            (set in the drive)";
+    let Some(word) = table.text_if_there(KEY, EXPECTED) else {
+        return (!table.had(KEY)).then_some(MasterSupervision::Heartbeat);
+    };
+    let known = MasterSupervision::ALL.into_iter().find(|choice| choice.word() == word);
+    if known.is_none() {
+        table.fault(KEY, &shown(&word), EXPECTED);
+    }
+    known
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absent_objects_are_distinguished() {
+        for object in OptionalObject::ALL {
+            let only = AbsentObjects::NONE.with(object);
+            let listed: Vec<OptionalObject> = only.objects().collect();
+            assert_eq!(listed, [object]);
+            assert_eq!(OptionalObject::from_index(object.index()), Some(object));
+        }
+        assert_eq!(OptionalObject::from_index(0x1016), None);
+    }
+
+    #[test]
+    fn only_what_departs_from_the_profiles_is_said() {
+        assert_eq!(DriveFeatures::default().sentences(), Vec::<String>::new());
+        let odd = DriveFeatures {
+            absent: AbsentObjects::NONE.with(OptionalObject::AbortConnection),
+            master_supervision: MasterSupervision::Drive,
+            boot_timeout_s: 20.0,
+            late_mode_display: true,
+        };
+        let said = odd.sentences().join("; ");
+        for part in ["0x6007 (abort connection option) NOT SET", "0x1016", "0x6061", "20 s"] {
+            assert!(said.contains(part), "no {part} in: {said}");
+        }
+    }
+}
