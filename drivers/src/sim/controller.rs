@@ -33,6 +33,25 @@ enum Mode {
     Following,
     /// Coming to rest with this deceleration, then holding.
     Slowing(f64),
+    /// Moving by a trapezoidal profile of the drive's own.
+    Profiled(Goal, ProfileLimits),
+}
+
+/// Where a profile of the drive's own leads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Goal {
+    /// To rest at an angle.
+    Position(f64),
+    /// To a velocity, until another goal is set.
+    Velocity(f64),
+}
+
+/// Limits of such a profile, all positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ProfileLimits {
+    pub(crate) speed_rad_s: f64,
+    pub(crate) acceleration_rad_s2: f64,
+    pub(crate) deceleration_rad_s2: f64,
 }
 
 /// A straight line in time.
@@ -118,6 +137,8 @@ impl Controller {
     pub(crate) fn slow_down(&mut self, deceleration_rad_s2: f64, measured: (f64, f64)) {
         if self.mode == Mode::Following {
             (self.reference_rad, self.reference_rad_s) = measured;
+        } else if matches!(self.mode, Mode::Profiled(..)) {
+            self.reference_rad = measured.0;
         }
         if self.mode != Mode::Released {
             self.mode = Mode::Slowing(deceleration_rad_s2);
@@ -128,6 +149,20 @@ impl Controller {
     pub(crate) fn set_target(&mut self, now: Nanos, to_rad: f64, period_s: f64) {
         if self.mode == Mode::Following {
             self.line = Line { from_rad: self.reference_rad, to_rad, begins: now, duration_s: period_s };
+        }
+    }
+
+    /// Moves by a profile from where the reference is, unless the motor is being stopped.
+    pub(crate) fn go(&mut self, goal: Goal, limits: ProfileLimits) {
+        if matches!(self.mode, Mode::Following | Mode::Profiled(..)) {
+            self.mode = Mode::Profiled(goal, limits);
+        }
+    }
+
+    /// Holds the reference where it is.
+    pub(crate) fn hold(&mut self) {
+        if matches!(self.mode, Mode::Profiled(..)) {
+            self.follow();
         }
     }
 
@@ -201,6 +236,33 @@ impl Controller {
                     if speed_rad_s > 0.0 { speed_rad_s.copysign(self.reference_rad_s) } else { 0.0 };
                 self.reference_rad += dt_s * self.reference_rad_s;
             }
+            Mode::Profiled(goal, limits) => self.move_by_profile(goal, limits, dt_s),
         }
+    }
+
+    /// One step of a trapezoidal profile.
+    fn move_by_profile(&mut self, goal: Goal, limits: ProfileLimits, dt_s: f64) {
+        let speed_rad_s = self.reference_rad_s;
+        let wanted_rad_s = match goal {
+            Goal::Velocity(wanted_rad_s) => wanted_rad_s.clamp(-limits.speed_rad_s, limits.speed_rad_s),
+            Goal::Position(to_rad) => {
+                let left_rad = to_rad - self.reference_rad;
+                // The speed from which the rest of the way suffices to stop, one step ahead.
+                let step_rad_s = limits.deceleration_rad_s2 * dt_s;
+                let braked_rad_s =
+                    (step_rad_s * step_rad_s + 2.0 * limits.deceleration_rad_s2 * left_rad.abs()).sqrt()
+                        - step_rad_s;
+                let wanted_rad_s = braked_rad_s.min(limits.speed_rad_s).copysign(left_rad);
+                if left_rad.abs() <= wanted_rad_s.abs() * dt_s || left_rad.abs() <= step_rad_s * dt_s {
+                    (self.reference_rad, self.reference_rad_s) = (to_rad, 0.0);
+                    return;
+                }
+                wanted_rad_s
+            }
+        };
+        let speeds_up = wanted_rad_s * speed_rad_s >= 0.0 && wanted_rad_s.abs() > speed_rad_s.abs();
+        let most = dt_s * if speeds_up { limits.acceleration_rad_s2 } else { limits.deceleration_rad_s2 };
+        self.reference_rad_s = speed_rad_s + (wanted_rad_s - speed_rad_s).clamp(-most, most);
+        self.reference_rad += dt_s * self.reference_rad_s;
     }
 }

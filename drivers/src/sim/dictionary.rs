@@ -217,6 +217,19 @@ impl Dictionary {
         }
     }
 
+    /// Moves the identifiers that contain the node id to another one.
+    pub(crate) fn readdress(&mut self, from: u8, to: u8) {
+        let change = i64::from(to) - i64::from(from);
+        let holds_id = |spec: &Spec| matches!((spec.index, spec.sub), (0x1014, 0) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1));
+        for ((spec, value), stored) in self.specs.iter_mut().zip(&mut self.values).zip(&mut self.stored) {
+            if holds_id(spec) {
+                spec.default += change;
+                *value += change;
+                *stored += change;
+            }
+        }
+    }
+
     fn find(&self, address: Address) -> Option<usize> {
         self.specs.binary_search_by_key(&(address.index, address.sub), |spec| (spec.index, spec.sub)).ok()
     }

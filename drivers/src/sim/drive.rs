@@ -8,15 +8,18 @@
 use super::controller::{Controller, LoopParameters};
 use super::dictionary::Dictionary;
 use super::disturbance::Disturbance;
+use super::lss::Lss;
 use super::mechanics::Mechanics;
+use super::modes::ModeState;
 use super::network::{Consumers, Errors, Nmt};
 use super::pdo::{Pdos, Received};
 use super::plant::PlantParameters;
 use super::power::{Power, PowerState};
 use super::quirks::{DriveQuirks, QuirkState};
-use super::sdo_server::SdoServer;
+use super::sdo_block::{self, BlockUpload};
+use super::sdo_server::{SdoServer, TIMEOUT_S};
 use crate::codec::canopen::{NmtCommand, decode_sync};
-use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, emcy};
+use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, SdoResponse, emcy, error_text};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use taustream_arm::Reaction;
@@ -101,6 +104,9 @@ pub struct Drive {
     pub(super) warning: bool,
     pub(super) refuse_writes: u32,
     pub(super) quirks: QuirkState,
+    pub(super) modes: ModeState,
+    pub(super) block: Option<BlockUpload>,
+    pub(super) lss: Lss,
 }
 
 /// Emergency code for a connection that was ended by command, not lost.
@@ -136,6 +142,9 @@ impl Drive {
             warning: false,
             refuse_writes: 0,
             quirks: QuirkState::default(),
+            modes: ModeState::default(),
+            block: None,
+            lss: Lss::default(),
             parameters,
             shipped_parameters: parameters,
         }
@@ -160,6 +169,11 @@ impl Drive {
         if let Some(abort) = self.sdo.expire(now) {
             out.push(abort.encode(self.parameters.node_id));
         }
+        if let Some(upload) = self.block.take_if(|upload| now.since_s(upload.newest) > TIMEOUT_S) {
+            let abort = SdoResponse::Abort(upload.address(), error_text::ABORT_TIMEOUT);
+            out.push(abort.encode(self.parameters.node_id));
+        }
+        self.continue_mode();
         if self.nmt.state() == NmtState::Operational {
             self.publish();
             self.pdos.on_event(now, &self.dictionary, out);
@@ -186,6 +200,8 @@ impl Drive {
             self.consumers.received(now, node);
             return;
         }
+        let identity = [1, 2, 3, 4].map(|sub| u32::try_from(self.dictionary.get(0x1018, sub)).unwrap_or(0));
+        out.extend(self.lss.answer(identity, self.parameters.node_id, frame));
         self.converse(now, frame, out);
         if self.nmt.state() == NmtState::Operational {
             self.exchange(now, frame, out);
@@ -279,9 +295,11 @@ impl Drive {
             self.perform(action);
             (self.held, self.halted, self.limited, self.astray) = (false, false, false, None);
             self.errors = Errors::default();
+            self.forget_modes();
         }
         self.forget_quirks(communication_only);
         self.dictionary.reset(communication_only);
+        self.readdress();
         self.pdos = Pdos::compile(&self.dictionary);
         self.watch_heartbeats();
         self.sdo.reset();
@@ -289,16 +307,35 @@ impl Drive {
         self.nmt = Nmt::new();
     }
 
+    /// Takes the node id that layer setting services have given it.
+    fn readdress(&mut self) {
+        self.block = None;
+        if let Some(node_id) = self.lss.node_id {
+            self.dictionary.readdress(self.parameters.node_id, node_id);
+            (self.parameters.node_id, self.shipped_parameters.node_id) = (node_id, node_id);
+        }
+    }
+
     /// SDO requests, answered in pre-operational and operational.
     fn converse(&mut self, now: Nanos, frame: &CanFrame, out: &mut Vec<CanFrame>) {
         if self.nmt.state() == NmtState::Stopped {
             return;
         }
-        // The server is lent out for the call, because it reads and writes the rest of the drive.
-        let mut server = std::mem::take(&mut self.sdo);
+        // Server and block are lent out for the call, because they read and write the rest of the drive.
+        let (mut server, mut block) = (std::mem::take(&mut self.sdo), self.block.take());
+        let at = (now, self.parameters.node_id);
+        let mut blocks = Vec::new();
+        let mut session = super::drive_objects::Session { drive: self, out };
+        if sdo_block::answer(&mut block, at, frame, &mut session, &mut blocks) {
+            (self.sdo, self.block) = (SdoServer::default(), block);
+            out.append(&mut blocks);
+            return;
+        }
         let mut session = super::drive_objects::Session { drive: self, out };
         let answer = server.answer(now, session.drive.parameters.node_id, frame, &mut session);
         self.sdo = server;
+        // Any other request ends a block.
+        self.block = block.filter(|_| answer.is_none());
         if let Some(answer) = answer {
             self.send_answer(now, answer, out);
         }

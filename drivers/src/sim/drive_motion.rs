@@ -1,7 +1,7 @@
 //! What a simulated drive does with its motor: commands carried out, faults found, time passed on to the mechanics.
 use super::drive::Drive;
+use super::plant::PlantParameters;
 use super::power::{Action, Options, PowerState, Slowing};
-use crate::codec::object::MODE_CSP;
 use crate::codec::{NmtState, emcy};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
@@ -20,9 +20,10 @@ impl Drive {
     /// Moves the mechanics up to the last whole step before `now`.
     pub(super) fn move_on(&mut self, now: Nanos) {
         let dt_s = self.mechanics.step_s();
+        let limited = PlantParameters { torque_nm_max: self.torque_limit_nm(), ..self.parameters.plant };
         for at in self.mechanics.due(now) {
             let measured = (self.measured_rad(0.0), self.mechanics.plant.velocity_rad_s);
-            let torque_nm = self.controller.step(at, dt_s, measured, &self.parameters.plant);
+            let torque_nm = self.controller.step(at, dt_s, measured, &limited);
             self.mechanics.plant.step(torque_nm, dt_s);
         }
     }
@@ -63,7 +64,10 @@ impl Drive {
             }
         }
         self.halt(word & HALT != 0);
-        self.target_source(now);
+        self.run_mode(word);
+        if self.is_in_csp() {
+            self.target_source(now);
+        }
     }
 
     /// Gives the newest setpoint to the controller, when the drive follows setpoints now.
@@ -91,7 +95,7 @@ impl Drive {
             && self.controller.is_following()
             && self.mechanics.plant.is_free()
             && !self.held
-            && self.dictionary.get(0x6060, 0) == i64::from(MODE_CSP)
+            && self.is_in_csp()
     }
 
     /// The halt bit stops the motor, and releases it to follow again.
@@ -261,7 +265,7 @@ impl Drive {
             shutdown: self.dictionary.get(0x605B, 0),
             disable_operation: self.dictionary.get(0x605C, 0),
             fault_reaction: self.dictionary.get(0x605E, 0),
-            has_mode: self.dictionary.get(0x6060, 0) == i64::from(MODE_CSP),
+            has_mode: self.dictionary.get(0x6060, 0) != 0,
         }
     }
 
@@ -295,7 +299,7 @@ pub(super) fn counts(drive: &Drive, angle_rad: f64) -> i32 {
 }
 
 /// A 32-bit object's value as a number.
-fn whole(value: i64) -> f64 {
+pub(super) fn whole(value: i64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "objects have at most 32 bits")]
     let value = value as f64;
     value

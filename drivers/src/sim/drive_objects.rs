@@ -64,6 +64,7 @@ impl Drive {
             register((angle_rad - parameters.zero_offset_rad) * per_rad, i32::MIN, i32::MAX)
         });
         let window = parameters.following_window_rad * per_rad.abs();
+        let speed = parameters.plant.speed_rad_s_max * per_rad.abs();
         for (index, sub, value) in [
             (0x2000, 1, i64::from(parameters.watchdog_ms)),
             (0x2000, 2, reaction_code(parameters.reaction)),
@@ -73,7 +74,13 @@ impl Drive {
             (0x607C, 0, i64::from(parameters.home_offset_counts)),
             (0x607D, 1, limits[0].min(limits[1])),
             (0x607D, 2, limits[0].max(limits[1])),
+            (0x607F, 0, register(speed, 1, i32::MAX)),
+            (0x6081, 0, register(0.5 * speed, 1, i32::MAX)),
+            (0x6083, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6084, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
+            (0x6099, 1, register(0.1 * speed, 1, i32::MAX)),
+            (0x6099, 2, register(0.01 * speed, 1, i32::MAX)),
+            (0x609A, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6085, 0, register(parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
         ] {
             dictionary.ship(Address::new(index, sub), value);
@@ -116,6 +123,7 @@ impl Drive {
             (0x606C, velocity),
             (0x6077, register(torque * self.parameters.sign, i32::from(i16::MIN), i32::from(i16::MAX))),
             (0x60F4, self.following_error()),
+            (0x60FD, self.digital_inputs()),
         ] {
             self.dictionary.set(index, 0, value);
         }
@@ -144,8 +152,7 @@ impl Drive {
             | bit(self.warning || self.held, 7)
             | bit(true, 9)
             | bit(self.limited, 11)
-            | bit(self.follows_target(), 12)
-            | bit(self.astray.is_some(), 13)
+            | self.mode_bits()
     }
 
     /// Takes the heartbeats to watch from the dictionary.
@@ -175,7 +182,7 @@ impl Drive {
             0x1019 if value == 1 => Err(error_text::ABORT_RANGE),
             0x1019 if self.dictionary.get(0x1006, 0) != 0 => Err(error_text::ABORT_DEVICE_STATE),
             // Changing the mode of a moving motor would take its setpoint away.
-            0x6060 if energised && value != self.dictionary.get(0x6060, 0) => {
+            0x6060 if value != self.dictionary.get(0x6060, 0) && !self.may_leave_mode(value) => {
                 Err(error_text::ABORT_DEVICE_STATE)
             }
             _ => Ok(()),
@@ -201,7 +208,7 @@ impl Drive {
                 self.pdos = Pdos::compile(&self.dictionary);
             }
             0x2002 => self.fail(u16::try_from(value).unwrap_or(0x1000), out),
-            0x6040 | 0x607A | 0x60B0..=0x60B2 => self.commanded(self.now, out),
+            0x6040 | 0x6060 | 0x607A | 0x60B0..=0x60B2 | 0x60FF => self.commanded(self.now, out),
             _ => {}
         }
     }

@@ -5,7 +5,7 @@
 //! runs the simulator on links. All but the last are pure: frames and time in, frames out.
 //!
 //! What is simple: each joint is one inertia with a pendulum's gravity, uncoupled from the others; a bus with a bit rate knows no
-//! bit errors ([`wire`]); of the modes of operation there is only cyclic synchronous position.
+//! bit errors ([`wire`]); profiles of the modes other than cyclic synchronous position are trapezoids.
 pub mod arguments;
 pub mod bit_time;
 pub(crate) mod controller;
@@ -18,8 +18,10 @@ pub(crate) mod drive_settings;
 pub mod faults;
 pub(crate) mod impedance;
 mod linked;
+mod lss;
 pub(crate) mod mechanics;
 pub mod model;
+mod modes;
 mod network;
 mod objects;
 mod pdo;
@@ -28,6 +30,7 @@ pub mod planted;
 mod power;
 pub mod priority;
 mod quirks;
+mod sdo_block;
 mod sdo_server;
 pub mod serve;
 pub mod settings;

@@ -1,7 +1,8 @@
-//! The objects that a simulated drive has: CiA 301 communication objects and the CiA 402 objects that cyclic
-//! synchronous position needs. Data only; the rules that tie objects together stand in `drive_objects`.
+//! The objects that a simulated drive has: CiA 301 communication objects and the CiA 402 objects of its modes. Data only; the rules that tie objects together stand in `drive_objects`.
 //!
 //! Source: CiA 301 (communication profile) and CiA 402-2 (drive profile).
+
+use super::modes::{HOMING_METHODS, MODES, SUPPORTED};
 
 /// Type of an object's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,10 +209,10 @@ fn power(all: &mut Vec<Spec>) {
         Spec::rw(0x605C, 0, Kind::I16, 1).within(0, 1),
         Spec::rw(0x605D, 0, Kind::I16, 1).within(1, 3),
         Spec::rw(0x605E, 0, Kind::I16, 2).within(0, 3),
-        // Cyclic synchronous position, or no mode: what 0x6502 says.
-        Spec::rw(0x6060, 0, Kind::I8, 0).one_of(&[0, 8]).rpdo(),
+        // What 0x6502 says, or no mode.
+        Spec::rw(0x6060, 0, Kind::I8, 0).one_of(MODES).rpdo(),
         Spec::ro(0x6061, 0, Kind::I8, 0).tpdo(),
-        Spec::ro(0x6502, 0, Kind::U32, 0x80),
+        Spec::ro(0x6502, 0, Kind::U32, SUPPORTED),
     ]);
 }
 
@@ -222,7 +223,10 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x6064, 0, Kind::I32, 0).tpdo(),
         Spec::rw(0x6065, 0, Kind::U32, 0xFFFF_FFFF),
         Spec::rw(0x6066, 0, Kind::U16, 0),
+        // Half a per mille of a motor revolution of 131072 counts.
+        Spec::rw(0x6067, 0, Kind::U32, 64),
         Spec::ro(0x606C, 0, Kind::I32, 0).tpdo(),
+        Spec::rw(0x6072, 0, Kind::U16, 1000),
         Spec::ro(0x6076, 0, Kind::U32, 0),
         Spec::ro(0x6077, 0, Kind::I16, 0).tpdo(),
         Spec::rw(0x607A, 0, Kind::I32, 0).rpdo().tpdo(),
@@ -230,12 +234,16 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x607B, 0, Kind::U8, 2),
         Spec::ro(0x607B, 1, Kind::I32, 0),
         Spec::ro(0x607B, 2, Kind::I32, 0),
-        Spec::ro(0x607C, 0, Kind::I32, 0),
+        Spec::rw(0x607C, 0, Kind::I32, 0),
         Spec::ro(0x607E, 0, Kind::U8, 0),
         Spec::ro(0x607D, 0, Kind::U8, 2),
         Spec::rw(0x607D, 1, Kind::I32, i64::from(i32::MIN)),
         Spec::rw(0x607D, 2, Kind::I32, i64::from(i32::MAX)),
-        Spec::rw(0x6084, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF),
+        Spec::rw(0x607F, 0, Kind::U32, 1).rpdo(),
+        Spec::rw(0x6081, 0, Kind::U32, 1).rpdo(),
+        Spec::rw(0x6082, 0, Kind::U32, 0).one_of(&[0]),
+        Spec::rw(0x6083, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF).rpdo(),
+        Spec::rw(0x6084, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF).rpdo(),
         Spec::rw(0x6085, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF),
         Spec::ro(0x608F, 0, Kind::U8, 2),
         Spec::ro(0x608F, 1, Kind::U32, 1),
@@ -249,6 +257,11 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x6093, 0, Kind::U8, 2),
         Spec::ro(0x6093, 1, Kind::U32, 1),
         Spec::ro(0x6093, 2, Kind::U32, 1),
+        Spec::rw(0x6098, 0, Kind::I8, 0).one_of(HOMING_METHODS),
+        Spec::ro(0x6099, 0, Kind::U8, 2),
+        Spec::rw(0x6099, 1, Kind::U32, 1).within(1, 0xFFFF_FFFF),
+        Spec::rw(0x6099, 2, Kind::U32, 1).within(1, 0xFFFF_FFFF),
+        Spec::rw(0x609A, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF),
         Spec::rw(0x60B0, 0, Kind::I32, 0).rpdo(),
         Spec::rw(0x60B1, 0, Kind::I32, 0).rpdo(),
         Spec::rw(0x60B2, 0, Kind::I16, 0).rpdo(),
@@ -256,6 +269,9 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::rw(0x60C2, 1, Kind::U8, 1).within(1, 255),
         Spec::rw(0x60C2, 2, Kind::I8, -3).within(-6, 0),
         Spec::ro(0x60F4, 0, Kind::I32, 0).tpdo(),
+        // Bit 0 negative, bit 1 positive limit switch.
+        Spec::ro(0x60FD, 0, Kind::U32, 0).tpdo(),
+        Spec::rw(0x60FF, 0, Kind::I32, 0).rpdo().tpdo(),
     ]);
 }
 

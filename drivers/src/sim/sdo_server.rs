@@ -9,7 +9,7 @@ use crate::frame::CanFrame;
 use crate::servo::Nanos;
 
 /// How long a segmented transfer may pause before the server gives it up.
-const TIMEOUT_S: f64 = 1.0;
+pub(super) const TIMEOUT_S: f64 = 1.0;
 
 /// What the server reads from and writes to.
 pub(crate) trait Objects {
@@ -63,7 +63,7 @@ impl SdoServer {
             return None;
         }
         let Some((_, request)) = SdoRequest::decode(frame) else {
-            // Block transfer and reserved commands: refused, with the address that the frame names.
+            // Block download and reserved commands: refused, with the address that the frame names.
             self.reset();
             let address = match *frame.data() {
                 [_, low, high, sub, ..] => Address::new(u16::from_le_bytes([low, high]), sub),

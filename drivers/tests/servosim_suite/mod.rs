@@ -3,6 +3,7 @@ mod adopt;
 mod arm;
 mod bench;
 mod hostile;
+mod modes;
 mod motion;
 mod network;
 mod power;

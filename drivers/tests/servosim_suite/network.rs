@@ -22,7 +22,7 @@ fn device_name_is_read_in_segments() {
 fn identity_and_modes_are_those_of_a_csp_servo_drive() {
     let mut bench = Bench::new(parameters());
     assert_eq!(bench.read(0x1000, 0), 0x0002_0192);
-    assert_eq!(bench.read(0x6502, 0), 0x80);
+    assert_eq!(bench.read(0x6502, 0), 0xA5, "profile position and velocity, homing, cyclic position");
     assert_eq!(bench.read(0x1018, 4), i64::from(NODE));
     assert_eq!(bench.read(0x6041, 0) & 0x4F, 0x40, "switch on disabled");
     assert_eq!(bench.read(0x6064, 0) as u32 as i32, counts(START_RAD));
@@ -43,13 +43,14 @@ fn wrong_sdo_requests_are_refused_with_the_code_that_says_why() {
         ([0x2F, 0x40, 0x60, 0, 6, 0, 0, 0], 0x0607_0013, "one byte for two"),
         ([0x21, 0x40, 0x60, 0, 9, 0, 0, 0], 0x0607_0012, "segmented, nine bytes"),
         ([0x21, 0x34, 0x12, 0, 4, 0, 0, 0], 0x0602_0000, "segmented, no such object"),
-        ([0x2F, 0x60, 0x60, 0, 1, 0, 0, 0], 0x0609_0030, "profile position mode"),
+        ([0x2F, 0x60, 0x60, 0, 2, 0, 0, 0], 0x0609_0030, "velocity mode"),
         ([0x2B, 0x5E, 0x60, 0, 4, 0, 0, 0], 0x0609_0031, "fault reaction 4"),
         ([0x2B, 0x5E, 0x60, 0, 0xFF, 0xFF, 0, 0], 0x0609_0032, "fault reaction -1"),
         ([0x2F, 0x03, 0x10, 0, 1, 0, 0, 0], 0x0609_0030, "history count set to 1"),
         ([0x23, 0x10, 0x10, 1, b'l', b'o', b'v', b'e'], 0x0800_0020, "wrong signature for storing"),
         ([0x2F, 0x19, 0x10, 0, 1, 0, 0, 0], 0x0609_0030, "SYNC counter of 1"),
-        ([0xA0, 0x00, 0x10, 0, 0, 0, 0, 0], 0x0504_0001, "block upload"),
+        ([0xA0, 0x00, 0x10, 0, 0, 0, 0, 0], 0x0504_0002, "block upload in blocks of none"),
+        ([0xC0, 0x00, 0x10, 0, 4, 0, 0, 0], 0x0504_0001, "block download"),
         ([0xFF, 0x00, 0x10, 0, 0, 0, 0, 0], 0x0504_0001, "no command at all"),
         ([0x60, 0, 0, 0, 0, 0, 0, 0], 0x0504_0001, "segment without a transfer"),
         ([0x00, 0, 0, 0, 0, 0, 0, 0], 0x0504_0001, "written segment without a transfer"),
