@@ -65,7 +65,7 @@ impl OptionalObject {
             Self::AbortConnection => "what the drive does when its master is lost is the drive's own setting",
             Self::QuickStopOption => "whether the drive holds after a quick stop is the drive's own setting",
             Self::InterpolationPeriod => "the drive does not know the time between two setpoints",
-            Self::SupportedModes => "only its modes display (0x6061) confirms cyclic synchronous position",
+            Self::SupportedModes => "only its modes display (0x6061) confirms the mode",
         }
     }
     const fn bit(self) -> u8 {
@@ -131,6 +131,49 @@ impl MasterSupervision {
     }
 }
 
+/// In which of its modes a drive follows setpoints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PositionMode {
+    /// Cyclic synchronous position, mode 8.
+    #[default]
+    Cyclic,
+    /// Interpolated position with linear interpolation, mode 7, for drives that do not have the former.
+    Interpolated,
+}
+
+impl PositionMode {
+    /// Every choice.
+    pub const ALL: [Self; 2] = [Self::Cyclic, Self::Interpolated];
+
+    /// Its word in settings files.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Cyclic => "cyclic",
+            Self::Interpolated => "interpolated",
+        }
+    }
+    /// Its number in 0x6060 and 0x6061.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Cyclic => 8,
+            Self::Interpolated => 7,
+        }
+    }
+}
+
+/// Limits that are written into a drive and read back; none of them without their key.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WrittenLimits {
+    /// Following error window (0x6065), rad of the joint.
+    pub following_window_rad: Option<f64>,
+    /// How long the window may be left (0x6066), ms.
+    pub following_timeout_ms: Option<u16>,
+    /// The joint's range becomes the software position limit (0x607D), which is compared with it otherwise.
+    pub soft_limits: bool,
+}
+
 /// What a drive lacks or does in its own time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveFeatures {
@@ -142,6 +185,10 @@ pub struct DriveFeatures {
     pub boot_timeout_s: f64,
     /// Its modes display (0x6061) follows only in operation enabled.
     pub late_mode_display: bool,
+    /// The mode in which it follows setpoints.
+    pub position_mode: PositionMode,
+    /// Limits that are written into it.
+    pub limits: WrittenLimits,
 }
 
 impl Default for DriveFeatures {
@@ -151,6 +198,8 @@ impl Default for DriveFeatures {
             master_supervision: MasterSupervision::Heartbeat,
             boot_timeout_s: BOOT_TIMEOUT_S,
             late_mode_display: false,
+            position_mode: PositionMode::Cyclic,
+            limits: WrittenLimits::default(),
         }
     }
 }
@@ -179,6 +228,18 @@ impl DriveFeatures {
         if self.late_mode_display {
             all.push("0x6061 (modes display) is looked at only in operation enabled".into());
         }
+        if self.position_mode == PositionMode::Interpolated {
+            all.push("interpolated position (mode 7)".into());
+        }
+        if let Some(window_rad) = self.limits.following_window_rad {
+            all.push(format!("following error window {window_rad} rad written"));
+        }
+        if let Some(timeout_ms) = self.limits.following_timeout_ms {
+            all.push(format!("following error time-out {timeout_ms} ms written"));
+        }
+        if self.limits.soft_limits {
+            all.push("software position limit written".into());
+        }
         if self.boot_timeout_s > BOOT_TIMEOUT_S {
             all.push(format!("boot-up within {} s", self.boot_timeout_s));
         }
@@ -188,6 +249,7 @@ impl DriveFeatures {
 
 const BOOT_TIMEOUT_S: f64 = 5.0;
 const BOOT_TIMEOUTS_S: Bounds = Bounds::within(0.1, 300.0, "s");
+const WINDOW_RAD: Bounds = Bounds::above(0.0, 10.0, "rad");
 
 /// Reads the keys of [`DriveFeatures`]; `None` only after a fault.
 pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
@@ -195,12 +257,41 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
     let master_supervision = read_supervision(table);
     let boot_timeout_s = table.number_or("boot_timeout_s", BOOT_TIMEOUT_S, &BOOT_TIMEOUTS_S);
     let late_mode_display = table.flag_or("late_mode_display", false);
+    let position_mode = read_position_mode(table);
+    let limits = read_limits(table);
     Some(DriveFeatures {
         absent: absent?,
         master_supervision: master_supervision?,
         boot_timeout_s: boot_timeout_s?,
         late_mode_display: late_mode_display?,
+        position_mode: position_mode?,
+        limits: limits?,
     })
+}
+
+fn read_limits(table: &mut Table<'_>) -> Option<WrittenLimits> {
+    // Not a number stands for none here: no window can be that.
+    let window_rad = table.number_or("following_window_rad", f64::NAN, &WINDOW_RAD);
+    let timeout_ms = table.integer_if_there("following_timeout_ms", 0, 65_535);
+    let soft_limits = table.flag_or("write_soft_limits", false);
+    Some(WrittenLimits {
+        following_window_rad: window_rad.map(|window_rad| Some(window_rad).filter(|rad| !rad.is_nan()))?,
+        following_timeout_ms: timeout_ms?.and_then(|timeout_ms| u16::try_from(timeout_ms).ok()),
+        soft_limits: soft_limits?,
+    })
+}
+
+fn read_position_mode(table: &mut Table<'_>) -> Option<PositionMode> {
+    const KEY: &str = "position_mode";
+    const EXPECTED: &str = "\"cyclic\" (cyclic synchronous position, mode 8) or \"interpolated\" (interpolated position, mode 7)";
+    let Some(word) = table.text_if_there(KEY, EXPECTED) else {
+        return (!table.had(KEY)).then_some(PositionMode::Cyclic);
+    };
+    let known = PositionMode::ALL.into_iter().find(|choice| choice.word() == word);
+    if known.is_none() {
+        table.fault(KEY, &shown(&word), EXPECTED);
+    }
+    known
 }
 
 fn read_absent(table: &mut Table<'_>) -> Option<AbsentObjects> {
@@ -267,6 +358,7 @@ mod tests {
             master_supervision: MasterSupervision::Drive,
             boot_timeout_s: 20.0,
             late_mode_display: true,
+            ..DriveFeatures::default()
         };
         let said = odd.sentences().join("; ");
         for part in ["0x6007 (abort connection option) NOT SET", "0x1016", "0x6061", "20 s"] {

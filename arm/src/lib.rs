@@ -55,7 +55,9 @@ pub mod trust;
 mod urdf;
 
 pub use bus_load::BusLoad;
-pub use drive_features::{AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject};
+pub use drive_features::{
+    AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject, PositionMode, WrittenLimits,
+};
 pub use drive_scale::{Overruled, ScaleObject};
 pub use fault::{Fault, Faults};
 pub use lookup::{Kind, find};

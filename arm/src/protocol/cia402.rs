@@ -40,6 +40,10 @@ pub(super) const REGISTRATION: Registration = Registration {
         "master_supervision",
         "boot_timeout_s",
         "late_mode_display",
+        "position_mode",
+        "following_window_rad",
+        "following_timeout_ms",
+        "write_soft_limits",
     ],
     // 127 is refused later, because it is this master.
     node_id: [1, 127],
@@ -160,6 +164,10 @@ impl ServoProtocol for Cia402 {
             ("master_supervision", self.features.master_supervision.word().into()),
             ("boot_timeout_s", self.features.boot_timeout_s.into()),
             ("late_mode_display", self.features.late_mode_display.into()),
+            ("position_mode", self.features.position_mode.word().into()),
+            ("following_window_rad", self.features.limits.following_window_rad.into()),
+            ("following_timeout_ms", self.features.limits.following_timeout_ms.into()),
+            ("write_soft_limits", self.features.limits.soft_limits.into()),
         ]
     }
 

@@ -41,6 +41,8 @@ pub(crate) struct Adoption {
     source: usize,
     held: Option<i32>,
     not_before: Nanos,
+    /// Where the plan maps the target.
+    target: Address,
     expected: ExpectedScale,
     stated: StatedScale,
 }
@@ -56,6 +58,7 @@ impl Adoption {
             source: 0,
             held: None,
             not_before: Nanos(0),
+            target: plan.target_object(),
             expected: plan.scale,
             stated: StatedScale::default(),
         }
@@ -69,7 +72,7 @@ impl Adoption {
         self.stated = StatedScale::default();
         // A drive without the demand object holds its last target while it is enabled, and where it stands after a stop.
         let second = match state {
-            Some(DriveStep::OperationEnabled) => object::TARGET_POSITION,
+            Some(DriveStep::OperationEnabled) => self.target,
             Some(DriveStep::QuickStopActive) => object::POSITION_ACTUAL,
             _ => return false,
         };

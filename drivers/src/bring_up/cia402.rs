@@ -15,7 +15,7 @@ use crate::codec::cia402_words::{CONTROL_OFF, DriveStep, STATUS_WARNING};
 use crate::codec::emcy::HEARTBEAT;
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest};
-use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome, SdoValue};
+use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome};
 use crate::servo::{DriveState, DriveTarget, Nanos};
 
 /// Pause between two looks at the modes display of a drive that is being energised.
@@ -38,8 +38,8 @@ const NOT_TAKEN: u32 = BringUpFault::NotTaken.code();
 /// What the modes display (0x6061) has said.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ModeDisplay {
-    /// It says cyclic synchronous position.
-    pub(super) is_csp: bool,
+    /// It says the mode of the settings.
+    pub(super) is_right: bool,
     /// When it was asked last.
     pub(super) asked: Nanos,
 }
@@ -149,7 +149,7 @@ impl Node {
             adoption: Adoption::new(&plan),
             held: None,
             nmt: None,
-            power: Power::new(timeouts.step, plan.feedback_every),
+            power: plan.power(timeouts.step),
             last_target: DriveTarget::Disabled,
             received: false,
             status: 0,
@@ -279,12 +279,12 @@ impl Node {
             status: self.status,
             fresh: self.age(cycle.now, self.tpdo_at) <= self.timeouts.feedback.0,
             command_near: target.near,
-            in_mode: self.mode.is_csp,
+            in_mode: self.mode.is_right,
         };
         let control = match self.stage {
             NodeStage::Operational { .. } => self.power.control(cycle.now, cycle.drive_target, received),
             NodeStage::Rejoin { .. } if cycle.drive_target != DriveTarget::TorqueOff => {
-                Power::keeping(self.status)
+                self.power.keeping(self.status)
             }
             NodeStage::Observe { .. }
             | NodeStage::Verify
@@ -376,7 +376,7 @@ impl Node {
     /// Back to the start, where nothing is changed before the drive has been looked at.
     pub(super) fn observe(&mut self, now: Nanos, fault: Option<BringUpFault>) {
         self.sdo.cancel();
-        self.power = Power::new(self.timeouts.step, self.plan.feedback_every);
+        self.power = self.plan.power(self.timeouts.step);
         self.commanded = None;
         self.power.watch(self.last_target);
         (self.emcy, self.requested_error) = (0, false);
@@ -483,8 +483,9 @@ impl Node {
         let enabled = DriveStep::from_status(self.status) == Some(DriveStep::OperationEnabled);
         if !enabled {
             // It shows it anew each time.
-            self.mode.is_csp &= !self.plan.features.late_mode_display;
-        } else if !self.mode.is_csp && self.sdo.is_idle() && self.age(now, self.mode.asked) >= MODE_AGAIN.0 {
+            self.mode.is_right &= !self.plan.features.late_mode_display;
+        } else if !self.mode.is_right && self.sdo.is_idle() && self.age(now, self.mode.asked) >= MODE_AGAIN.0
+        {
             self.mode.asked = now;
             self.sdo.begin(SdoJob::Read(object::MODE_DISPLAY));
         }
@@ -525,7 +526,8 @@ impl Node {
                 if let SdoOutcome::Value(value) = outcome
                     && job.address() == object::MODE_DISPLAY
                 {
-                    self.mode.is_csp = is_csp(value);
+                    let mode = self.plan.features.position_mode.number();
+                    self.mode.is_right = value.as_unsigned(1) == Some(u32::from(mode));
                 }
             }
             NodeStage::Reset { .. }
@@ -535,9 +537,4 @@ impl Node {
             | NodeStage::Refused { .. } => {}
         }
     }
-}
-
-/// The value of a modes display is that of cyclic synchronous position.
-pub(super) fn is_csp(display: SdoValue) -> bool {
-    display.as_unsigned(1) == Some(u32::from(object::MODE_CSP.cast_unsigned()))
 }

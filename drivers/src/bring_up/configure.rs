@@ -1,5 +1,5 @@
 //! What the answers to the configuration steps of a node mean.
-use crate::bring_up::cia402::{Node, NodeStage, SCALE_DIFFERS, is_csp};
+use crate::bring_up::cia402::{Node, NodeStage, SCALE_DIFFERS};
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::scale::Contradiction;
 use crate::bring_up::steps::{self, Check, Parts, Step};
@@ -95,9 +95,9 @@ impl Node {
                 self.stage = NodeStage::Unowned { next: now, fault: BringUpFault::Foreign, object: 0 };
                 Ok(false)
             }
-            Check::BecomesCsp | Check::MayBeCsp => {
-                self.mode.is_csp = is_csp(value);
-                let waits = step.check == Check::BecomesCsp && !self.mode.is_csp;
+            Check::Becomes(mode) | Check::MayBe(mode) => {
+                self.mode.is_right = number == u32::from(mode);
+                let waits = matches!(step.check, Check::Becomes(_)) && !self.mode.is_right;
                 if waits && self.age(now, since) >= self.timeouts.step.0 {
                     return Err(BringUpFault::ModeNotTaken);
                 }
@@ -113,7 +113,7 @@ impl Node {
                 self.note_difference(if differs { part } else { Parts::NONE }, first);
                 Ok(true)
             }
-            Check::Present | Check::Profile402 | Check::OffersCsp | Check::Scale | Check::Equals { .. } => {
+            Check::Present | Check::Profile402 | Check::Offers(_) | Check::Scale | Check::Equals { .. } => {
                 Ok(true)
             }
         }

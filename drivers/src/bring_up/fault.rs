@@ -49,11 +49,13 @@ pub enum BringUpFault {
     ScaleDiffers = 0x0001_0012,
     /// It confirmed a write and holds another value.
     NotTaken = 0x0001_0013,
+    /// Object 0x6502 does not offer interpolated position.
+    NoMode = 0x0001_0014,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -73,6 +75,7 @@ impl BringUpFault {
         Self::Foreign,
         Self::ScaleDiffers,
         Self::NotTaken,
+        Self::NoMode,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -98,9 +101,13 @@ impl BringUpFault {
             Self::LeftOperational => "the drive left NMT operational by itself",
             Self::NotOperational => "the drive did not become operational after NMT start",
             Self::NotCia402 => "the device is no CiA 402 drive (object 0x1000); check the node id",
-            Self::NoCsp => "the drive does not offer cyclic synchronous position (object 0x6502, bit 7)",
+            Self::NoCsp => {
+                "the drive does not offer cyclic synchronous position (object 0x6502, bit 7); one with interpolated position \
+                 takes position_mode = \"interpolated\" in its [[servo]]"
+            }
+            Self::NoMode => "the drive does not offer interpolated position (object 0x6502, bit 6)",
             Self::ModeNotTaken => {
-                "the drive did not take mode 8 (object 0x6061); one that shows its mode only in operation enabled needs \
+                "the drive did not take the mode of its settings (object 0x6061); one that shows its mode only in operation enabled needs \
                  late_mode_display = true in its [[servo]]"
             }
             Self::EnableTimeout => {
@@ -151,7 +158,8 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::OtherMaster
         | BringUpFault::Foreign
         | BringUpFault::ScaleDiffers
-        | BringUpFault::NotTaken => None,
+        | BringUpFault::NotTaken
+        | BringUpFault::NoMode => None,
     }
 }
 

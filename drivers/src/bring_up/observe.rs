@@ -2,7 +2,6 @@
 use crate::bring_up::adopt::Finding;
 use crate::bring_up::cia402::{DriveSetpoint, Node, NodeStage, OBSERVE_AGAIN, OBSERVE_MIN};
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::power::Power;
 use crate::bring_up::timing::BringUpCycle;
 use crate::codec::canopen::NmtCommand;
 use crate::codec::cia402_words::{DriveStep, STATUS_ENERGISED};
@@ -18,7 +17,7 @@ impl Node {
     pub fn keeping(&self) -> Option<DriveSetpoint> {
         let waits = matches!(self.stage, NodeStage::Held { .. } | NodeStage::Rejoin { .. });
         let target_counts = self.held.filter(|_| waits)?;
-        Some(DriveSetpoint { control: Power::keeping(self.status), target_counts })
+        Some(DriveSetpoint { control: self.power.keeping(self.status), target_counts })
     }
 
     pub(super) fn settle_observation(&mut self, cycle: BringUpCycle, job: SdoJob, outcome: SdoOutcome) {

@@ -1,11 +1,15 @@
 //! The configuration of a CSP drive as a list of SDO steps.
+use crate::bring_up::power::Power;
 use crate::bring_up::scale::ExpectedScale;
 use crate::bring_up::steps::{self, Check, Need, Pdo, Step, Steps, cob_id};
 use crate::codec::canopen::{COB_RPDO1, COB_TPDO1, MASTER_NODE, PdoEntry};
+use crate::codec::cia402_words::CONTROL_INTERPOLATE;
 use crate::codec::object::{self, Address};
 use crate::codec::sdo::SdoBytes;
 use crate::codec::setpoint_frames::shared_cob_id;
-use taustream_arm::{DriveFeatures, MasterSupervision, OptionalObject, Reaction};
+use crate::servo::Nanos;
+use taustream_arm::{DriveFeatures, MasterSupervision, OptionalObject, PositionMode, Reaction};
+use taustream_motion::range::POSITION_TOLERANCE_RAD;
 
 /// Period of the heartbeats that drives send, and that this master sends.
 pub use taustream_arm::bus_load::HEARTBEAT_MS;
@@ -79,8 +83,9 @@ impl NodePlan {
             steps.no_pdo(object::TPDO_COMMUNICATION, COB_TPDO1, self.node, number);
         }
         // Drives need not let the request be read; what counts is the display.
-        steps.set_unproven(object::MODE, SdoBytes::from_i8(object::MODE_CSP));
-        let display = if self.features.late_mode_display { Check::MayBeCsp } else { Check::BecomesCsp };
+        let mode = self.features.position_mode.number();
+        steps.set_unproven(object::MODE, SdoBytes::from_u8(mode));
+        let display = if self.features.late_mode_display { Check::MayBe(mode) } else { Check::Becomes(mode) };
         steps.read(object::MODE_DISPLAY, 1, display);
         // Before the first RPDO the target must already be where the drive stands.
         steps.read(object::POSITION_ACTUAL, 4, Check::Position);
@@ -91,15 +96,16 @@ impl NodePlan {
     fn receive_pdos(&self, steps: &mut Steps) -> u16 {
         let communication = object::RPDO_COMMUNICATION;
         let rpdo1 = Pdo { number: 0, cob_id: cob_id(communication, COB_RPDO1, self.node) };
+        let target = PdoEntry::new(self.target_object(), 32);
         match self.target {
             TargetPdo::Own => {
-                steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD, TARGET]);
+                steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD, target]);
                 self.watch_setpoints(steps, rpdo1);
                 1
             }
             TargetPdo::Shared { first_node, second } => {
                 let shared = Pdo { number: 1, cob_id: shared_cob_id(first_node).raw() };
-                let entries = if second { [SKIPPED, TARGET] } else { [TARGET, SKIPPED] };
+                let entries = if second { [SKIPPED, target] } else { [target, SKIPPED] };
                 steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD]);
                 steps.pdo(communication, shared, EVERY_SYNC, &entries);
                 self.watch_setpoints(steps, shared);
@@ -123,6 +129,24 @@ impl NodePlan {
         steps::verification(&self.steps())
     }
 
+    /// The object that takes the target.
+    #[must_use]
+    pub const fn target_object(&self) -> Address {
+        match self.features.position_mode {
+            PositionMode::Cyclic => object::TARGET_POSITION,
+            PositionMode::Interpolated => object::INTERPOLATION_DATA,
+        }
+    }
+
+    /// The power state machine of such a node, de-energised.
+    pub(super) const fn power(&self, step_timeout: Nanos) -> Power {
+        let mode_bits = match self.features.position_mode {
+            PositionMode::Cyclic => 0,
+            PositionMode::Interpolated => CONTROL_INTERPOLATE,
+        };
+        Power::new(step_timeout, self.feedback_every, mode_bits)
+    }
+
     const fn has(&self, object: OptionalObject) -> bool {
         !self.features.absent.holds(object)
     }
@@ -131,7 +155,8 @@ impl NodePlan {
         steps.read(object::DEVICE_TYPE, 4, Check::Profile402);
         steps.read(object::VENDOR_ID, 4, Check::Present);
         if self.has(OptionalObject::SupportedModes) {
-            steps.read(object::SUPPORTED_MODES, 4, Check::OffersCsp);
+            let offers = Check::Offers(self.features.position_mode.number());
+            steps.read(object::SUPPORTED_MODES, 4, offers);
         }
         steps.read(object::STATUSWORD, 2, Check::NotEnergised);
         for address in self.scale.addresses() {
@@ -171,11 +196,33 @@ impl NodePlan {
         if self.has(OptionalObject::QuickStopOption) {
             steps.set(object::QUICK_STOP_OPTION, SdoBytes::from_i16(quick_stop), quick_stop_need);
         }
+        self.limit(steps);
+    }
+
+    /// Limits that the settings want in the drive.
+    fn limit(&self, steps: &mut Steps) {
+        let limits = self.features.limits;
+        if let Some(window_rad) = limits.following_window_rad {
+            let window = SdoBytes::from_u32(self.scale.counts_of(window_rad));
+            steps.set(object::FOLLOWING_ERROR_WINDOW, window, Need::Demanded);
+        }
+        if let Some(timeout_ms) = limits.following_timeout_ms {
+            let timeout = SdoBytes::from_u16(timeout_ms);
+            steps.set(object::FOLLOWING_ERROR_TIMEOUT_MS, timeout, Need::Demanded);
+        }
+        if limits.soft_limits {
+            // What counts as at the limit everywhere may be held, so the drive must not cut it off.
+            let beyond = self.scale.counts_of(POSITION_TOLERANCE_RAD).cast_signed();
+            let [low, high] = self.scale.range_counts;
+            let low = SdoBytes::from_i32(low.saturating_sub(beyond));
+            steps.set(object::SOFT_LIMIT_MIN, low, Need::Demanded);
+            let high = SdoBytes::from_i32(high.saturating_add(beyond));
+            steps.set(object::SOFT_LIMIT_MAX, high, Need::Demanded);
+        }
     }
 }
 
 const CONTROLWORD: PdoEntry = PdoEntry::new(object::CONTROLWORD, 16);
-const TARGET: PdoEntry = PdoEntry::new(object::TARGET_POSITION, 32);
 /// The part of another drive: a dummy entry of type UNSIGNED32.
 const SKIPPED: PdoEntry = PdoEntry::new(object::DUMMY_U32, 32);
 const TPDO1_ENTRIES: [PdoEntry; 2] =

@@ -29,7 +29,7 @@ pub struct Received {
     pub fresh: bool,
     /// The command is close enough to the measured position to energise.
     pub command_near: bool,
-    /// The drive has said that it is in cyclic synchronous position.
+    /// The drive has said that it is in the mode of its settings.
     pub in_mode: bool,
 }
 
@@ -86,6 +86,8 @@ pub struct Power {
     /// Cycles in which that many answers come.
     not_following_max: u8,
     step_timeout: Nanos,
+    /// Controlword that lets an enabled drive follow setpoints.
+    follow: u16,
 }
 
 /// How far towards operation enabled a state is.
@@ -104,9 +106,10 @@ fn holds(step: Option<DriveStep>) -> bool {
 }
 
 impl Power {
-    /// De-energised; `step_timeout` bounds each confirmation, and an answer comes every `answer_every` cycles.
+    /// De-energised; `step_timeout` bounds each confirmation, an answer comes every `answer_every` cycles, and `mode_bits` are set
+    /// in the controlword of an enabled drive.
     #[must_use]
-    pub const fn new(step_timeout: Nanos, answer_every: u8) -> Self {
+    pub const fn new(step_timeout: Nanos, answer_every: u8, mode_bits: u16) -> Self {
         Self {
             phase: Phase::Off,
             reset: Reset::Idle,
@@ -115,6 +118,7 @@ impl Power {
             not_following: 0,
             not_following_max: NOT_FOLLOWING_MAX.saturating_mul(answer_every),
             step_timeout,
+            follow: CONTROL_ENABLE | mode_bits,
         }
     }
 
@@ -143,9 +147,9 @@ impl Power {
 
     /// The controlword that changes nothing about a drive that holds.
     #[must_use]
-    pub fn keeping(status: u16) -> u16 {
+    pub fn keeping(&self, status: u16) -> u16 {
         match DriveStep::from_status(status) {
-            Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,
+            Some(DriveStep::OperationEnabled) => self.follow,
             Some(DriveStep::QuickStopActive) => CONTROL_QUICK_STOP,
             _ => CONTROL_OFF,
         }
@@ -200,10 +204,10 @@ impl Power {
         self.advance(now, drive_target, step, received);
         match self.phase {
             Phase::Off => self.control_off(now, drive_target, step),
-            Phase::Enabling { .. } | Phase::On => Self::control_up(step, received),
+            Phase::Enabling { .. } | Phase::On => self.control_up(step, received),
             Phase::Disabling { .. } => Self::control_down(step),
-            Phase::Kept => Self::keeping(received.status),
-            Phase::TakingOver { .. } => CONTROL_ENABLE,
+            Phase::Kept => self.keeping(received.status),
+            Phase::TakingOver { .. } => self.follow,
         }
     }
 
@@ -369,14 +373,14 @@ impl Power {
         }
     }
 
-    fn control_up(step: Option<DriveStep>, received: Received) -> u16 {
+    fn control_up(&self, step: Option<DriveStep>, received: Received) -> u16 {
         match step {
             Some(DriveStep::SwitchOnDisabled) => CONTROL_SHUTDOWN,
             // The step into torque needs a recent word of the drive; staying in it does not: a drive without feedback that
             // still receives must be able to follow the arm to rest.
             Some(DriveStep::SwitchedOn) if received.fresh => CONTROL_ENABLE,
             Some(DriveStep::ReadyToSwitchOn | DriveStep::SwitchedOn) => CONTROL_SWITCH_ON,
-            Some(DriveStep::OperationEnabled) => CONTROL_ENABLE,
+            Some(DriveStep::OperationEnabled) => self.follow,
             _ => CONTROL_OFF,
         }
     }

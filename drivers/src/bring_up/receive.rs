@@ -28,7 +28,7 @@ impl Node {
                 self.stage = NodeStage::Operational { shutdown_since: None };
                 self.heartbeat_at = now;
                 self.denials = 0;
-                self.mode.is_csp = true;
+                self.mode.is_right = true;
                 self.power.adopt();
             }
             NodeStage::Operational { .. } => {}

@@ -15,6 +15,7 @@
 //! Sources: CiA 402-2, "Factor group", "Position control function" and "Homing mode".
 use crate::codec::cia402_words::{CountScale, counts_from_rad};
 use crate::codec::object::{self, Address};
+use std::f64::consts::TAU;
 use taustream_arm::{Cia402, Overruled, RobotJoint, ScaleObject, Servo};
 
 /// Relative difference up to which two ratios are the same: a decimal fraction of the settings has its digits.
@@ -51,8 +52,22 @@ impl ExpectedScale {
             gear_ratio: cia402.gear_ratio,
             range_counts: [low.min(high), low.max(high)],
             home_offset_counts: cia402.home_offset_counts,
-            overruled: cia402.overruled,
+            overruled: if cia402.features.limits.soft_limits {
+                // It is written, not compared.
+                cia402.overruled.with(ScaleObject::SoftLimit)
+            } else {
+                cia402.overruled
+            },
         })
+    }
+
+    /// A distance of the joint in counts, at least one.
+    #[must_use]
+    pub fn counts_of(&self, distance_rad: f64) -> u32 {
+        let exact = (distance_rad * self.gear_ratio * self.counts_per_rev / TAU).round();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let counts = exact.clamp(1.0, f64::from(u32::MAX - 1)) as u32;
+        counts
     }
 
     /// The objects to read, in the order in which [`StatedScale`] takes them.

@@ -16,14 +16,14 @@ pub enum Check {
     Present,
     /// The low half is 402.
     Profile402,
-    /// Bit 7 is set.
-    OffersCsp,
+    /// The bit of this mode is set.
+    Offers(u8),
     /// The drive is not energised.
     NotEnergised,
-    /// The value is 8; asked again until it is.
-    BecomesCsp,
+    /// The value is this mode; asked again until it is.
+    Becomes(u8),
     /// The value is looked at, and looked at again when the drive is energised.
-    MayBeCsp,
+    MayBe(u8),
     /// It is the position.
     Position,
     /// It agrees with the settings' scale, direction or range.
@@ -229,8 +229,8 @@ pub(super) fn verification(steps: &[Step]) -> Vec<Step> {
                 let need = if step.need == Need::Demanded { Need::Demanded } else { Need::Free };
                 Step::read(address, bytes.as_slice().len(), check).needed(need)
             }
-            (SdoJob::Read(_), Check::BecomesCsp | Check::MayBeCsp) => {
-                let value = u32::from(object::MODE_CSP.cast_unsigned());
+            (SdoJob::Read(_), Check::Becomes(mode) | Check::MayBe(mode)) => {
+                let value = u32::from(mode);
                 Step { check: Check::Equals { value, mask: u32::MAX }, ..*step }
             }
             (SdoJob::Read(_), Check::Profile402 | Check::Scale) => *step,
@@ -248,15 +248,17 @@ pub(super) fn verification(steps: &[Step]) -> Vec<Step> {
 pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
     let fault = match check {
         Check::Profile402 if number & 0xFFFF != u32::from(object::PROFILE_402) => BringUpFault::NotCia402,
-        Check::OffersCsp if number & object::SUPPORTS_CSP == 0 => BringUpFault::NoCsp,
+        Check::Offers(mode) if number >> mode.saturating_sub(1) & 1 == 0 => {
+            if mode == object::MODE_CSP.cast_unsigned() { BringUpFault::NoCsp } else { BringUpFault::NoMode }
+        }
         Check::Equals { value, mask } if number & mask != value & mask => BringUpFault::NotTaken,
         Check::Profile402
-        | Check::OffersCsp
+        | Check::Offers(_)
         | Check::Equals { .. }
         | Check::Present
         | Check::NotEnergised
-        | Check::BecomesCsp
-        | Check::MayBeCsp
+        | Check::Becomes(_)
+        | Check::MayBe(_)
         | Check::Position
         | Check::Scale
         | Check::Compare { .. } => return Ok(()),

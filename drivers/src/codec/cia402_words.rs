@@ -44,6 +44,8 @@ pub const CONTROL_SHUTDOWN: u16 = 0x0006;
 pub const CONTROL_SWITCH_ON: u16 = 0x0007;
 /// Controlword: enable operation.
 pub const CONTROL_ENABLE: u16 = 0x000F;
+/// Controlword bit in interpolated position mode: interpolate.
+pub const CONTROL_INTERPOLATE: u16 = 0x0010;
 /// Controlword: fault reset (rising edge).
 pub const CONTROL_FAULT_RESET: u16 = 0x0080;
 

@@ -146,6 +146,8 @@ objects! {
     VELOCITY_OFFSET = 0x60B1:0;
     /// Torque offset, i16, 0.1 % of the rated torque.
     TORQUE_OFFSET = 0x60B2:0;
+    /// Interpolation data, i32, counts: the target position of interpolated position mode.
+    INTERPOLATION_DATA = 0x60C1:1;
     /// Interpolation period, value, u8.
     INTERPOLATION_VALUE = 0x60C2:1;
     /// Interpolation period, power of ten of a second, i8.
@@ -177,7 +179,5 @@ pub const PDO_SYNC_START: u8 = 6;
 
 /// Mode of operation of cyclic synchronous position.
 pub const MODE_CSP: i8 = 8;
-/// Bit of [`SUPPORTED_MODES`] that says cyclic synchronous position.
-pub const SUPPORTS_CSP: u32 = 1 << 7;
 /// Profile number of CiA 402, in the low half of [`DEVICE_TYPE`].
 pub const PROFILE_402: u16 = 402;

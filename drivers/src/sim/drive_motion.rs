@@ -65,14 +65,13 @@ impl Drive {
         }
         self.halt(word & HALT != 0);
         self.run_mode(word);
-        if self.is_in_csp() {
-            self.target_source(now);
+        if let Some(wanted) = self.cyclic_target() {
+            self.target_source(now, wanted);
         }
     }
 
     /// Gives the newest setpoint to the controller, when the drive follows setpoints now.
-    fn target_source(&mut self, now: Nanos) {
-        let wanted = self.dictionary.get(0x607A, 0).saturating_add(self.dictionary.get(0x60B0, 0));
+    fn target_source(&mut self, now: Nanos, wanted: i64) {
         let (low, high) = (self.dictionary.get(0x607D, 1), self.dictionary.get(0x607D, 2));
         let target = wanted.max(low).min(high);
         self.limited = target != wanted;
@@ -95,7 +94,7 @@ impl Drive {
             && self.controller.is_following()
             && self.mechanics.plant.is_free()
             && !self.held
-            && self.is_in_csp()
+            && self.cyclic_target().is_some()
     }
 
     /// The halt bit stops the motor, and releases it to follow again.

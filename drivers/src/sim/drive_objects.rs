@@ -208,7 +208,7 @@ impl Drive {
                 self.pdos = Pdos::compile(&self.dictionary);
             }
             0x2002 => self.fail(u16::try_from(value).unwrap_or(0x1000), out),
-            0x6040 | 0x6060 | 0x607A | 0x60B0..=0x60B2 | 0x60FF => self.commanded(self.now, out),
+            0x6040 | 0x6060 | 0x607A | 0x60B0..=0x60B2 | 0x60C1 | 0x60FF => self.commanded(self.now, out),
             _ => {}
         }
     }

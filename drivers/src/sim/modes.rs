@@ -14,10 +14,12 @@ pub(super) const PROFILE_POSITION: i64 = 1;
 pub(super) const PROFILE_VELOCITY: i64 = 3;
 /// Homing.
 pub(super) const HOMING: i64 = 6;
+/// Interpolated position.
+const INTERPOLATED: i64 = 7;
 /// Every mode that there is, and none.
-pub(super) const MODES: &[i64] = &[0, PROFILE_POSITION, PROFILE_VELOCITY, HOMING, 8];
+pub(super) const MODES: &[i64] = &[0, PROFILE_POSITION, PROFILE_VELOCITY, HOMING, INTERPOLATED, 8];
 /// What 0x6502 says: bit `mode - 1`.
-pub(super) const SUPPORTED: i64 = 1 | 1 << 2 | 1 << 5 | 1 << 7;
+pub(super) const SUPPORTED: i64 = 1 | 1 << 2 | 1 << 5 | 1 << 6 | 1 << 7;
 /// The homing methods that there are: none; on limit switches with (1, 2) and without (17, 18) the index pulse; on the index
 /// pulse (33, 34); at the present position (35, 37).
 pub(super) const HOMING_METHODS: &[i64] = &[0, 1, 2, 17, 18, 33, 34, 35, 37];
@@ -293,9 +295,14 @@ impl Drive {
         !self.power.is_energised() || (next != 0 && stands)
     }
 
-    /// The mode is one with setpoints of its own.
-    pub(super) fn is_in_csp(&self) -> bool {
-        self.dictionary.get(0x6060, 0) == i64::from(MODE_CSP)
+    /// Target of the mode that follows cyclic setpoints now: in interpolated position only while bit 4 of the controlword is set.
+    pub(super) fn cyclic_target(&self) -> Option<i64> {
+        let mode = self.dictionary.get(0x6060, 0);
+        if mode == i64::from(MODE_CSP) {
+            Some(self.dictionary.get(0x607A, 0).saturating_add(self.dictionary.get(0x60B0, 0)))
+        } else {
+            (mode == INTERPOLATED && self.modes.bit_4).then(|| self.dictionary.get(0x60C1, 1))
+        }
     }
 
     /// The modes begin anew, as after a fault or without torque.

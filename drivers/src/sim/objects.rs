@@ -265,6 +265,8 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::rw(0x60B0, 0, Kind::I32, 0).rpdo(),
         Spec::rw(0x60B1, 0, Kind::I32, 0).rpdo(),
         Spec::rw(0x60B2, 0, Kind::I16, 0).rpdo(),
+        Spec::ro(0x60C1, 0, Kind::U8, 1),
+        Spec::rw(0x60C1, 1, Kind::I32, 0).rpdo(),
         Spec::ro(0x60C2, 0, Kind::U8, 2),
         Spec::rw(0x60C2, 1, Kind::U8, 1).within(1, 255),
         Spec::rw(0x60C2, 2, Kind::I8, -3).within(-6, 0),

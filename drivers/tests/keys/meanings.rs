@@ -256,6 +256,19 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: simulator.objects",
         "Objects of the drives changed, for example `[\"joint=3,object=0x6091:01,value=50\"]`; also `value=absent`, `access=read-only`, `abort=0x08000020`, `bytes=4`; none.",
     ),
+    ("Settings files: servo[].position_mode", "CiA 402: the mode in which it follows setpoints; `cyclic`."),
+    (
+        "Settings files: servo[].following_window_rad",
+        "CiA 402: following error window (0x6065) that is written into the drive; without it the drive's own.",
+    ),
+    (
+        "Settings files: servo[].following_timeout_ms",
+        "CiA 402: following error time-out (0x6066) that is written into the drive; without it the drive's own.",
+    ),
+    (
+        "Settings files: servo[].write_soft_limits",
+        "CiA 402: true: the joint's `position_rad` is written as software position limit (0x607D); false: compared.",
+    ),
     (
         "Settings files: simulator.fixed_pdos",
         "CiA 402: true: PDO 1 is mapped and on as this master needs it, and no PDO can be changed; false.",

@@ -13,7 +13,8 @@ fn enabled_in(mode: i64) -> Bench {
     }
     assert_eq!(bench.drive.power_state(), PowerState::OperationEnabled);
     assert_eq!(bench.read(0x6061, 0), mode);
-    bench.pass_ms(50);
+    // The brake opens, and the load is caught.
+    bench.pass_ms(500);
     bench
 }
 

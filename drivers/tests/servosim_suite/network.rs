@@ -22,7 +22,11 @@ fn device_name_is_read_in_segments() {
 fn identity_and_modes_are_those_of_a_csp_servo_drive() {
     let mut bench = Bench::new(parameters());
     assert_eq!(bench.read(0x1000, 0), 0x0002_0192);
-    assert_eq!(bench.read(0x6502, 0), 0xA5, "profile position and velocity, homing, cyclic position");
+    assert_eq!(
+        bench.read(0x6502, 0),
+        0xE5,
+        "profile position and velocity, homing, interpolated and cyclic position"
+    );
     assert_eq!(bench.read(0x1018, 4), i64::from(NODE));
     assert_eq!(bench.read(0x6041, 0) & 0x4F, 0x40, "switch on disabled");
     assert_eq!(bench.read(0x6064, 0) as u32 as i32, counts(START_RAD));

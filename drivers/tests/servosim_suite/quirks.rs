@@ -1,6 +1,8 @@
 //! Simulated drives that depart from what masters expect, each by one switch, and the master that takes them all the same.
 use super::arm::{Arm, shipped};
-use taustream_arm::{AbsentObjects, Cia402, DriveFeatures, OptionalObject, Settings};
+use taustream_arm::{
+    AbsentObjects, Cia402, DriveFeatures, OptionalObject, PositionMode, Settings, WrittenLimits,
+};
 use taustream_drivers::sim::FaultRequest;
 use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
@@ -78,7 +80,7 @@ fn objects_that_are_absent_or_fixed_are_refused_with_the_key_and_taken_with_it()
             } else {
                 let said = said_when(&mut arm, DriveState::Refused, 3_000);
                 let key = format!("absent_objects = [0x{index:04X}]");
-                let no_csp = index == 0x6502 && read_only && said.contains("does not offer");
+                let no_csp = index == 0x6502 && read_only && said.contains("does not offer cyclic");
                 assert!(said.contains(&key) || no_csp, "{change}: {said}");
             }
             let mut settings = with_objects(&texts);
@@ -187,6 +189,56 @@ fn drive_that_falls_back_to_switch_on_disabled_comes_up() {
         arm.enable();
         assert_eq!(arm.status(ELBOW).error_code, 0, "{times}");
     }
+}
+
+/// Goal: a drive without cyclic synchronous position follows in interpolated position, when its settings say so.
+#[test]
+fn drive_with_interpolated_position_alone_follows_as_well_as_the_others() {
+    let settings = || with_objects(&["object=0x6502,value=0x40"]);
+    let said = said_when(&mut Arm::with(settings()), DriveState::Refused, 3_000);
+    assert!(said.contains("position_mode = \"interpolated\""), "{said}");
+    let mut settings = settings();
+    state(&mut settings, |features| features.position_mode = PositionMode::Interpolated);
+    let mut arm = Arm::with(settings);
+    arm.enable();
+    let worst_rad = arm.move_and_measure(0.5);
+    assert!(worst_rad.iter().all(|worst_rad| (1e-9..0.005).contains(worst_rad)), "{worst_rad:?}");
+    arm.reach(DriveTarget::Disabled, DriveState::Disabled);
+    arm.enable();
+}
+
+/// Goal: limits that the settings want are in the drive, in its counts; a drive that cannot take them is refused.
+#[test]
+fn limits_of_the_settings_are_written_and_read_back() {
+    let limits =
+        WrittenLimits { following_window_rad: Some(0.1), following_timeout_ms: Some(25), soft_limits: true };
+    let mut settings = shipped();
+    state(&mut settings, |features| features.limits = limits);
+    let counts_per_rad = 131_072.0 * 101.0 / std::f64::consts::TAU;
+    let mut arm = Arm::with(settings);
+    let mut written = Vec::new();
+    for _ in 0..3_000 {
+        arm.cycle(DriveTarget::Disabled);
+        let writes =
+            arm.sent.iter().filter(|frame| frame.id().raw() == 0x603 && frame.data()[0] & 0xE0 == 0x20);
+        written.extend(writes.map(|frame| {
+            let data = frame.data();
+            let number = i32::from_le_bytes(data[4..8].try_into().unwrap());
+            (u16::from_le_bytes([data[1], data[2]]), data[3], number)
+        }));
+    }
+    assert_eq!(arm.states(), [DriveState::Disabled; 6]);
+    let value =
+        |index, sub| written.iter().find(|(i, s, _)| (*i, *s) == (index, sub)).map(|(.., number)| *number);
+    assert_eq!(value(0x6065, 0), Some((0.1 * counts_per_rad).round() as i32));
+    assert_eq!(value(0x6066, 0), Some(25));
+    let (low, high) = (value(0x607D, 1).unwrap(), value(0x607D, 2).unwrap());
+    assert!(low < high && f64::from(high) <= 6.3 * counts_per_rad, "{low} {high}");
+
+    let mut settings = with_objects(&["object=0x6065,access=read-only"]);
+    state(&mut settings, |features| features.limits = limits);
+    let said = said_when(&mut Arm::with(settings), DriveState::Refused, 3_000);
+    assert!(said.starts_with("object 0x6065:00"), "{said}");
 }
 
 #[test]
