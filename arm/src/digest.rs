@@ -42,6 +42,16 @@
 //! | f64 | the margin of all pairs |
 //! | u32 | number of pairs with one of their own; per pair 2 x u32 links, f64 margin |
 //!
+//! With feed-forward torques (`[feed_forward]` of a settings file) gravity and moments of inertia change what is commanded. The
+//! digest in messages then is that of the torque model, over these bytes:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 24 | the ASCII text `taustream torque model 1` |
+//! | 32 | the robot digest |
+//! | 3 x f64 | gravity |
+//! | 6 x f64 | per mass, links in the order above and the payload last: xx, yy, zz, xy, xz, yz |
+//!
 //! A string is its length in bytes as u32, then its UTF-8 bytes. An origin is x, y, z, roll, pitch, yaw as 6 x f64. An f64 is its
 //! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
 use crate::capsule::Capsule;
@@ -52,10 +62,31 @@ use crate::rows::{Row, RowKind};
 use sha2::{Digest, Sha256};
 
 const HEADER: &[u8; 24] = b"taustream robot digest 2";
+const TORQUE_HEADER: &[u8; 24] = b"taustream torque model 1";
 
 /// The digest of a description.
 pub(crate) fn of(description: &Description) -> [u8; 32] {
     Sha256::digest(bytes(description)).into()
+}
+
+/// The digest of a description whose masses make torques: `digest` is the description's own.
+pub(crate) fn of_torque_model(description: &Description, digest: &[u8; 32]) -> [u8; 32] {
+    let mut out = [TORQUE_HEADER.as_slice(), digest].concat();
+    description.gravity_m_s2.iter().for_each(|number| put_number(&mut out, *number));
+    match &description.geometry {
+        Geometry::Rows(rows) => {
+            rows.iter()
+                .filter_map(|row| row.weight.as_ref())
+                .for_each(|weight| put_moments(&mut out, weight));
+        }
+        Geometry::Urdf(arm) => arm.put_moments(&mut out),
+    }
+    description.payload.iter().for_each(|weight| put_moments(&mut out, weight));
+    Sha256::digest(out).into()
+}
+
+fn put_moments(out: &mut Vec<u8>, weight: &Weight) {
+    weight.inertia_kg_m2.iter().for_each(|number| put_number(out, *number));
 }
 
 /// The digest of a file's bytes.
@@ -65,7 +96,7 @@ pub(crate) fn of_bytes(bytes: &[u8]) -> [u8; 32] {
 
 fn bytes(description: &Description) -> Vec<u8> {
     // Taken apart, so that a new field cannot be forgotten here without the compiler saying so.
-    // Gravity and moments of inertia weigh proven motions against each other, and change none.
+    // Gravity and moments of inertia change no setpoint: they are in the digest of the torque model.
     // A pose's name moves nothing. A link that is acknowledged to have no shape has none either way.
     let Description {
         name,
@@ -325,6 +356,39 @@ mod tests {
         for text in [spread, on_a_wall] {
             assert_eq!(digest(&text), digest(&massive), "{text}");
         }
+    }
+
+    /// Goal: planner and streamer compute torques by one model. The bytes are put together here a second time.
+    #[test]
+    fn digest_of_the_torque_model_changes_with_gravity_and_moments_of_inertia() {
+        let robot = |text: &str| {
+            Robot::from_toml(Path::new("r.toml"), text).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+        };
+        let payload =
+            "[payload]\nmass_kg = 1.0\ncenter_m = [0, 0, 0]\ninertia_kg_m2 = [1, 1, 1, 0, 0, 0]\n[[joint]]";
+        let massive = TEXT
+            .replace("link_radius_m", "link_mass_kg = 2.0\nlink_center_m = [0.1, 0, 0]\nlink_radius_m")
+            .replacen("[[joint]]", payload, 1);
+        let spread =
+            massive.replacen("link_radius_m", "link_inertia_kg_m2 = [1, 1, 1, 0, 0, 0]\nlink_radius_m", 1);
+        let heavier = spread.replacen("mass_kg = 1.0", "mass_kg = 1.5", 1);
+        let turned = spread.replacen("ia_kg_m2 = [1, 1, 1, 0,", "ia_kg_m2 = [1, 1, 1, 0.1,", 1);
+        let on_a_wall = spread.replacen("name", "gravity_m_s2 = [9.81, 0, 0]\nname", 1);
+        let mut seen = Vec::new();
+        for text in [massive, spread.clone(), heavier, turned, on_a_wall] {
+            let model = robot(&text).torque_model_digest;
+            assert!(!seen.contains(&model), "{text}");
+            seen.push(model);
+        }
+        let robot = robot(&spread);
+        let mut bytes = b"taustream torque model 1".to_vec();
+        bytes.extend(robot.digest);
+        let moments = [[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; 6], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]].concat();
+        for number in [0.0, 0.0, -9.806_65_f64].into_iter().chain(moments) {
+            bytes.extend(number.to_le_bytes());
+        }
+        assert_eq!(robot.torque_model_digest, super::of_bytes(&bytes));
+        assert_eq!(robot.message_digest, robot.digest, "a robot file alone commands no torque");
     }
 
     /// A file made by one version must be known to the next. The number was computed from the table in the header by

@@ -19,7 +19,9 @@ mod document;
 pub mod drive_epochs;
 pub mod drive_features;
 pub mod drive_scale;
+mod dynamics;
 pub mod fault;
+pub mod feed_forward;
 mod hull;
 pub mod journal;
 pub mod last_pose;
@@ -59,7 +61,9 @@ pub use drive_features::{
     AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject, PositionMode, WrittenLimits,
 };
 pub use drive_scale::{Overruled, ScaleObject};
+pub use dynamics::NoMasses;
 pub use fault::{Fault, Faults};
+pub use feed_forward::{FeedForward, JointTorque};
 pub use lookup::{Kind, find};
 pub use mass::LinkMass;
 pub use motion_table::MotionTable;

@@ -81,8 +81,12 @@ pub struct Robot {
     pub margins: LinkMargins,
     /// Link pairs that are never further apart than their margin, in 10,000 seeded poses: they keep more than 0 m.
     pub close_by_rule: Vec<(usize, usize)>,
-    /// Hash over everything that changes what a setpoint means.
+    /// Hash over everything that changes what a setpoint means. Trajectory files hold it.
     pub digest: [u8; 32],
+    /// The digest that messages hold: [`Self::digest`], or with feed-forward torques that of the torque model, which covers
+    /// gravity and moments of inertia too.
+    pub message_digest: [u8; 32],
+    pub(crate) torque_model_digest: [u8; 32],
 }
 
 /// What finds out which links may touch; an error is the index of a shape that cannot be built.
@@ -155,6 +159,7 @@ impl Robot {
         let (states, mut notices) = (&parts.states, Vec::new());
         let poses = named_pose::of_states(states, &description.joints, &description.poses, &mut notices);
         let joints = description.joints.iter();
+        let digest = digest::of(description);
         Some(Self {
             name: description.name.clone(),
             file: fault_list.file().to_owned(),
@@ -180,7 +185,9 @@ impl Robot {
             allowed_by_rule: ruled.allowed,
             close_by_rule: ruled.close,
             margins,
-            digest: digest::of(description),
+            digest,
+            message_digest: digest,
+            torque_model_digest: digest::of_torque_model(description, &digest),
             chain,
         })
     }

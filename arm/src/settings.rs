@@ -1,5 +1,6 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
 use crate::document::{self, Node};
+use crate::feed_forward::{self, FeedForward};
 use crate::protocol::{self, Protocol};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::stopping::STOP_S_MAX;
@@ -180,6 +181,8 @@ pub struct Settings {
     pub cycle: CycleSettings,
     /// Supervision.
     pub supervision: Supervision,
+    /// Torque that is commanded beside the position, if any.
+    pub feed_forward: Option<FeedForward>,
     /// The section of the simulated servos as it stands; whoever simulates checks its keys.
     pub simulator: Option<toml::Table>,
 }
@@ -278,6 +281,7 @@ impl Settings {
         let servos = binding::read_servos(&mut top, robot.as_ref(), &buses);
         let cycle = top.table("cycle", "a table [cycle]").and_then(read_cycle);
         let supervision = top.table("supervision", "a table [supervision]").and_then(read_supervision);
+        let feed_forward = feed_forward::read(&mut top, robot.as_ref(), &servos);
         let simulator = read_simulator(&mut top, text);
         top.done();
         if let (Some(cycle), Some(supervision)) = (&cycle, &supervision) {
@@ -286,7 +290,7 @@ impl Settings {
         if !fault_list.is_clean() {
             return None;
         }
-        let settings = Self {
+        let mut settings = Self {
             name: name?,
             file: fault_list.file().to_owned(),
             robot: robot?,
@@ -295,8 +299,13 @@ impl Settings {
             servos,
             cycle: cycle?,
             supervision: supervision?,
+            feed_forward: feed_forward?,
             simulator,
         };
+        if settings.feed_forward.is_some() {
+            settings.robot.message_digest = settings.robot.torque_model_digest;
+        }
+        feed_forward::check_masses(fault_list, &settings);
         let stops = settings.robot.require_stops(settings.supervision.stop_s_max);
         for faults in [settings.robot.require_modelled(), stops].into_iter().filter_map(Result::err) {
             fault_list.merge(faults);

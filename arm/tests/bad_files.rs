@@ -1,7 +1,7 @@
 //! A long table of bad files: each is refused under the key that is wrong, with words that help.
 mod bad_files_cases;
 mod common;
-use bad_files_cases::{Case, cubemars, damiao, robstride, settings};
+use bad_files_cases::{Case, cubemars, damiao, feed_forward, robstride, settings};
 use common::Reader::{Robot, Scene, Settings, Trajectory};
 use common::{Reader, edited, faults_of};
 
@@ -316,8 +316,8 @@ const TRAJECTORY_CASES: &[Case] = &[
 
 #[test]
 fn bad_file_is_refused_under_its_key_with_words_that_help() {
-    let protocols = [damiao::CASES, robstride::CASES, cubemars::CASES];
-    for table in [ROBOT_CASES, SCENE_CASES, settings::CASES, TRAJECTORY_CASES].into_iter().chain(protocols) {
+    let others = [damiao::CASES, robstride::CASES, cubemars::CASES, feed_forward::CASES];
+    for table in [ROBOT_CASES, SCENE_CASES, settings::CASES, TRAJECTORY_CASES].into_iter().chain(others) {
         for (reader, from, to, key, words) in table {
             let faults = faults_of(*reader, &edited(&reader.good_text(), from, to));
             let hit = faults.0.iter().any(|fault| fault.key == *key && fault.to_string().contains(words));

@@ -81,9 +81,11 @@ fn kinds() -> Vec<Kind> {
                 shipped("config/settings/damiao6.toml", &[]),
                 shipped("config/settings/robstride6.toml", &[]),
                 shipped("config/settings/ak6.toml", &[]),
+                shipped("config/settings/rmd6.toml", &[]),
                 shipped("config/settings/one-bus.toml", &[]),
                 shipped("config/settings/odrive6.toml", &[]),
                 shipped("config/settings/piper.toml", &[]),
+                shipped("config/settings/damiao6.toml", &[("[cycle]", FEED_FORWARD)]),
             ],
             load: settings,
         },
@@ -95,6 +97,10 @@ fn kinds() -> Vec<Kind> {
         },
     ]
 }
+
+/// A section of torques, before `[cycle]`.
+const FEED_FORWARD: &str = "[feed_forward]\ngravity = true\ninertia = true\nshare = 1.0\n[[feed_forward.joint]]\njoint = \"elbow\"\n\
+    torque_nm_max = 20.0\nrate_nm_s_max = 50.0\n[cycle]";
 
 /// A scene with every kind of obstacle, beside the mesh that it names.
 fn scene() -> (PathBuf, String) {

@@ -14,6 +14,7 @@ pub mod chain;
 pub mod cut;
 pub mod digits;
 pub mod duration;
+pub mod dynamics;
 pub mod limits;
 pub mod peaks;
 pub mod peaks_ahead;

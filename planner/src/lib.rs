@@ -8,7 +8,7 @@
 pub mod arguments;
 pub mod budget;
 pub mod collide;
-pub mod dynamics;
+pub mod energy;
 pub mod enter;
 pub mod explain;
 pub mod foraging;

@@ -1,7 +1,7 @@
 //! What makes one verified motion better than another, by the names that users write.
-use crate::dynamics::{Dynamics, NoMasses};
+use crate::energy::Energy;
 use crate::verify::Proof;
-use taustream_arm::Robot;
+use taustream_arm::{NoMasses, Robot};
 use taustream_motion::{JointArray, Trajectory};
 use taustream_optimizers::cost::CostModel;
 
@@ -56,7 +56,7 @@ pub struct Evaluator<'a> {
     /// What counts.
     pub objective: Objective,
     robot: &'a Robot,
-    dynamics: Result<Dynamics<'a>, NoMasses>,
+    energy: Result<Energy, NoMasses>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -65,23 +65,23 @@ impl<'a> Evaluator<'a> {
     /// # Errors
     /// When energy counts and the robot states no masses.
     pub fn new(objective: Objective, robot: &'a Robot) -> Result<Self, NoMasses> {
-        let dynamics = Dynamics::new(robot);
-        match (objective, dynamics) {
+        let energy = Energy::of(robot);
+        match (objective, energy) {
             (Objective::Energy, Err(none)) => Err(none),
-            (_, dynamics) => Ok(Self { objective, robot, dynamics }),
+            (_, energy) => Ok(Self { objective, robot, energy }),
         }
     }
 
-    /// The arm's dynamics, when energy counts.
+    /// What computes energies, when energy counts.
     #[must_use]
-    pub fn energy(&self) -> Option<&Dynamics<'a>> {
-        self.dynamics.as_ref().ok().filter(|_| self.objective == Objective::Energy)
+    pub fn energy(&self) -> Option<&Energy> {
+        self.energy.as_ref().ok().filter(|_| self.objective == Objective::Energy)
     }
 
     /// Energy of a motion in J, whatever counts; `None` without masses.
     #[must_use]
     pub fn energy_j(&self, motion: &Trajectory) -> Option<f64> {
-        self.dynamics.as_ref().ok().map(|dynamics| dynamics.spent_j(motion))
+        self.energy.as_ref().ok().map(|energy| energy.spent_j(motion))
     }
 
     /// Less is better.

@@ -1,7 +1,6 @@
 //! From two poses to a verified motion.
 use crate::budget::Budget;
 use crate::collide::SweepRules;
-use crate::dynamics::NoMasses;
 use crate::enter::Entry;
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
@@ -12,7 +11,7 @@ use crate::verify::{Contact, Proof, Violation};
 use crate::world::World;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use taustream_arm::{Robot, Scene};
+use taustream_arm::{NoMasses, Robot, Scene};
 use taustream_messages::way_points::Blend;
 use taustream_motion::digits::{Amount, OutsideRange};
 use taustream_motion::range::INSIDE_RAD;
@@ -86,7 +85,7 @@ pub struct Plan {
     pub proof: Proof,
     /// What it is worth by the objective: seconds, cost or joules; less is better.
     pub score: f64,
-    /// Mechanical energy of the motion ([`crate::dynamics`]); `None` when the robot states no masses.
+    /// Mechanical energy of the motion ([`crate::energy`]); `None` when the robot states no masses.
     pub energy_j: Option<f64>,
     /// How long planning took.
     pub planning_s: f64,

@@ -4,7 +4,7 @@
 //! distances are the world's own, of every shape, and the penalty's width is the radii and the margin. What comes
 //! out is a proposal: its edges are proven like any other path's.
 use crate::budget::Budget;
-use crate::dynamics::Dynamics;
+use crate::energy::Energy;
 use crate::rng::SeededRng;
 use crate::timing::Path;
 use crate::tree::Space;
@@ -45,7 +45,7 @@ pub fn refine(
     Ok((!found.x.is_empty()).then(|| (problem.corners(&found.x), found)))
 }
 
-/// The paper's problem: where to put the control points. With an arm's dynamics the energy of the motion takes the place
+/// The paper's problem: where to put the control points. With [`Energy`] the energy of the motion takes the place
 /// of the ways of tip and joints.
 pub struct PathProblem<'a> {
     world: &'a World<'a>,
@@ -53,7 +53,7 @@ pub struct PathProblem<'a> {
     start_rad: JointArray,
     goal_rad: JointArray,
     weights: [f64; 3],
-    energy: Option<&'a Dynamics<'a>>,
+    energy: Option<&'a Energy>,
     bounds: Vec<[f64; 2]>,
     /// Scratch memory; the trait's evaluation takes no mutable access.
     snapshot: RefCell<Snapshot>,
@@ -72,7 +72,7 @@ impl<'a> PathProblem<'a> {
 
     /// The same for the energy of the motion.
     #[must_use]
-    pub fn by_energy(mut self, energy: Option<&'a Dynamics<'a>>) -> Self {
+    pub fn by_energy(mut self, energy: Option<&'a Energy>) -> Self {
         self.energy = energy;
         self
     }
@@ -92,10 +92,10 @@ impl<'a> PathProblem<'a> {
 
     /// Energy of the motion that passes the corners without stopping, as timing would make it; infinite when there is
     /// none.
-    fn energy_j(&self, dynamics: &Dynamics, corners_rad: &[JointArray]) -> f64 {
+    fn energy_j(&self, energy: &Energy, corners_rad: &[JointArray]) -> f64 {
         let limits = self.world.robot().limits();
         let path = Path { corners_rad, joints: self.world.joints(), limits: &limits };
-        path.rough().map_or(f64::INFINITY, |motion| dynamics.spent_roughly_j(&motion))
+        path.rough().map_or(f64::INFINITY, |motion| energy.spent_roughly_j(&motion))
     }
 
     /// The path with three control points, some scattered around it, and the straight line.
@@ -151,7 +151,7 @@ impl Problem for PathProblem<'_> {
         let [length, travel, weight] = self.weights;
         let penalty = if collides { weight * penalty } else { 0.0 };
         let leading_term = match self.energy {
-            Some(dynamics) => self.energy_j(dynamics, &corners),
+            Some(energy) => self.energy_j(energy, &corners),
             None => length * length_m + travel * travel_rad,
         };
         leading_term + penalty

@@ -202,7 +202,7 @@ impl<'a> Outbox<'a> {
         let message = TrajectoryMessage::new(&CheckedTrajectory {
             trajectory_id,
             generation,
-            robot_digest: robot.digest,
+            robot_digest: robot.message_digest,
             replaces,
             trajectory: trajectory.clone(),
         });
@@ -261,11 +261,12 @@ impl<'a> Outbox<'a> {
 /// # Errors
 /// `WrongRobot` with both digests.
 pub fn check_robot(robot: &Robot, report: &Report) -> Result<(), SendError> {
-    if report.robot_digest == robot.digest {
+    if report.robot_digest == robot.message_digest {
         return Ok(());
     }
-    let streamer: String = report.robot_digest.iter().map(|b| format!("{b:02x}")).collect();
-    Err(SendError::WrongRobot { streamer, ours: robot.digest_hex() })
+    let [streamer, ours] = [&report.robot_digest, &robot.message_digest]
+        .map(|digest| digest.iter().map(|b| format!("{b:02x}")).collect());
+    Err(SendError::WrongRobot { streamer, ours })
 }
 
 fn transport(what: &'static str, why: &dyn std::fmt::Debug) -> SendError {

@@ -2,9 +2,9 @@
 //!
 //! A slower motion needs less torque only down to what gravity asks for at standstill. Torques are known where masses are
 //! and may be right ([`Robot::mass_doubt`]); they are rigid-body torques, without friction and the motors' own inertia.
-use crate::dynamics::Dynamics;
 use taustream_arm::Robot;
-use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
+use taustream_motion::dynamics::Dynamics;
+use taustream_motion::{JointArray, Trajectory};
 
 /// Instants a second of a proof, and of a plan, which keeps [`PLANNED_SHARE`] for what lies between them.
 const PROVEN_HZ: f64 = 1_000.0;
@@ -70,7 +70,7 @@ pub(crate) enum Load {
 #[derive(Clone, Debug)]
 pub struct TorqueLimits<'a> {
     robot: &'a Robot,
-    dynamics: Dynamics<'a>,
+    dynamics: Dynamics,
 }
 
 /// Why torques are not checked.
@@ -96,7 +96,7 @@ impl<'a> TorqueLimits<'a> {
         if robot.joints.iter().all(|joint| joint.torque_nm_max.is_none()) {
             return Err(Unchecked::NoLimits);
         }
-        let dynamics = Dynamics::new(robot).map_err(|_| Unchecked::NoMasses)?;
+        let dynamics = robot.dynamics().map_err(|_| Unchecked::NoMasses)?;
         match robot.mass_doubt() {
             Some(doubt) => Err(Unchecked::Doubtful(doubt)),
             None => Ok(Self { robot, dynamics }),
@@ -175,8 +175,7 @@ impl<'a> TorqueLimits<'a> {
         if beyond.is_empty() {
             return Vec::new();
         }
-        let rest = [0.0; MAX_JOINTS];
-        let holding = self.dynamics.torques_nm(pose_rad, &rest, &rest);
+        let holding = self.dynamics.holding_nm(pose_rad);
         let overload = |joint: usize| {
             let limit_nm = limit(joint)?;
             let (torque, held) = (torques[joint], holding[joint]);

@@ -11,7 +11,7 @@ use taustream_arm::{LinkMass, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint};
 use taustream_motion::{JointArray, Stroke, Trajectory};
 use taustream_optimizers::papers::two_link::{Moving, TwoLink};
-use taustream_planner::dynamics::Dynamics;
+use taustream_planner::energy::Energy;
 use taustream_planner::margin_exit::is_clear;
 use taustream_planner::objective::Evaluator;
 use taustream_planner::rng::SeededRng;
@@ -74,7 +74,7 @@ fn two_link(arm: &TwoLink) -> Robot {
 fn torques_and_energy_of_the_papers_two_link_arm_are_its_closed_forms() {
     let arm = TwoLink { masses: [1.3, 0.7], lengths: [5.0, 4.0], ..TwoLink::PAPER_004 };
     let robot = two_link(&arm);
-    let dynamics = Dynamics::new(&robot).expect("masses");
+    let dynamics = robot.dynamics().expect("masses");
     let base_j = arm.gravity * arm.height * (arm.masses[0] + arm.masses[1]);
     for seed in 0..200 {
         let mut rng = SeededRng::new(seed, 70);
@@ -124,7 +124,7 @@ fn torques_and_energies_of_a_ur5_agree_with_the_python_program_by_lagrange() {
         let (gravity, rest) = numbers.split_at(3);
         robot.gravity_m_s2 = Vector3::from_column_slice(gravity);
         let of = |i: usize| pose(rest[6 * i..6 * i + 6].try_into().expect("six"));
-        let dynamics = Dynamics::new(&robot).expect("masses");
+        let dynamics = robot.dynamics().expect("masses");
         let torques = dynamics.torques_nm(&of(0), &of(1), &of(2));
         for (ours, theirs) in torques.iter().zip(of(3)) {
             close("torque", *ours, theirs, 1e-11);
@@ -142,7 +142,7 @@ fn torques_and_energies_of_a_ur5_agree_with_the_python_program_by_lagrange() {
 fn torques_change_with_every_part_of_the_description() {
     let (right, q, v) =
         (heavy_ur5(), pose([0.1, -0.7, 1.1, 0.3, -0.4, 0.2]), pose([1.0, -2.0, 0.5, 1.5, 0.7, -3.0]));
-    let torques = |robot: &Robot| Dynamics::new(robot).expect("masses").torques_nm(&q, &v, &v);
+    let torques = |robot: &Robot| robot.dynamics().expect("masses").torques_nm(&q, &v, &v);
     let change = |doctor: &dyn Fn(&mut Robot)| {
         let mut robot = right.clone();
         doctor(&mut robot);
@@ -177,7 +177,7 @@ fn one_stroke(base_rad: JointArray, delta_rad: JointArray, joints: usize, durati
 #[test]
 fn work_of_the_joints_is_the_change_of_kinetic_and_potential_energy() {
     let robot = heavy_ur5();
-    let dynamics = Dynamics::new(&robot).expect("masses");
+    let (dynamics, spent) = (robot.dynamics().expect("masses"), Energy::of(&robot).expect("masses"));
     let motion =
         one_stroke(pose([0.3, -1.2, 0.8, -0.4, 0.9, 0.1]), pose([2.0, 1.5, -1.8, 0.7, -2.0, 1.0]), 6, 1.7);
     let energy = |t_s: f64| -> f64 {
@@ -191,12 +191,12 @@ fn work_of_the_joints_is_the_change_of_kinetic_and_potential_energy() {
         let torques = dynamics.torques_nm(&at.position_rad, &at.velocity_rad_s, &at.acceleration_rad_s2);
         let power: f64 = torques.iter().zip(&at.velocity_rad_s).map(|(t, v)| t * v).sum();
         given += power * step_s;
-        size += dynamics.power_w(&at.position_rad, &at.velocity_rad_s, &at.acceleration_rad_s2) * step_s;
+        size += spent.power_w(&at.position_rad, &at.velocity_rad_s, &at.acceleration_rad_s2) * step_s;
         if i % 400 == 399 {
             close("given", given, energy(f64::from(i + 1) * step_s) - energy(0.0), 1e-5);
         }
     }
-    close("spent", dynamics.spent_j(&motion), size, 1e-4);
+    close("spent", spent.spent_j(&motion), size, 1e-4);
     assert!(size > 2.0 * given.abs(), "the motion must brake and lift to show anything: {size} and {given}");
 }
 
@@ -214,13 +214,13 @@ fn spent_energy_of_one_joint_is_its_closed_form() {
     let s = (3.0_f64 / 23.0).powf(0.25);
     let fastest_rad_s = 24.0 * s.powi(3) * (1.0 - s.powi(4)).powi(5) * turn_rad / duration_s;
     let kinetic_j = 0.5 * mass_kg * length_m * length_m / 3.0 * fastest_rad_s * fastest_rad_s;
-    let spent_j = Dynamics::new(&robot).expect("masses").spent_j(&motion);
+    let spent_j = Energy::of(&robot).expect("masses").spent_j(&motion);
     close("kinetic energy twice", spent_j, 2.0 * kinetic_j, 1e-5);
     // So slowly that only the weight counts: lifted from hanging to upright, and past it down again.
     robot.gravity_m_s2 = Vector3::new(0.0, -9.806_65, 0.0);
     let mut base = [0.0; 8];
     (base[0], distance[0]) = (-FRAC_PI_2, 3.0 * FRAC_PI_2);
-    let spent_j = Dynamics::new(&robot).expect("masses").spent_j(&one_stroke(base, distance, 1, 400.0));
+    let spent_j = Energy::of(&robot).expect("masses").spent_j(&one_stroke(base, distance, 1, 400.0));
     // Centre from -0.5 m to 0.5 m, and back to 0 m.
     close("weight", spent_j, mass_kg * 9.806_65 * (1.0 + 0.5), 1e-4);
 }
@@ -290,7 +290,7 @@ fn energy_of_an_arm_without_masses_is_refused_with_what_to_do() {
         words.contains("piper") && words.contains("link_mass_kg") && words.contains("by time"),
         "{words}"
     );
-    assert!(Dynamics::new(&piper).is_err());
+    assert!(piper.dynamics().is_err());
     let by_time = plan(&piper, &empty, &ends[0], &ends[1], &PlanOptions::default()).expect("a plan");
     assert_eq!(by_time.energy_j, None);
     for objective in Objective::ALL {

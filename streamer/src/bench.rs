@@ -247,7 +247,7 @@ fn setpoint(servo: &Servo, command: &JointCommand) -> CanFrame {
         velocity_rad_s: command.velocity_rad_s * servo.sign,
         stiffness_nm_rad: 100.0,
         damping_nm_s_rad: 1.0,
-        torque_nm: 0.0,
+        torque_nm: command.torque_nm * servo.sign,
     };
     let bytes = packed.encode(&MitRanges::symmetric(12.5, 30.0, 10.0)).unwrap_or_default();
     CanFrame::classic(CanId::standard(u16::from(servo.node_id)), &bytes)

@@ -39,7 +39,7 @@ impl Rules {
     /// The rules of a robot.
     #[must_use]
     pub fn of(robot: &Robot) -> Self {
-        Self { digest: robot.digest, joints: robot.joints.len(), limits: robot.limits() }
+        Self { digest: robot.message_digest, joints: robot.joints.len(), limits: robot.limits() }
     }
 
     /// Checks everything about a message that the moment cannot change.

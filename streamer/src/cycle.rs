@@ -1,10 +1,11 @@
 //! The cycle: the only place where the stages meet.
 //!
-//! `subscribe -> splice -> sample -> guard -> encode -> send -> receive -> supervise -> report`. No stage calls
+//! `subscribe -> splice -> sample -> guard -> feed-forward -> encode -> send -> receive -> supervise -> report`. No stage calls
 //! another, none returns early, none reads a clock: everything is a function of the tick and of what arrived, so a
 //! recorded run replays exactly.
 use crate::buses::Buses;
 use crate::cycle_state::CycleState;
+use crate::feed_forward::FeedForward;
 use crate::guard::Guard;
 use crate::intake::{Answers, Handover, Intake};
 use crate::last_sent::Ledger;
@@ -29,6 +30,8 @@ pub enum Stage {
     Sample,
     /// It was let pass or replaced.
     Guard,
+    /// Torques were added to it.
+    FeedForward,
     /// Frames were written.
     Encode,
     /// Frames were passed to the links.
@@ -43,11 +46,12 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Subscribe,
         Self::Splice,
         Self::Sample,
         Self::Guard,
+        Self::FeedForward,
         Self::Encode,
         Self::Send,
         Self::Receive,
@@ -62,6 +66,7 @@ impl Stage {
             Self::Splice => "splice",
             Self::Sample => "sample",
             Self::Guard => "guard",
+            Self::FeedForward => "feed-forward",
             Self::Encode => "encode",
             Self::Send => "send",
             Self::Receive => "receive",
@@ -93,6 +98,7 @@ pub struct Core {
     ledger: Ledger,
     track: Track,
     guard: Guard,
+    feed_forward: FeedForward,
     buses: Buses,
     supervisor: Supervisor,
     reporter: Reporter,
@@ -110,8 +116,9 @@ impl Core {
             ledger: Ledger::new(settings),
             track: Track::new(settings),
             guard: Guard::new(limits, joints, cycle.period_us),
+            feed_forward: FeedForward::new(settings),
             supervisor: Supervisor::new(settings, Records::none()),
-            reporter: Reporter::new(settings.robot.digest, joints, buses.local(), cycle, reports),
+            reporter: Reporter::new(settings.robot.message_digest, joints, buses.local(), cycle, reports),
             buses,
         }
     }
@@ -198,19 +205,22 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     core.ledger.find_stopped(&mut cycle_state);
     let requested = core.track.sample(drive_target == DriveTarget::Enabled, &core.ledger, &mut cycle_state);
     probe.ended(Stage::Sample);
-    let command = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last check before the bus.
+    let guarded = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last check before the bus.
     probe.ended(Stage::Guard);
+    let command = core.feed_forward.add(guarded, &core.ledger, &cycle_state);
+    probe.ended(Stage::FeedForward);
 
     let drive_commands = core.supervisor.referencing().to_drives(command.joints());
     core.buses.encode(tick.wake_time, drive_target, &drive_commands);
     probe.ended(Stage::Encode);
     core.buses.send(&mut cycle_state);
-    core.ledger.record(command.setpoint(), requested.restart, &mut cycle_state);
+    core.ledger.record(&command, requested.restart, &mut cycle_state);
     let replaced = core.track.commit(&command.setpoint().position_rad, &core.ledger, &mut cycle_state);
     core.intake.recycle(replaced);
     probe.ended(Stage::Send);
     core.buses.receive(tick.wake_time, &mut cycle_state);
     core.supervisor.referencing_mut().read(&mut cycle_state);
+    core.feed_forward.read(&cycle_state.servos);
     probe.ended(Stage::Receive);
 
     let mut answers: Answers = [None; _];

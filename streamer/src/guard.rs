@@ -20,7 +20,7 @@ use taustream_drivers::JointCommand;
 use taustream_motion::brake::{Brake, JointState};
 use taustream_motion::limits::Quantity;
 use taustream_motion::range::PermittedRange;
-use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS, Setpoint};
+use taustream_motion::{JointArray, JointLimits, LimitSet, MAX_JOINTS, Setpoint};
 
 /// Relative excess over a limit that is taken for rounding.
 const SLACK: f64 = 1e-3;
@@ -47,11 +47,15 @@ impl GuardedCommand {
                 position_rad: *position,
                 velocity_rad_s: *velocity,
                 acceleration_rad_s2: *acceleration,
-                // No model of the arm's masses yet: servos carry their load by their own control.
                 torque_nm: 0.0,
             };
         }
         Self { setpoint, joints }
+    }
+    /// The same with torques that have passed the torque guard.
+    pub(crate) fn with_torque(mut self, passed_nm: &JointArray) -> Self {
+        self.joints.iter_mut().zip(passed_nm).for_each(|(joint, passed_nm)| joint.torque_nm = *passed_nm);
+        self
     }
     /// As drivers take it.
     #[must_use]
@@ -385,7 +389,7 @@ mod tests {
             let restart = tick == 0;
             let command =
                 guard.limit(&RequestedSetpoint { setpoint, restart, live: true }, &ledger, &mut cycle_state);
-            ledger.record(command.setpoint(), restart, &mut cycle_state);
+            ledger.record(&command, restart, &mut cycle_state);
             cycle_state.trip.map(|trip| (tick, trip))
         })
     }

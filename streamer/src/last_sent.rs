@@ -9,9 +9,10 @@
 //! has *stopped*: its drive stands at the last setpoint that it got, so nothing but that is commanded until the arm is at
 //! rest (`Track`), and supervision stops the others on their path.
 use crate::cycle_state::{CycleState, LostSetpoints};
+use crate::guard::GuardedCommand;
 use taustream_arm::Settings;
 use taustream_arm::settings::SETPOINT_EVERY_MAX;
-use taustream_motion::{JointArray, MAX_JOINTS, Setpoint};
+use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Setpoints that are remembered of a joint: what the third difference needs besides a new one.
 pub(crate) const PAST: usize = 3;
@@ -29,6 +30,8 @@ pub struct LastSent {
     pub velocity_rad_s: f64,
     /// Acceleration of the newest.
     pub acceleration_rad_s2: f64,
+    /// Torque that was commanded with the newest.
+    pub torque_nm: f64,
     /// The kernel took the newest setpoint that was due.
     pub taken: bool,
     /// Its drive stands at the newest position for want of setpoints.
@@ -48,6 +51,7 @@ impl LastSent {
         tick: [2, 1, 0],
         velocity_rad_s: 0.0,
         acceleration_rad_s2: 0.0,
+        torque_nm: 0.0,
         taken: true,
         stopped: false,
         consecutive_lost: 0,
@@ -186,10 +190,11 @@ impl Ledger {
     /// count.
     ///
     /// Real time: no allocation.
-    pub fn record(&mut self, command: &Setpoint, restart: bool, cycle_state: &mut CycleState) {
+    pub fn record(&mut self, command: &GuardedCommand, restart: bool, cycle_state: &mut CycleState) {
         let tick = cycle_state.tick.number;
         let left = cycle_state.setpoints_sent();
         let lost_max = self.lost_max;
+        let (command, torques) = (command.setpoint(), command.joints().map(|joint| joint.torque_nm));
         for (joint, last) in self.last.iter_mut().enumerate().take(self.joints) {
             let (due, taken) = (cycle_state.due.contains(joint), cycle_state.taken.contains(joint));
             let position_rad = command.position_rad[joint];
@@ -208,6 +213,9 @@ impl Ledger {
             } else if taken {
                 let rates = [command.velocity_rad_s[joint], command.acceleration_rad_s2[joint]];
                 last.take([position_rad, rates[0], rates[1]], tick);
+            }
+            if taken || !cycle_state.live {
+                last.torque_nm = torques[joint];
             }
             let waits = !due && !cycle_state.unreachable[joint];
             if left {

@@ -54,13 +54,21 @@ impl UrdfArm {
     }
 }
 
+impl UrdfArm {
+    /// Appends the moments of inertia of every link that has a mass.
+    pub(crate) fn put_moments(&self, out: &mut Vec<u8>) {
+        let inertials = self.model.links.iter().filter_map(|link| link.inertial);
+        inertials.flat_map(|inertial| inertial.inertia_kg_m2).for_each(|moment| put_number(out, moment));
+    }
+}
+
 fn put_link(out: &mut Vec<u8>, link: &Link) {
     // Its parts come later, with their meshes read; whether it can be seen does not matter.
     let Link { name, parts: _, is_visible: _, inertial } = link;
     put_text(out, name);
     match inertial {
         None => out.push(0),
-        // How a mass is spread weighs proven motions against each other, and changes none: not in the digest.
+        // How a mass is spread changes no setpoint: it is in the digest of the torque model only.
         Some(Inertial { mass_kg, origin, inertia_kg_m2: _ }) => {
             out.push(1);
             put_number(out, *mass_kg);

@@ -2,12 +2,12 @@
 use super::{SEGMENT_S, refused};
 use crate::run_context::Stop;
 use taustream_arm::{Robot, Scene};
+use taustream_motion::dynamics::Dynamics;
 use taustream_motion::profile::Profile;
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::cost::ControlPointCost;
 use taustream_optimizers::cost::{CostModel, PaperCost};
 use taustream_optimizers::papers::control_points::CONTROL_POINTS;
-use taustream_planner::dynamics::Dynamics;
 
 /// The clearance is found to this (m), from none to this.
 const CLEARANCE_M: [f64; 2] = [1e-4, 1.0];
@@ -115,11 +115,7 @@ impl TipPath {
 
 impl TipPath {
     /// Torques of the joints over time, and what every joint has to bear at most (Nm).
-    pub(super) fn torques(
-        &self,
-        robot: &Robot,
-        dynamics: &Dynamics<'_>,
-    ) -> (Vec<(f64, JointArray)>, JointArray) {
+    pub(super) fn torques(&self, robot: &Robot, dynamics: &Dynamics) -> (Vec<(f64, JointArray)>, JointArray) {
         let joints = robot.joints.len();
         let curves: Vec<[Vec<(f64, f64)>; 3]> =
             (0..joints).map(|joint| [0, 1, 2].map(|order| self.curve(joint, order))).collect();

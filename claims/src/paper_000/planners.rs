@@ -20,7 +20,6 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::cost::CostModel;
 use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
 use taustream_optimizers::{Parameters, Reading};
-use taustream_planner::dynamics::Dynamics;
 use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::rrt;
 
@@ -207,7 +206,7 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
 /// Figures 6 and 7 show torques and call them reasonable by design.
 fn torque(robot: &Robot, all: &[Run]) -> Claim {
     let says = "Torques are reasonable by design: no constraints need to be evaluated";
-    let Ok(dynamics) = Dynamics::new(robot) else {
+    let Ok(dynamics) = robot.dynamics() else {
         return Claim::unchecked(says, "the arm states no masses", String::new());
     };
     let share = |run: &Run| {
@@ -257,7 +256,7 @@ fn unbounded(robot: &Robot, worths: &[PathCost]) -> Claim {
 
 fn torque_panel(robot: &Robot, name: &str, found: &TipPath) -> Panel {
     let mut panel = Panel::new("t (s)", &format!("{name}: torque (Nm)"));
-    if let Ok(dynamics) = Dynamics::new(robot) {
+    if let Ok(dynamics) = robot.dynamics() {
         let (over_time, _) = found.torques(robot, &dynamics);
         for joint in 0..robot.joints.len() {
             let points = over_time.iter().map(|(t_s, torques)| (*t_s, torques[joint])).collect();

@@ -122,7 +122,7 @@ fn check_ready(
     file: &TrajectoryFile,
     settings: &Settings,
 ) -> Result<(), Failure> {
-    if report.robot_digest != settings.robot.digest {
+    if report.robot_digest != settings.robot.message_digest {
         return Err(Failure::Refused(format!(
             "the streamer of arm `{}` drives another robot than {}; start it with these settings, or name its settings",
             settings.name,

@@ -1,6 +1,7 @@
 //! `taustream check`: is a configuration sound, and what does it mean?
 use super::bus_table::BusTable;
 use super::checked_robot::CheckedRobot;
+use super::feed_forward_line::FeedForwardLine;
 use super::protocol_line::ProtocolLine;
 use crate::args::CheckArgs;
 use crate::arm;
@@ -186,6 +187,7 @@ struct CheckedSettings {
     first_speed_percent: f64,
     buses: Vec<BusTable>,
     servos: Vec<ServoLine>,
+    feed_forward: Option<FeedForwardLine>,
 }
 
 impl CheckedSettings {
@@ -217,6 +219,7 @@ impl CheckedSettings {
             first_speed_percent: settings.supervision.first_speed_percent,
             buses: buses.filter_map(|(i, bus)| BusTable::of(settings, i, bus)).collect(),
             servos: settings.servos.iter().map(line).collect(),
+            feed_forward: FeedForwardLine::of(settings),
         }
     }
 }
@@ -242,6 +245,9 @@ impl fmt::Display for CheckedSettings {
                 "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>12.6}  {limp:<14}  {}",
                 s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
+        }
+        if let Some(feed_forward) = &self.feed_forward {
+            writeln!(f, "{feed_forward}")?;
         }
         writeln!(f, "  when setpoints stop coming, because of a failure of streamer or bus:")?;
         for reaction in Reaction::ALL {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::fmt;
 use taustream_arm::text::counted;
 use taustream_optimizers::cost::{CostError, CostModel, paper_cost};
-use taustream_planner::dynamics::Dynamics;
+use taustream_planner::energy::Energy;
 
 /// The cost and its parts.
 #[derive(Debug, Serialize)]
@@ -71,7 +71,7 @@ pub(crate) fn run(form: Form, args: &CostArgs) -> Result<(), Failure> {
         penalty: cost.penalty,
         collision: u8::from(cost.collision),
         cost: cost.cost,
-        energy_j: Dynamics::new(&robot).ok().map(|dynamics| dynamics.spent_j(&file.trajectory)),
+        energy_j: Energy::of(&robot).ok().map(|energy| energy.spent_j(&file.trajectory)),
         mass_doubt: robot.mass_doubt(),
         poses: cost.poses,
         waypoints_per_segment: model.waypoints_per_segment,

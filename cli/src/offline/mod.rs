@@ -7,6 +7,7 @@ mod compare;
 pub(crate) mod cost;
 mod cost_bench;
 mod cuts_bench;
+mod feed_forward_line;
 mod follow_bench;
 pub(crate) mod import;
 mod limit_sets;

@@ -34,7 +34,7 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Robot files: joint[].link_capsules[].from_m", "One end of the capsule's axis."),
     ("Robot files: joint[].link_capsules[].to_m", "The other end; equal ends make a ball."),
     ("Robot files: joint[].link_capsules[].radius_m", "Radius of the capsule."),
-    ("Robot files: payload", "Mass at the tip, for the energy of motions."),
+    ("Robot files: payload", "Mass at the tip, for the torques and the energy of motions."),
     ("Robot files: gravity_m_s2", "Gravity in the base's frame; without it `[0, 0, -9.80665]`."),
     ("Robot files: payload.mass_kg", "Mass of the payload, kg."),
     ("Robot files: payload.center_m", "Centre of mass of the payload in the tip's frame."),
@@ -193,6 +193,37 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     (
         "Settings files: supervision.stop_s_max",
         "Longest stop from full speed, s, of an arm that is accepted; without it 1.",
+    ),
+    (
+        "Settings files: feed_forward",
+        "Torque that is commanded beside the position, where the protocol carries one; without the section none.",
+    ),
+    (
+        "Settings files: feed_forward.gravity",
+        "true: the torque that holds the masses of the robot file, its payload included, against gravity.",
+    ),
+    (
+        "Settings files: feed_forward.inertia",
+        "true: the torque that accelerates these masses, Coriolis and centrifugal terms included.",
+    ),
+    ("Settings files: feed_forward.share", "Share of the computed torque that is commanded."),
+    ("Settings files: feed_forward.joint", "One table for each joint that gets a torque."),
+    ("Settings files: feed_forward.joint[].joint", "Joint of the robot."),
+    (
+        "Settings files: feed_forward.joint[].torque_nm_max",
+        "Greatest torque: at most that of the joint in the robot file, and at most what the servo's frames carry.",
+    ),
+    (
+        "Settings files: feed_forward.joint[].rate_nm_s_max",
+        "Fastest change of the torque. After enabling it rises from zero by this rate.",
+    ),
+    (
+        "Settings files: feed_forward.joint[].coulomb_nm",
+        "Dry friction that is compensated in motion; without it 0.",
+    ),
+    (
+        "Settings files: feed_forward.joint[].viscous_nm_s_rad",
+        "Viscous friction that is compensated; without it 0.",
     ),
     ("Settings files: bus[].name", "Name of the bus, for the servos and for messages."),
     ("Settings files: bus[].interface", "Network interface."),

@@ -95,7 +95,7 @@ impl Arm {
             batch: FrameBatch::new(),
             out: vec![Vec::new(); count],
             runtime,
-            digest: settings.robot.digest,
+            digest: settings.robot.message_digest,
             limits: settings.robot.limits(),
             settings,
             tick: 0,

@@ -276,7 +276,7 @@ impl CycleHarness {
         let checked = CheckedTrajectory {
             trajectory_id: 0,
             generation: 0,
-            robot_digest: self.settings.robot.digest,
+            robot_digest: self.settings.robot.message_digest,
             replaces,
             trajectory,
         };

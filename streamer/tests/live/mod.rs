@@ -272,7 +272,7 @@ impl Operator {
         let message = TrajectoryMessage::new(&CheckedTrajectory {
             trajectory_id: 1 + (generation & 0xffff),
             generation,
-            robot_digest: arm.settings.robot.digest,
+            robot_digest: arm.settings.robot.message_digest,
             replaces: Replaces::Rest,
             trajectory: Trajectory::new(6, base_rad, &[stroke]).unwrap(),
         });

@@ -291,7 +291,7 @@ impl World {
         let checked = CheckedTrajectory {
             trajectory_id,
             generation: self.generation,
-            robot_digest: self.settings.robot.digest,
+            robot_digest: self.settings.robot.message_digest,
             replaces,
             trajectory: trajectory.clone(),
         };

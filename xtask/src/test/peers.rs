@@ -13,6 +13,7 @@ const fn step(name: &'static str, run: fn(&Place) -> Result<Outcome>) -> Step {
 
 pub(super) const STEPS: &[Step] = &[
     step("forward kinematics", kinematics),
+    step("torques of motions", torques),
     step("clearances of planned motions", clearances),
     step("mesh files", meshes),
     step("optimisers step by step", walks),
@@ -54,6 +55,15 @@ fn kinematics(place: &Place) -> Result<Outcome> {
             "ur5_spherized of the published problems (not part of this project; looked in {looked}, TAUSTREAM_MBM_DIR names another folder)"
         ))
     })
+}
+
+/// Inverse dynamics of an independent library, in pinned versions, against ours.
+fn torques(place: &Place) -> Result<Outcome> {
+    let python = place.python("venv-torques", "torques-requirements.txt", &["--no-deps"])?;
+    let mut command = Command::new(python);
+    command.arg(place.peers().join("torques.py")).arg(place.programs.join("torques")).arg(&place.root);
+    perform("torques of motions against an independent library", &mut command)?;
+    Ok(Outcome::Passed)
 }
 
 /// Distances by an independent library, in pinned versions, against what was proven of planned motions.
