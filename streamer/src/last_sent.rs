@@ -193,8 +193,8 @@ impl Ledger {
     pub fn record(&mut self, command: &GuardedCommand, restart: bool, cycle_state: &mut CycleState) {
         let tick = cycle_state.tick.number;
         let left = cycle_state.setpoints_sent();
-        let lost_max = self.lost_max;
         let (command, torques) = (command.setpoint(), command.joints().map(|joint| joint.torque_nm));
+        let lost_max = self.lost_max;
         for (joint, last) in self.last.iter_mut().enumerate().take(self.joints) {
             let (due, taken) = (cycle_state.due.contains(joint), cycle_state.taken.contains(joint));
             let position_rad = command.position_rad[joint];

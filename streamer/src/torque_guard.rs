@@ -107,7 +107,8 @@ mod tests {
         let all = JointSet::of(0).union(JointSet::of(2));
         for state in [DriveState::Absent, DriveState::Disabled, DriveState::Enabling, DriveState::Fault] {
             guard.read(&servos(state));
-            assert_eq!(guard.limit(&[5.0; MAX_JOINTS], &ledger, 10), [0.0; MAX_JOINTS], "{state:?}");
+            let passed = guard.limit(&[5.0; MAX_JOINTS], &ledger, 10);
+            assert!(passed.iter().all(|torque| *torque == 0.0), "{state:?}: {passed:?}");
         }
         guard.read(&servos(DriveState::Enabled));
         send(&mut ledger, &[0.0; MAX_JOINTS], 10, all);
@@ -115,7 +116,8 @@ mod tests {
             let passed = guard.limit(&[5.0; MAX_JOINTS], &ledger, u64::from(tick));
             let expected = (f64::from(tick - 10) * STEP_NM).min(5.0);
             assert!((passed[0] - expected).abs() < 1e-9, "{passed:?} in cycle {tick}");
-            assert_eq!([1, 3, 4, 5, 6, 7].map(|joint| passed[joint]), [0.0; 6], "not in the settings");
+            let others = [1, 3, 4, 5, 6, 7].map(|joint| passed[joint]);
+            assert!(others.iter().all(|torque| *torque == 0.0), "not in the settings: {passed:?}");
             send(&mut ledger, &passed, u64::from(tick), all);
         }
         let mut one = servos(DriveState::Enabled);

@@ -10,6 +10,7 @@
     reason = "helpers of tests fail by panicking"
 )]
 mod arm;
+mod fed;
 
 use arm::{Arm, JOINTS, shipped};
 use taustream_arm::Settings;
@@ -61,6 +62,16 @@ fn cycle_with_robstride_motors_never_allocates() {
 #[test]
 fn cycle_with_cubemars_motors_never_allocates() {
     let mut arm = counted("no-alloc-cubemars", shipped("ak6.toml", str::to_owned));
+    live_through(&mut arm, 25_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+/// The same with torques beside the positions, on an arm that feels its masses.
+#[test]
+fn cycle_with_torques_beside_positions_never_allocates() {
+    let settings = fed::settings("no-alloc-fed", 0.5, &fed::section(true, 1.0));
+    let mut arm = fed::arm("no-alloc-fed", settings, 0.5);
+    arm.around = |cycle| allocations(cycle);
     live_through(&mut arm, 25_000);
     assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
 }

@@ -91,11 +91,11 @@ impl fmt::Display for StageTable<'_> {
         )?;
         writeln!(
             f,
-            "  stage       p50 (us)  p99 (us)  max (us)  of the cycle   bare loop: p50 (us)  p99 (us)  max (us)"
+            "  stage         p50 (us)  p99 (us)  max (us)  of the cycle   bare loop: p50 (us)  p99 (us)  max (us)"
         )?;
         for s in &self.0.stages {
             let (p50, p99, max) = (us(s.time.p50_ns), us(s.time.p99_ns), us(s.time.max_ns));
-            write!(f, "  {:<10} {p50:>9.2} {p99:>9.2} {max:>9.2} {:>11.1} %", s.stage, s.share_percent)?;
+            write!(f, "  {:<12} {p50:>9.2} {p99:>9.2} {max:>9.2} {:>11.1} %", s.stage, s.share_percent)?;
             match s.bare {
                 Some(b) => {
                     let (p50, p99, max) = (us(b.p50_ns), us(b.p99_ns), us(b.max_ns));

@@ -13,7 +13,7 @@ use taustream_arm::{Kind, Settings, runtime};
 use taustream_drivers::link::{CanLink, LinkRole};
 use taustream_drivers::sim::arguments::Arguments;
 use taustream_drivers::sim::serve::{StandardInput, serve};
-use taustream_drivers::sim::settings::{drives, queue_frames};
+use taustream_drivers::sim::settings::{drives, masses, queue_frames};
 use taustream_drivers::sim::{FaultRequest, LinkedSimulator, ServoSimulator, planted, priority};
 use taustream_drivers::{Nanos, link};
 
@@ -44,6 +44,9 @@ fn prepare(args: &Arguments) -> anyhow::Result<(Settings, LinkedSimulator)> {
         planted::plant(text, &mut setups).with_context(|| format!("--object {text}"))?;
     }
     let mut simulator = ServoSimulator::new(setups, settings.buses.len(), args.seed);
+    if let Some(masses) = masses(&settings)? {
+        simulator = simulator.with_masses(masses)?;
+    }
     let joints = simulator.joints();
     for text in &args.faults {
         let order = FaultRequest::parse(text, &joints).with_context(|| format!("--fault {text}"))?;

@@ -108,6 +108,10 @@ impl ServoModel for Drive {
     fn velocity_rad_s(&self) -> f64 {
         Self::velocity_rad_s(self)
     }
+    fn weigh(&mut self, weight_nm: f64) -> bool {
+        self.mechanics.plant.weight_nm = Some(weight_nm);
+        true
+    }
     fn node_id(&self) -> u8 {
         Self::node_id(self)
     }

@@ -54,6 +54,12 @@ pub trait ServoModel: Any + Debug + Send {
     fn node_id(&self) -> u8;
     /// Its states, for the operator: `key=value` words of its protocol.
     fn describe(&self) -> String;
+    /// From now on the weight of the arm's masses acts on the joint, this torque in the present pose, instead of a pendulum's.
+    /// False: this servo's mechanics cannot.
+    fn weigh(&mut self, weight_nm: f64) -> bool {
+        let _ = weight_nm;
+        false
+    }
     /// The same servo once more.
     fn boxed_clone(&self) -> Box<dyn ServoModel>;
 }

@@ -1,8 +1,9 @@
 //! The mechanics of one simulated joint: motor, gear and link as one inertia under torque, friction and gravity.
 //!
 //! Each joint stands alone: the gravity load is that of a pendulum on the joint's own angle, `m g l` at most, and
-//! neither couples to other joints nor changes with their pose. That is enough for what the simulator is for: an arm
-//! that falls when torque goes, that needs time and torque to follow, and that cannot jump.
+//! neither couples to other joints nor changes with their pose, unless the simulator weighs the arm's masses
+//! ([`Plant::weight_nm`]). The inertia is one number a joint in either case. That is enough for what the simulator is for:
+//! an arm that falls when torque goes, that needs time and torque to follow, and that cannot jump.
 //!
 //! Semi-implicit Euler with implicit dry friction: stable at rest (no chatter) and for any step well below the
 //! closed loop's time constants. Link side, SI units.
@@ -43,6 +44,8 @@ pub(crate) struct Plant {
     pub(crate) velocity_rad_s: f64,
     /// The joint is jammed.
     pub(crate) jammed: bool,
+    /// Torque of the arm's weight in its pose; `None`: the joint is a pendulum.
+    pub(crate) weight_nm: Option<f64>,
     energised: bool,
     brake_closed: bool,
     brake_shall_close: bool,
@@ -57,6 +60,7 @@ impl Plant {
             position_rad,
             velocity_rad_s: 0.0,
             jammed: false,
+            weight_nm: None,
             energised: false,
             brake_closed: parameters.brake,
             brake_shall_close: true,
@@ -88,7 +92,8 @@ impl Plant {
         self.move_brake(dt_s);
         let p = self.parameters;
         let motor_nm = if self.energised { self.available_nm(torque_nm) } else { 0.0 };
-        let gravity_nm = p.gravity_nm * (self.position_rad - p.gravity_level_rad).cos();
+        let pendulum_nm = p.gravity_nm * (self.position_rad - p.gravity_level_rad).cos();
+        let gravity_nm = self.weight_nm.unwrap_or(pendulum_nm);
         let brake_nm = if self.brake_closed { BRAKE_FACTOR * p.torque_nm_max } else { 0.0 };
 
         // Viscous friction implicitly, so that no coefficient can make it unstable.

@@ -13,6 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 use taustream_arm::{BusKind, Fault, Faults, MitGains, Servo, Settings};
 use taustream_motion::JointLimits;
+use taustream_motion::dynamics::Dynamics;
 use toml::{Table, Value};
 
 /// One servo and the joint that it moves.
@@ -47,6 +48,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
         settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
     section.plant_objects(&mut setups);
+    section.masses(settings);
     section.unknown_keys();
     let faults = section.faults.into_inner();
     if !faults.is_empty() {
@@ -78,11 +80,27 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
     if faults.is_empty() { Ok(frames as usize) } else { Err(Faults(faults)) }
 }
 
+/// The masses whose weight acts on the simulated joints, where the section says `gravity_of_masses = true`.
+///
+/// # Errors
+/// When the key is no flag, stands beside `gravity_nm`, or the robot file states no masses.
+pub fn masses(settings: &Settings) -> Result<Option<Dynamics>, Faults> {
+    let empty = Table::new();
+    let table = settings.simulator.as_ref().unwrap_or(&empty);
+    let joints = settings.robot.joints.len();
+    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let dynamics = section.masses(settings);
+    let faults = section.faults.into_inner();
+    if faults.is_empty() { Ok(dynamics) } else { Err(Faults(faults)) }
+}
+
+const GRAVITY_OF_MASSES: &str = "gravity_of_masses";
+
 /// A few cycles of a six-joint arm: enough for a burst, and an overload shows within a tenth of a second.
 const QUEUE_FRAMES: u32 = 64;
 
 /// Keys of every servo and of the buses; those of each protocol come beside them.
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 19] = [
     "bus_queue_frames",
     "start_rad",
     "inertia_kg_m2",
@@ -90,6 +108,7 @@ const KEYS: [&str; 18] = [
     "coulomb_nm",
     "gravity_nm",
     "gravity_level_rad",
+    GRAVITY_OF_MASSES,
     "torque_nm_max",
     "speed_rad_s_max",
     "brake",
@@ -267,6 +286,22 @@ impl Section<'_> {
         let simulated = SimulatedJoint { section: self, settings, servo, limits };
         let parameters = (known.simulate)(&simulated);
         Some(DriveSetup { joint: name, bus: servo.bus, parameters, objects: Vec::new() })
+    }
+
+    /// The masses whose weight acts on the joints, if it does.
+    fn masses(&self, settings: &Settings) -> Option<Dynamics> {
+        if !self.flag(GRAVITY_OF_MASSES, 0, false) {
+            return None;
+        }
+        if let Some(pendulum) = self.table.get("gravity_nm") {
+            self.fault("gravity_nm", &pendulum.to_string(), "one of gravity_nm and gravity_of_masses");
+        }
+        let dynamics = settings.robot.dynamics();
+        if dynamics.is_err() {
+            let expected = format!("false: robot {} states no masses", settings.robot.name);
+            self.fault(GRAVITY_OF_MASSES, "true", &expected);
+        }
+        dynamics.ok()
     }
 
     /// Objects of drives that hold something else than the parameters make.

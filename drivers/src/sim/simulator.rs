@@ -8,6 +8,8 @@ use super::settings::DriveSetup;
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use std::collections::VecDeque;
+use taustream_motion::MAX_JOINTS;
+use taustream_motion::dynamics::Dynamics;
 
 /// A joint moves when its drive steers it faster than this while enabled.
 const MOVING_RAD_S: f64 = 0.02;
@@ -46,10 +48,20 @@ pub struct Event {
     pub began: bool,
 }
 
+/// A servo whose simulation knows only the pendulum of its own joint.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the simulated servo of joint {joint} feels no masses; leave simulator.gravity_of_masses out")]
+pub struct FeelsNoMasses {
+    /// The joint.
+    pub joint: String,
+}
+
 /// All drives of an arm.
 #[derive(Clone, Debug)]
 pub struct ServoSimulator {
     units: Vec<Unit>,
+    /// The masses whose weight acts on the joints; none: each joint is a pendulum.
+    masses: Option<Dynamics>,
     faults: Vec<Pending>,
     /// Frames that a delay holds back, by due time, for each bus.
     held: Vec<VecDeque<(Nanos, CanFrame)>>,
@@ -74,12 +86,42 @@ impl ServoSimulator {
         });
         Self {
             units: units.collect(),
+            masses: None,
             faults: Vec::new(),
             held: vec![VecDeque::new(); buses],
             chance: seed,
             scratch: Vec::with_capacity(64),
             events: Vec::new(),
         }
+    }
+
+    /// The same arm, on whose joints the weight of these masses acts, in the pose that the arm is in.
+    ///
+    /// # Errors
+    /// When the simulation of a servo has no room for it.
+    pub fn with_masses(mut self, masses: Dynamics) -> Result<Self, FeelsNoMasses> {
+        self.masses = Some(masses);
+        match self.weigh() {
+            None => Ok(self),
+            Some(joint) => Err(FeelsNoMasses { joint }),
+        }
+    }
+
+    /// Puts the weight of the masses in the present pose on the joints. Returns a joint that does not feel it.
+    fn weigh(&mut self) -> Option<String> {
+        let masses = self.masses.as_ref()?;
+        let mut pose_rad = [0.0; MAX_JOINTS];
+        for (angle_rad, unit) in pose_rad.iter_mut().zip(&self.units) {
+            *angle_rad = unit.drive.position_rad();
+        }
+        let holding_nm = masses.holding_nm(&pose_rad);
+        let mut numb = None;
+        for (unit, holding_nm) in self.units.iter_mut().zip(holding_nm) {
+            if !unit.drive.weigh(-holding_nm) {
+                numb.get_or_insert_with(|| unit.joint.clone());
+            }
+        }
+        numb
     }
 
     /// Names of the joints, base to tip.
@@ -116,6 +158,7 @@ impl ServoSimulator {
 
     /// Lets time pass; `out` takes each bus's frames.
     pub fn advance(&mut self, now: Nanos, out: &mut [Vec<CanFrame>]) {
+        self.weigh();
         for at in 0..self.units.len() {
             self.with_drive(now, at, out, |drive, frames| drive.advance(now, frames));
         }

@@ -401,6 +401,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: simulator.gravity_nm", "Torque of the load where the link is level; 10."),
     ("Settings files: simulator.gravity_level_rad", "Angle at which the link is level; 0."),
     (
+        "Settings files: simulator.gravity_of_masses",
+        "true: the weight of the robot file's masses acts on the joints, in the arm's pose, instead of `gravity_nm`; false.",
+    ),
+    (
         "Settings files: simulator.torque_nm_max",
         "Torque limit of the motor; enough for the joint's stop limits.",
     ),

@@ -3,9 +3,9 @@ use super::bench::{Bench, NODE, enabled, parameters};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use std::path::Path;
 use taustream_arm::Settings;
-use taustream_drivers::sim::settings::{drives, queue_frames};
-use taustream_drivers::sim::{DriveParameters, FaultRequest, SimulatorCommand};
-use taustream_drivers::{CanFrame, CanId};
+use taustream_drivers::sim::settings::{drives, masses, queue_frames};
+use taustream_drivers::sim::{DriveParameters, FaultRequest, ServoSimulator, SimulatorCommand};
+use taustream_drivers::{CanFrame, CanId, Nanos};
 
 fn joints() -> Vec<String> {
     ["base", "elbow", "wrist"].map(str::to_owned).to_vec()
@@ -154,6 +154,61 @@ fn keys_of_modelled_buses_are_checked_too() {
     assert_eq!(queue_frames(&settings_with("")), Ok(64));
     let text = drives(&settings_with("dummy_mapping = 3"), None).unwrap_err().to_string();
     assert!(text.contains("simulator.dummy_mapping = 3: expected true or false"), "{text}");
+}
+
+#[test]
+fn weight_of_masses_stands_instead_of_pendulums_and_needs_masses() {
+    let both = settings_with("gravity_of_masses = true\ngravity_nm = 3.0");
+    let text = drives(&both, None).unwrap_err().to_string();
+    assert!(
+        text.contains("simulator.gravity_nm = 3.0: expected one of gravity_nm and gravity_of_masses"),
+        "{text}"
+    );
+    let mut massless = settings_with("gravity_of_masses = true");
+    massless.robot.masses.clear();
+    let text = masses(&massless).unwrap_err().to_string();
+    assert!(
+        text.contains("simulator.gravity_of_masses = true: expected false: robot ur5 states no masses"),
+        "{text}"
+    );
+    let text = drives(&settings_with("gravity_of_masses = 1"), None).unwrap_err().to_string();
+    assert!(text.contains("simulator.gravity_of_masses = 1: expected true or false"), "{text}");
+    assert_eq!(masses(&settings_with("")), Ok(None));
+    assert_eq!(
+        masses(&settings_with("gravity_of_masses = true")),
+        Ok(settings_with("").robot.dynamics().ok())
+    );
+}
+
+/// Goal: a limp arm falls as its masses pull, joints behind others included, and not as pendulums.
+#[test]
+fn limp_arm_that_feels_its_masses_falls_by_their_weight() {
+    let settings =
+        settings_with("gravity_of_masses = true\ncoulomb_nm = 0.0\nviscous_nm_s_rad = 0.0\nbrake = false");
+    let start_rad = [0.0, -0.7, 0.9, -0.4, 0.3, 0.0];
+    let setups = drives(&settings, Some(&start_rad)).unwrap_or_else(|faults| panic!("{faults}"));
+    let inertia_kg_m2: Vec<f64> = setups
+        .iter()
+        .map(|setup| setup.parameters.get::<DriveParameters>().unwrap().plant.inertia_kg_m2)
+        .collect();
+    let dynamics = masses(&settings).unwrap().unwrap();
+    let mut pose_rad = [0.0; 8];
+    pose_rad[..6].copy_from_slice(&start_rad);
+    let holding_nm = dynamics.holding_nm(&pose_rad);
+    let mut simulator = ServoSimulator::new(setups, 1, 1).with_masses(dynamics).unwrap();
+    let mut out = vec![Vec::new()];
+    for ms in 0..=10_u64 {
+        simulator.advance(Nanos(1_000_000_000 + ms * 1_000_000), &mut out);
+    }
+    for joint in 0..6 {
+        let fell_rad = simulator.drive(joint).unwrap().position_rad() - start_rad[joint];
+        // a t^2 / 2 over 10 ms.
+        let expected_rad = -holding_nm[joint] / inertia_kg_m2[joint] * 0.5e-4;
+        assert!(
+            (fell_rad - expected_rad).abs() < 0.05 * expected_rad.abs() + 1e-9,
+            "{joint}: {fell_rad}, {expected_rad}"
+        );
+    }
 }
 
 #[test]

@@ -391,6 +391,10 @@ impl ServoModel for Motor {
     fn velocity_rad_s(&self) -> f64 {
         self.mechanics.plant.velocity_rad_s
     }
+    fn weigh(&mut self, weight_nm: f64) -> bool {
+        self.mechanics.plant.weight_nm = Some(weight_nm);
+        true
+    }
     fn node_id(&self) -> u8 {
         self.parameters.node_id
     }
