@@ -126,7 +126,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
     for mut table in tables {
         let joint = read_joint(&mut table, robot, &mut bound_joints);
         let bus = read_bus(&mut table, buses);
-        let servo = read_servo(&mut table, robot, joint, bus);
+        let servo = read_servo(&mut table, joint, bus);
         busy.extend(bus);
         if let Some(servo) = &servo {
             if nodes.insert((servo.bus, servo.protocol.name(), servo.node_id)) {
@@ -202,11 +202,10 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
 /// Nothing here but `after_stall` has a default: each of these moves the arm, or says how it falls.
 fn read_servo(
     table: &mut Table<'_>,
-    robot: Option<&Robot>,
     joint: Option<usize>,
     bus: Option<usize>,
 ) -> Option<Servo> {
-    let (node_id, protocol) = protocol::read(table, robot);
+    let (node_id, protocol) = protocol::read(table);
     let sign = table.need("sign", SIGN_WORDS).and_then(|node| sign_of(table, &node));
     let zero_offset_rad = table.number("zero_offset_rad", &ZERO_RAD);
     let feedback = trust::read_feedback(table);

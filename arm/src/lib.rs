@@ -75,6 +75,7 @@ pub use protocol::cubemars::CubeMars;
 pub use protocol::damiao::{Damiao, DamiaoMode};
 pub use protocol::motors::{MitGains, WireRanges};
 pub use protocol::robstride::RobStride;
+pub use protocol::myactuator::{MyActuator, MyActuatorMode};
 pub use robot::{LinkShape, Robot, RobotJoint};
 pub use runtime::RuntimeError;
 pub use scene::{Obstacle, Scene, Shape};

@@ -10,6 +10,7 @@ pub mod cubemars;
 pub mod damiao;
 pub(crate) mod identifiers;
 pub(crate) mod motors;
+pub mod myactuator;
 pub mod odrive;
 pub mod piper;
 pub mod robstride;
@@ -18,10 +19,9 @@ use crate::bus_load::flow::Flow;
 use crate::bus_load::frame::Format;
 use crate::document::shown;
 use crate::reader::{FaultList, Table};
-use crate::robot::{Robot, RobotJoint};
+use crate::robot::RobotJoint;
 use crate::settings::{Bus, BusKind, Servo, Settings};
 use crate::stall::AfterStall;
-use crate::text::counted;
 use crate::trust::Reaction;
 use identifiers::Use;
 use serde_json::Value;
@@ -30,13 +30,14 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Every protocol.
-const REGISTRY: [Registration; 6] = [
+const REGISTRY: [Registration; 7] = [
     cia402::REGISTRATION,
     damiao::REGISTRATION,
     odrive::REGISTRATION,
     piper::REGISTRATION,
     robstride::REGISTRATION,
     cubemars::REGISTRATION,
+    myactuator::REGISTRATION,
 ];
 
 /// How a protocol is found in settings files.
@@ -193,24 +194,8 @@ fn expected() -> String {
     format!("{} or {last}", others.join(", "))
 }
 
-/// What is known by name and not spoken yet: not a slip of the pen, so it is not called unknown.
-const LATER: [&str; 3] = ["robstride", "myactuator", "cubemars"];
-
-fn later_words(name: &str, robot: Option<&Robot>) -> String {
-    let sound = robot.map_or_else(String::new, |robot| {
-        let (joints, shapes) = (robot.joints.len(), robot.shapes.len());
-        format!(
-            "; the robot itself is valid ({}: {}, {}), so `plan --robot` can use it",
-            robot.name,
-            counted(joints, "joint"),
-            counted(shapes, "collision shape")
-        )
-    });
-    format!("{name} is known and comes in a later version{sound}")
-}
-
-/// Reads node id and protocol of a servo; the robot only lends words to a refusal.
-pub(crate) fn read(table: &mut Table<'_>, robot: Option<&Robot>) -> (Option<u8>, Option<Protocol>) {
+/// Reads node id and protocol of a servo.
+pub(crate) fn read(table: &mut Table<'_>) -> (Option<u8>, Option<Protocol>) {
     let expected = expected();
     let name = table.text("protocol", &expected);
     let known = name.as_deref().and_then(|name| REGISTRY.iter().find(|known| known.name == name));
@@ -218,9 +203,7 @@ pub(crate) fn read(table: &mut Table<'_>, robot: Option<&Robot>) -> (Option<u8>,
         return (read_id(table, known.node_id), (known.read)(table));
     }
     if let Some(name) = name {
-        let later = LATER.contains(&name.as_str());
-        let words = if later { format!("{expected}; {}", later_words(&name, robot)) } else { expected };
-        table.fault("protocol", &shown(&name), &words);
+        table.fault("protocol", &shown(&name), &expected);
     }
     // Their protocol is unknown, so none of them is called unknown.
     for key in REGISTRY.iter().flat_map(|known| known.keys) {

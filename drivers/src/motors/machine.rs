@@ -210,14 +210,15 @@ impl<M: AnsweringMotor> Machine<M> {
         if self.requested == Some(Ask::Refresh) {
             self.requested = None;
         }
-        // Its scale is unknown before the ranges were read.
-        let known = !matches!(
-            self.stage,
-            MotorStage::Observe { .. }
-                | MotorStage::Unowned
-                | MotorStage::Configure { .. }
-                | MotorStage::Refused { .. }
-        );
+        // Its scale is unknown before the ranges were read, and not every reply tells an angle.
+        let known = feedback.state.position_rad.is_finite()
+            && !matches!(
+                self.stage,
+                MotorStage::Observe { .. }
+                    | MotorStage::Unowned
+                    | MotorStage::Configure { .. }
+                    | MotorStage::Refused { .. }
+            );
         if known {
             (self.measured, self.measured_at) = (feedback.state, now);
         }

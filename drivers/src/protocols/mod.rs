@@ -11,6 +11,7 @@
 mod cia402;
 pub mod cubemars;
 pub mod damiao;
+pub mod myactuator;
 pub mod odrive;
 pub mod piper;
 pub mod robstride;
@@ -25,13 +26,14 @@ use taustream_arm::Settings;
 use taustream_motion::MAX_JOINTS;
 
 /// Every protocol.
-pub(crate) const REGISTRY: [Registration; 6] = [
+pub(crate) const REGISTRY: [Registration; 7] = [
     cia402::REGISTRATION,
     damiao::REGISTRATION,
     odrive::REGISTRATION,
     piper::REGISTRATION,
     robstride::REGISTRATION,
     cubemars::REGISTRATION,
+    myactuator::REGISTRATION,
 ];
 
 /// What a protocol brings.

@@ -194,6 +194,16 @@ impl SimulatedJoint<'_> {
         })
     }
 
+    /// A text, if there is one.
+    pub(crate) fn text(&self, key: &'static str) -> Option<String> {
+        let value = self.section.of_joint(key, self.servo.joint)?;
+        let text = value.as_str().map(str::to_owned);
+        if text.is_none() {
+            self.section.fault(&self.section.path(key, self.servo.joint), &value.to_string(), "a text");
+        }
+        text
+    }
+
     /// Kind of its bus.
     pub(crate) fn bus_kind(&self) -> Option<BusKind> {
         self.settings.buses.get(self.servo.bus).map(|bus| bus.kind)
