@@ -237,8 +237,9 @@ impl Server {
                     let (position_rad, velocity_rad_s) = (drive.position_rad(), drive.velocity_rad_s());
                     say(&format!(
                         "status joint={name} node={} position_rad={position_rad} \
-                         velocity_rad_s={velocity_rad_s} {}",
+                         velocity_rad_s={velocity_rad_s} energised={} {}",
                         drive.node_id(),
+                        drive.is_enabled(),
                         drive.describe(),
                     ));
                 }

@@ -8,9 +8,9 @@ use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 /// What a motor of the arm is commanded in the newest cycle.
 fn command(arm: &Arm, joint: usize) -> Option<MitCommand> {
     let spans = MitRanges::symmetric(12.5, 45.0, 24.0);
-    requests(arm, arm.settings.servos[joint].node_id).into_iter().find_map(|request| match request {
-        Request::Motion(bytes) => Some(MitCommand::decode(bytes, &spans)),
-        _ => None,
+    requests(arm, arm.settings.servos[joint].node_id).into_iter().find_map(|request| {
+        let Request::Motion(bytes) = request else { return None };
+        Some(MitCommand::decode(bytes, &spans))
     })
 }
 

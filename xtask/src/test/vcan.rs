@@ -22,10 +22,11 @@ pub(super) const STEPS: &[Step] = &[
     // Ways to carry setpoints: over two buses with modelled bit rates, and packed, staggered and rarer over one.
     step("scenarios with dual-bus", |place| three_goals(place, "dual-bus")),
     step("scenarios with one-bus", |place| three_goals(place, "one-bus")),
-    step("scenarios of Damiao motors", |place| scenarios(place, "damiao-scenarios", &[])),
+    step("scenarios of Damiao motors", |place| scenarios(place, "motor-scenarios", &[])),
     step("scenarios of Damiao motors over CAN FD", |place| {
-        scenarios(place, "damiao-scenarios", &["--fd", "--only", "goals"])
+        scenarios(place, "motor-scenarios", &["--fd", "--only", "goals"])
     }),
+    step("scenarios of MyActuator motors", |place| motor_goals(place, "rmd6")),
     step("figures", figures),
 ];
 
@@ -82,6 +83,12 @@ fn damiao_master(place: &Place) -> Result<Outcome> {
 fn three_goals(place: &Place, settings: &str) -> Result<Outcome> {
     let file = format!("config/settings/{settings}.toml");
     scenarios(place, "scenarios", &["--settings", &file, "--only", "three_goals"])
+}
+
+/// Three goals with a pause; the other scenarios of a protocol by the command of docs/testing.md.
+fn motor_goals(place: &Place, settings: &str) -> Result<Outcome> {
+    let file = format!("config/settings/{settings}.toml");
+    scenarios(place, "motor-scenarios", &["--settings", &file, "--only", "goals"])
 }
 
 fn scenarios(place: &Place, program: &str, further: &[&str]) -> Result<Outcome> {

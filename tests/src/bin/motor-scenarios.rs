@@ -1,21 +1,22 @@
-//! Runs the scenarios of Damiao motors on a real vcan0 and checks their recordings. Meant to run inside the test machine.
+//! Runs the scenarios of motors of any protocol but CiA 402 on a real vcan0 and checks their recordings. Meant to run inside the test machine.
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use taustream_tests::damiao_scenarios::{ALL, Scenario};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
-use taustream_tests::mit_setpoints::{LogEnds, check_setpoints, encodings};
+use taustream_tests::mit_setpoints::{self, LogEnds, check_setpoints};
+use taustream_tests::motor_commands;
+use taustream_tests::motor_scenarios::{ALL, Scenario};
 use taustream_tests::retry::{Failed, passes};
 use taustream_tests::scenarios::Goals;
 use taustream_tests::setpoints::BusFrame;
 use taustream_tests::test_bench::{Place, TestBench};
 use taustream_tests::{candump, cycle_log};
 
-/// Runs the scenarios of Damiao motors over the real processes on a real vcan0.
+/// Runs the scenarios of motors over the real processes on a real vcan0.
 #[derive(Parser, Debug)]
 struct Arguments {
-    /// Settings of an arm of Damiao motors in MIT mode.
+    /// Settings of an arm of motors on one bus.
     #[arg(long, default_value = "config/settings/damiao6.toml")]
     settings: PathBuf,
     /// Puts the arm on a bus of CAN FD, 1 and 5 Mbit/s, which the simulator models.
@@ -25,7 +26,7 @@ struct Arguments {
     #[arg(long, default_value = "config/demo.toml")]
     demo: PathBuf,
     /// Folder for logs and recordings.
-    #[arg(long, default_value = "target/damiao-scenarios")]
+    #[arg(long, default_value = "target/motor-scenarios")]
     output: PathBuf,
     /// Only scenarios whose name contains this.
     #[arg(long, default_value = "")]
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
         Ok(0) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("damiao-scenarios: {error:#}");
+            eprintln!("motor-scenarios: {error:#}");
             ExitCode::FAILURE
         }
     }
@@ -58,7 +59,7 @@ fn run(arguments: &Arguments) -> Result<usize> {
 
 fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) -> Result<String, Failed> {
     let mut bench = TestBench::open(place, &format!("{}-{attempt}", scenario.name))?;
-    let motors = encodings(&bench.settings).context("not every servo is a Damiao motor in MIT mode")?;
+    let settings = bench.settings.clone();
     let period_s = f64::from(bench.settings.cycle.period_us) * 1e-6;
     let bus = bench.settings.buses.first().context("no bus")?.clone();
     let interface = bus.interface.clone();
@@ -84,9 +85,14 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
         text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
     }
     let ends = if scenario.kills { LogEnds::Early } else { LogEnds::WithTheStreamer };
-    let check_result = check_setpoints((&frames, &cycle_log::parse(&text)?), 0, (&motors, period_s), ends)?;
+    let log = cycle_log::parse(&text)?;
+    // Damiao motors have a checker that compares gains and velocities too.
+    let check_result = match mit_setpoints::encodings(&settings) {
+        Some(motors) => check_setpoints((&frames, &log), 0, (&motors, period_s), ends)?,
+        None => motor_commands::check(&frames, &log, &settings, ends)?,
+    };
     // A recording without motion would pass every comparison.
-    if check_result.on_trajectory == 0 {
+    if check_result.on_trajectory == 0 || check_result.setpoints == 0 {
         return Err(anyhow!("nothing was compared with a trajectory").into());
     }
     Ok(check_result.to_string())
@@ -110,7 +116,7 @@ fn on_fd(settings: &Path) -> Result<PathBuf> {
     let bus = "bitrate_bit_s = 1000000\ndata_bitrate_bit_s = 5000000";
     let on_fd = text.replace("virtual = true", bus);
     ensure!(on_fd != text, "{} has no virtual bus to replace", settings.display());
-    let file = settings.with_file_name("damiao6-fd.toml");
+    let file = settings.with_file_name("motors-fd.toml");
     std::fs::write(&file, on_fd)?;
     Ok(file)
 }
