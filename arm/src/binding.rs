@@ -200,11 +200,7 @@ fn read_bus(table: &mut Table<'_>, buses: &[Option<Bus>]) -> Option<usize> {
 }
 
 /// Nothing here but `after_stall` has a default: each of these moves the arm, or says how it falls.
-fn read_servo(
-    table: &mut Table<'_>,
-    joint: Option<usize>,
-    bus: Option<usize>,
-) -> Option<Servo> {
+fn read_servo(table: &mut Table<'_>, joint: Option<usize>, bus: Option<usize>) -> Option<Servo> {
     let (node_id, protocol) = protocol::read(table);
     let sign = table.need("sign", SIGN_WORDS).and_then(|node| sign_of(table, &node));
     let zero_offset_rad = table.number("zero_offset_rad", &ZERO_RAD);

@@ -88,7 +88,12 @@ fn commanded(servo: &Servo, frame: &BusFrame) -> Option<Commanded> {
 ///
 /// # Errors
 /// The first flaw.
-pub fn check(frames: &[BusFrame], log: &[Event], settings: &Settings, ends: LogEnds) -> Result<CheckResult, Flaw> {
+pub fn check(
+    frames: &[BusFrame],
+    log: &[Event],
+    settings: &Settings,
+    ends: LogEnds,
+) -> Result<CheckResult, Flaw> {
     let mut check_result = CheckResult { frames: frames.len(), ..CheckResult::default() };
     let mut path = PathCheck::default();
     let mut cycles: Vec<&LoggedCycle> = Vec::new();
@@ -114,7 +119,8 @@ pub fn check(frames: &[BusFrame], log: &[Event], settings: &Settings, ends: LogE
         let on_bus: Vec<Commanded> = frames.iter().filter_map(|frame| commanded(servo, frame)).collect();
         check_result.setpoints += compare_joint(servo.joint, &on_bus, &cycles, ends)?;
     }
-    check_result.last_setpoint_rad = cycles.last().map(|cycle| cycle.position_rad.clone()).unwrap_or_default();
+    check_result.last_setpoint_rad =
+        cycles.last().map(|cycle| cycle.position_rad.clone()).unwrap_or_default();
     Ok(check_result)
 }
 
@@ -130,7 +136,8 @@ fn compare_joint(
     for cycle in cycles.iter().filter(|cycle| cycle.joint_sent.get(joint) == Some(&true)) {
         let flaw = |what: String| Flaw::Bus { sync: 0, tick: cycle.tick, what };
         let wanted_rad = cycle.position_rad.get(joint).copied().unwrap_or(f64::NAN);
-        let agrees = |command: &Commanded| (command.position_rad - wanted_rad).abs() <= command.half_rad + ROOM_RAD;
+        let agrees =
+            |command: &Commanded| (command.position_rad - wanted_rad).abs() <= command.half_rad + ROOM_RAD;
         let found = rest.by_ref().find(|command| command.holds || agrees(command));
         match found {
             Some(command) if agrees(command) => compared += 1,
@@ -147,7 +154,9 @@ fn compare_joint(
     let unknown = rest.filter(|command| command.holds).count();
     if unknown > 0 && ends == LogEnds::WithTheStreamer {
         let joint = joint + 1;
-        return Err(Flaw::Log(format!("joint {joint} was commanded {unknown} times that the log does not know")));
+        return Err(Flaw::Log(format!(
+            "joint {joint} was commanded {unknown} times that the log does not know"
+        )));
     }
     Ok(compared)
 }

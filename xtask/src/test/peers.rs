@@ -115,7 +115,6 @@ fn piper_frames(place: &Place) -> Result<Outcome> {
     frames(place, what, "piper_frames.py", "drivers/tests/piper_suite/frames.csv")
 }
 
-
 /// Frames of `RobStride` motors as two independent libraries pack and read them.
 fn robstride_frames(place: &Place) -> Result<Outcome> {
     let what = "frames of RobStride motors by two independent libraries";

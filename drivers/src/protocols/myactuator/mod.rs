@@ -13,7 +13,7 @@ use crate::motors::{MotorDriver, fault};
 use taustream_arm::Settings;
 
 /// Upper half of the error codes.
-const CODES: u16 = 3;
+const CODES: u16 = 5;
 
 pub(super) const REGISTRATION: Registration = Registration {
     name: "myactuator",
