@@ -8,7 +8,8 @@ use crate::mit_setpoints::LogEnds;
 use crate::on_path::PathCheck;
 use crate::setpoints::{BusFrame, CheckResult, Flaw};
 use std::f64::consts::{PI, TAU};
-use taustream_arm::{CubeMars, MyActuator, MyActuatorMode, Odrive, RobStride, Servo, Settings};
+use taustream_arm::protocol::odrive::Odrive;
+use taustream_arm::{CubeMars, MyActuator, MyActuatorMode, RobStride, Servo, Settings};
 
 /// Flag of a 29-bit identifier.
 const EXTENDED: u32 = 0x8000_0000;

@@ -83,6 +83,11 @@ fn ak6() {
 }
 
 #[test]
+fn odrive6() {
+    seeds_of("odrive6");
+}
+
+#[test]
 fn pos_vel() {
     seeds_of("pos-vel");
 }

@@ -1,6 +1,8 @@
 //! The setpoints that a frame holds for each joint, read by decoders that share nothing with the product's.
 use crate::mit_setpoints::MotorEncoding;
 use crate::setpoints::{Encoding, target};
+use taustream_arm::protocol::odrive::Odrive;
+use taustream_arm::protocol::piper::Piper;
 use taustream_arm::{Cia402, Damiao, DamiaoMode, RobStride, Settings};
 use taustream_drivers::CanFrame;
 use taustream_drivers::sim::{ServoModel, ServoSimulator};
@@ -15,6 +17,12 @@ const OPERATION: u32 = 0x8100_0000;
 const OPERATION_BITS: u32 = 0xFF00_00FF;
 /// Half the distance between two neighbouring numbers of 32 bits below 8 rad.
 const FLOAT_HALF_RAD: f64 = 2.4e-7;
+/// The same below 32 turns.
+const FLOAT_HALF_TURNS: f64 = 9.6e-7;
+/// `Set_Input_Pos`, below the node id.
+const INPUT_POSITION: u32 = 0x0C;
+/// Targets of the first pair of joints.
+const PAIRS: u32 = 0x155;
 
 /// One setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +44,10 @@ enum Kind {
     Operation { node_id: u8, reach_rad: f64, sign: f64, zero_rad: f64 },
     /// A number of 32 bits.
     PosVel { node_id: u8, sign: f64, zero_rad: f64 },
+    /// Turns of a motor, a number of 32 bits.
+    Turns { node_id: u8, turns_a_rad: f64, zero_rad: f64 },
+    /// Thousandths of degrees, in a frame of two joints.
+    Millidegrees { number: u8, sign: f64, zero_rad: f64 },
 }
 
 /// One servo on its bus.
@@ -68,6 +80,15 @@ impl SetpointReader {
                         / std::f64::consts::TAU,
                     zero_rad: servo.zero_offset_rad,
                 })
+            } else if let Some(odrive) = servo.protocol.get::<Odrive>() {
+                Kind::Turns {
+                    node_id: servo.node_id,
+                    turns_a_rad: servo.sign * odrive.gear_ratio / std::f64::consts::TAU,
+                    zero_rad: servo.zero_offset_rad,
+                }
+            } else if servo.protocol.get::<Piper>().is_some() {
+                let (number, sign, zero_rad) = (servo.node_id, servo.sign, servo.zero_offset_rad);
+                Kind::Millidegrees { number, sign, zero_rad }
             } else if let Some(robstride) = servo.protocol.get::<RobStride>() {
                 Kind::Operation {
                     node_id: servo.node_id,
@@ -99,7 +120,11 @@ impl SetpointReader {
             let counts: Vec<(usize, Encoding)> = own
                 .filter_map(|servo| match servo.kind {
                     Kind::Counts(encoding) => Some((servo.joint, encoding)),
-                    Kind::Mit(_) | Kind::Operation { .. } | Kind::PosVel { .. } => None,
+                    Kind::Mit(_)
+                    | Kind::Operation { .. }
+                    | Kind::PosVel { .. }
+                    | Kind::Turns { .. }
+                    | Kind::Millidegrees { .. } => None,
                 })
                 .collect();
             let pair = counts.chunks_exact(2).find(|pair| RPDO2 + u32::from(pair[0].1.node_id) == id);
@@ -121,6 +146,8 @@ impl SetpointReader {
             Kind::Mit(motor) => motor.reach[0] / 65_535.0,
             Kind::Operation { reach_rad, .. } => reach_rad / 65_535.0,
             Kind::PosVel { .. } => FLOAT_HALF_RAD,
+            Kind::Turns { turns_a_rad, .. } => FLOAT_HALF_TURNS / turns_a_rad.abs(),
+            Kind::Millidegrees { .. } => 0.5e-3_f64.to_radians(),
         })
     }
 
@@ -156,6 +183,18 @@ impl Reading {
                 let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
                 let is_setpoint = id == POS_VEL + u32::from(node_id) && data.len() == 8;
                 is_setpoint.then(|| f64::from(f32::from_le_bytes(bytes)) * sign + zero_rad)
+            }
+            Kind::Turns { node_id, turns_a_rad, zero_rad } => {
+                let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
+                let is_setpoint = id == u32::from(node_id) * 32 + INPUT_POSITION && data.len() == 8;
+                is_setpoint.then(|| f64::from(f32::from_le_bytes(bytes)) / turns_a_rad + zero_rad)
+            }
+            Kind::Millidegrees { number, sign, zero_rad } => {
+                let (pair, second) = (u32::from(number - 1) / 2, number % 2 == 0);
+                let from = if second { 4 } else { 0 };
+                let bytes: [u8; 4] = data.get(from..from + 4)?.try_into().ok()?;
+                let degrees = f64::from(i32::from_be_bytes(bytes)) * 1e-3;
+                (id == PAIRS + pair).then(|| degrees.to_radians() * sign + zero_rad)
             }
         }?;
         Some(ReadSetpoint { joint: self.joint, position_rad })

@@ -23,7 +23,7 @@ pub(super) const REGISTRATION: Registration = Registration {
     words: Some(CodeWords {
         codes: CODES,
         explain: |code, has_cable| fault::explain(&table::WORDS, code, has_cable),
-        explain_refusal: |code, object| fault::explain_refusal(&table::WORDS, code, object),
+        explain_refusal: |refusal| fault::explain_refusal(&table::WORDS, refusal.code, refusal.object),
     }),
     status: table::status_text,
 };
