@@ -109,14 +109,13 @@ fn robot(template: &Robot, seed: u64) -> Robot {
         }
     }
     let joint = template.joints[0].clone();
-    Robot {
-        joints: vec![joint; count],
-        chain: Chain::new(&joints).expect("one to eight"),
-        links: (0..=count).map(|i| format!("l{i}")).collect(),
-        shapes,
-        allowed_by_rule: Vec::new(),
-        ..template.clone()
-    }
+    let mut robot = template.clone();
+    robot.joints = vec![joint; count];
+    robot.chain = Chain::new(&joints).expect("one to eight");
+    robot.links = (0..=count).map(|i| format!("l{i}")).collect();
+    robot.shapes = shapes;
+    robot.allowed_by_rule = Vec::new();
+    robot
 }
 
 fn kind(shape: &Shape) -> usize {

@@ -4,6 +4,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
+    clippy::disallowed_macros,
     reason = "helpers of tests fail by panicking"
 )]
 #![expect(dead_code, reason = "helpers that other tests use")]

@@ -36,14 +36,7 @@ pub struct DriveSetup {
 pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<DriveSetup>, Faults> {
     let empty = Table::new();
     let table = settings.simulator.as_ref().unwrap_or(&empty);
-    let joints = settings.robot.joints.len();
-    let section = Section {
-        table,
-        file: &settings.file,
-        joints,
-        faults: RefCell::default(),
-        shared: RefCell::default(),
-    };
+    let section = Section::new(settings, table);
     let mut setups: Vec<DriveSetup> =
         settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
     setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
@@ -67,14 +60,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
 pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
     let empty = Table::new();
     let table = settings.simulator.as_ref().unwrap_or(&empty);
-    let joints = settings.robot.joints.len();
-    let section = Section {
-        table,
-        file: &settings.file,
-        joints,
-        faults: RefCell::default(),
-        shared: RefCell::default(),
-    };
+    let section = Section::new(settings, table);
     let frames: u32 = section.whole("bus_queue_frames", 0, QUEUE_FRAMES, 1..=4096);
     let faults = section.faults.into_inner();
     if faults.is_empty() { Ok(frames as usize) } else { Err(Faults(faults)) }
@@ -87,8 +73,7 @@ pub fn queue_frames(settings: &Settings) -> Result<usize, Faults> {
 pub fn masses(settings: &Settings) -> Result<Option<Dynamics>, Faults> {
     let empty = Table::new();
     let table = settings.simulator.as_ref().unwrap_or(&empty);
-    let joints = settings.robot.joints.len();
-    let section = Section { table, file: &settings.file, joints, faults: RefCell::default() };
+    let section = Section::new(settings, table);
     let dynamics = section.masses(settings);
     let faults = section.faults.into_inner();
     if faults.is_empty() { Ok(dynamics) } else { Err(Faults(faults)) }
@@ -283,6 +268,18 @@ impl SimulatedJoint<'_> {
             integral_time_s: self.number("integral_time_ms", 20.0, 5.0..=1000.0) * 1e-3,
             torque_lag_s: self.number("torque_lag_ms", 0.3, 0.0..=0.5) * 1e-3,
             extrapolation_s: self.number("extrapolation_ms", 0.0, 0.0..=1000.0) * 1e-3,
+        }
+    }
+}
+
+impl<'a> Section<'a> {
+    fn new(settings: &'a Settings, table: &'a Table) -> Self {
+        Self {
+            table,
+            file: &settings.file,
+            joints: settings.robot.joints.len(),
+            faults: RefCell::default(),
+            shared: RefCell::default(),
         }
     }
 }

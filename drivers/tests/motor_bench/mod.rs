@@ -112,7 +112,7 @@ impl Arm {
     /// What an operator reads about a servo.
     pub(crate) fn why(&self, joint: usize) -> String {
         let status = self.status(joint);
-        taustream_drivers::bring_up::explain_refusal(&status.refusal())
+        taustream_drivers::words::explain_refusal(&status.refusal())
     }
 
     /// Sets the commands to where the joints are, as the streamer does before it enables.

@@ -23,8 +23,8 @@ fn arm_is_asked_and_compared_and_nothing_of_it_is_changed() {
 fn angles_are_those_of_the_links() {
     let mut bench = Bench::with(|_, parameters| parameters.plant.gravity_nm = 0.0);
     bench.until(DriveState::Disabled);
-    for joint in 0..JOINTS {
-        let away_rad = bench.status(joint).position_rad - START_RAD[joint];
+    for (joint, start_rad) in START_RAD.iter().enumerate() {
+        let away_rad = bench.status(joint).position_rad - start_rad;
         assert!(away_rad.abs() < 2e-5, "joint {joint} is {away_rad} rad away");
     }
 }

@@ -9,15 +9,15 @@ use taustream_drivers::{
 fn arm_holds_where_it_stands_and_follows_a_motion() {
     let mut bench = Bench::enabled();
     let from: Vec<f64> = (0..JOINTS).map(|joint| bench.commands[joint].position_rad).collect();
-    for joint in 0..JOINTS {
-        let moved_rad = bench.arm[joint].position_rad() - from[joint];
+    for (joint, from_rad) in from.iter().enumerate() {
+        let moved_rad = bench.arm[joint].position_rad() - from_rad;
         assert!(moved_rad.abs() < 0.01, "joint {joint} moved by {moved_rad} rad while it was energised");
     }
     let mut worst_rad = 0.0_f64;
     for cycle in 1..=300 {
         let phase = std::f64::consts::PI * f64::from(cycle) / 300.0;
-        for joint in 0..JOINTS {
-            bench.commands[joint].position_rad = from[joint] + 0.2 * (1.0 - phase.cos());
+        for (joint, from_rad) in from.iter().enumerate() {
+            bench.commands[joint].position_rad = from_rad + 0.2 * (1.0 - phase.cos());
         }
         bench.step();
         for joint in 0..JOINTS {

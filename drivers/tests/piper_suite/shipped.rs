@@ -85,8 +85,8 @@ fn shipped_settings_drive_the_simulated_arm() {
     let from: Vec<f64> = arm.commands.iter().map(|command| command.position_rad).collect();
     for cycle in 1..=400 {
         let phase = std::f64::consts::PI * f64::from(cycle) / 400.0;
-        for joint in 0..6 {
-            arm.commands[joint].position_rad = from[joint] + 0.2 * (1.0 - phase.cos());
+        for (command, from_rad) in arm.commands.iter_mut().zip(&from).take(6) {
+            command.position_rad = from_rad + 0.2 * (1.0 - phase.cos());
         }
         arm.step();
     }

@@ -3,6 +3,7 @@ use super::{HOST, edited, energised, motor_of, request, requests};
 use crate::motor_bench::{Arm, JOINTS, START_RAD};
 use std::f64::consts::PI;
 use taustream_drivers::codec::mit::MitCommand;
+use taustream_drivers::protocols::robstride::RobStrideParameters;
 use taustream_drivers::protocols::robstride::frames::{Operation, Request, ranges};
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, protocols};
 
@@ -72,7 +73,7 @@ fn mode_of_the_motor_is_written_read_back_and_never_stored() {
 /// Goal: a motor of another model, or whose field spans something else than the settings say, is refused with what it holds.
 #[test]
 fn motor_of_another_type_or_range_is_refused_with_parameter_and_value() {
-    type Change = fn(&mut taustream_drivers::protocols::robstride::RobStrideParameters);
+    type Change = fn(&mut RobStrideParameters);
     let changes: [(Change, &str); 4] = [
         (|motor| motor.torque_limit_nm = 17.0, "parameter 0x700B (limit_torque) of the motor holds 17"),
         // It reads 1.0 rad on a field of +-4 pi as 1.0 / 4 pi of its range.

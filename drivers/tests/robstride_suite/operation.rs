@@ -12,9 +12,9 @@ fn command(arm: &Arm, joint: usize) -> Option<MitCommand> {
     let motor = servo.protocol.get::<RobStride>()?;
     let [stiffness, damping] = motor.gains_max;
     let reach = [motor.ranges.position_rad, motor.ranges.velocity_rad_s, motor.ranges.torque_nm];
-    requests(arm, servo.node_id).into_iter().find_map(|request| match request {
-        Request::Operation(operation) => Some(operation.decode(&ranges(reach, stiffness, damping))),
-        _ => None,
+    requests(arm, servo.node_id).into_iter().find_map(|request| {
+        let Request::Operation(operation) = request else { return None };
+        Some(operation.decode(&ranges(reach, stiffness, damping)))
     })
 }
 

@@ -177,7 +177,7 @@ impl Reading {
                 let bytes: [u8; 2] = data.get(..2)?.try_into().ok()?;
                 let is_setpoint = id & OPERATION_BITS == OPERATION | u32::from(node_id) && data.len() == 8;
                 let part = f64::from(u16::from_be_bytes(bytes)) / 65_535.0;
-                is_setpoint.then(|| (2.0 * part - 1.0) * reach_rad * sign + zero_rad)
+                is_setpoint.then_some((2.0 * part - 1.0) * reach_rad * sign + zero_rad)
             }
             Kind::PosVel { node_id, sign, zero_rad } => {
                 let bytes: [u8; 4] = data.get(..4)?.try_into().ok()?;
