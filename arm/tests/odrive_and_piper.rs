@@ -49,7 +49,7 @@ fn bad_odrive_settings_are_refused_at_their_key() {
             ("firmware = \"0.6.10\"", "", "servo[0].firmware", "missing"),
             ("gear_ratio = 20.0", "gear_ratio = 0", "servo[0].gear_ratio", "above 0"),
             ("gear_ratio = 20.0", "gear_ratio = 100.0", "servo[0].gear_ratio", "32.767 turns/s"),
-            ("gear_ratio = 20.0", "gear_ratio = 9000.0", "servo[0].gear_ratio", "8192 turns"),
+            ("gear_ratio = 20.0", "gear_ratio = 20000.0", "servo[0].gear_ratio", "8192 turns"),
             ("encoder_period_ms = 5", "encoder_period_ms = 26", "servo[0].encoder_period_ms", "at most half"),
             (
                 "encoder_period_ms = 5",

@@ -62,8 +62,10 @@ pub struct Claim {
     pub says: String,
     /// When it counts as true; or what is missing.
     pub rule: String,
-    /// What the rule said.
+    /// What the rule said; with several master seeds, the word that they all give, or "not told apart".
     pub verdict: Verdict,
+    /// What the rule said of the first master seed.
+    pub first_seed: Verdict,
     /// The numbers that it looked at.
     pub numbers: String,
     /// Effect sizes with intervals and tests; none where nothing is random.
@@ -80,6 +82,7 @@ impl Claim {
             says: says.to_owned(),
             rule: rule.to_owned(),
             verdict,
+            first_seed: verdict,
             numbers,
             effects: Vec::new(),
             is_exact: false,
@@ -120,6 +123,12 @@ impl Claim {
         self
     }
 
+    /// The same where nothing of it is random.
+    #[must_use]
+    pub fn calculated(self) -> Self {
+        Self { is_exact: true, ..self }
+    }
+
     /// A claim whose check needs what the paper does not give; `numbers` is what can be shown instead.
     #[must_use]
     pub fn unchecked(says: &str, missing: &str, numbers: String) -> Self {
@@ -130,6 +139,7 @@ impl Claim {
     pub(crate) fn unproven(&mut self) {
         if !self.is_exact {
             self.verdict = Verdict::CannotBeChecked;
+            self.first_seed = self.verdict;
             self.rule = format!("not checked: a quick run proves nothing; in a full run: {}", self.rule);
         }
     }
@@ -142,10 +152,24 @@ impl Claim {
         effects.chain(numbers).collect::<Vec<_>>().join("; ")
     }
 
-    /// How many of the further master seeds give the same word; `None` without any.
+    /// Adds what further master seeds say. A word that depends on the seed is none: such a claim is not told apart.
+    pub fn repeat(&mut self, other_seeds: impl IntoIterator<Item = Verdict>) {
+        self.other_seeds.extend(other_seeds);
+        if self.depends_on_the_seed() {
+            self.verdict = Verdict::Open;
+        }
+    }
+
+    /// True when the master seeds do not all give the same word.
+    #[must_use]
+    pub fn depends_on_the_seed(&self) -> bool {
+        self.other_seeds.iter().any(|other| *other != self.first_seed)
+    }
+
+    /// How many of the further master seeds give the first one's word; `None` without any.
     #[must_use]
     pub fn agreement(&self) -> Option<[usize; 2]> {
-        let same = self.other_seeds.iter().filter(|verdict| **verdict == self.verdict).count();
+        let same = self.other_seeds.iter().filter(|verdict| **verdict == self.first_seed).count();
         (!self.other_seeds.is_empty()).then_some([same, self.other_seeds.len()])
     }
 }

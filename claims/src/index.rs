@@ -19,6 +19,10 @@ const PAPER_000: &[Entry] = &[
         "none: they belong to a machine; `taustream bench cost` measures ratios here",
     ),
     ("section 6: number of control points", "number of control points"),
+    (
+        "parameters that are not printed: unit of L, arm, scenes, BSO's constants, RRT's step",
+        "numbers that are not printed; the arm: none, it is no number",
+    ),
 ];
 const PAPER_001: &[Entry] = &[
     ("spline of degree seven (eq. 7 to 16)", "spline"),
@@ -27,6 +31,10 @@ const PAPER_001: &[Entry] = &[
     ("chaotic maps: figures 1 and 2", "parts of ISMA"),
     ("feedback factor: figure 3", "parts of ISMA"),
     ("the five additions, one by one", "parts of ISMA"),
+    (
+        "parameters that are not printed: P_t, μ, λ, those of BOA and SSA, the chains' start, limits",
+        "numbers that are not printed; parts of ISMA; spline",
+    ),
     ("figures 7 and 9", PICTURE),
 ];
 const PAPER_002: &[Entry] = &[
@@ -48,6 +56,10 @@ const PAPER_003: &[Entry] = &[
     ("rewards: eq. 15 to 17, table 4, figure 10", "reward"),
     ("constraints: eq. 12 to 14", "the paper's own rows"),
     ("tables 1 and 2: fuzzy rules and functions", "the paper's own rows"),
+    (
+        "parameters that are not printed: those of the other four methods, how many particles are replaced, e_max",
+        "numbers that are not printed",
+    ),
     ("figure 11", PICTURE),
     ("table 6", "none: our copy does not hold it; the text's numbers are in reward"),
 ];
@@ -55,6 +67,10 @@ const PAPER_004: &[Entry] = &[
     ("via points: eq. 1 to 3, table I, figures 4 to 6", "via points"),
     ("energy: eq. 12; cubics", "energy"),
     ("IWO: table II", "via points; energy"),
+    (
+        "parameters that are not printed: spheres of a link, when the goal is reached, gravity",
+        "numbers that are not printed",
+    ),
     ("figures 1 to 3", PICTURE),
 ];
 

@@ -25,6 +25,7 @@ mod registry;
 mod report;
 mod run_context;
 pub mod statistics;
+mod swept;
 mod table;
 mod trial;
 mod wrap;

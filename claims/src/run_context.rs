@@ -46,6 +46,8 @@ impl From<SplineError> for Stop {
 /// What experiments run in.
 pub struct RunContext<'a> {
     effort: Effort,
+    /// True for a further master seed, of which only the claims' words are looked at.
+    is_repeat: bool,
     /// Called with progress messages.
     say: &'a (dyn Fn(&str) + Sync),
     /// Called before every batch of evaluations; true ends everything.
@@ -60,13 +62,19 @@ impl<'a> RunContext<'a> {
         say: &'a (dyn Fn(&str) + Sync),
         is_over: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
-        Self { effort, say, is_over }
+        Self { effort, is_repeat: false, say, is_over }
     }
 
-    /// The same with another effort.
+    /// The same with another master seed, for the claims' words alone.
     #[must_use]
-    pub fn with(&self, effort: Effort) -> Self {
-        Self { effort, ..*self }
+    pub fn repeated(&self, seed: u64) -> Self {
+        Self { effort: Effort { seed, ..self.effort }, is_repeat: true, ..*self }
+    }
+
+    /// True for a further master seed: what no claim looks at need not run.
+    #[must_use]
+    pub fn is_repeat(&self) -> bool {
+        self.is_repeat
     }
 
     /// True when few and short runs are requested.

@@ -158,6 +158,24 @@ fn selection_by_name_runs_that_experiment_and_other_seeds_stand_beside() {
     }
 }
 
+/// Goal: a further master seed leaves out what no claim looks at, and no claim.
+#[test]
+fn further_master_seed_has_every_claim_of_the_first() {
+    let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };
+    let selection = Selection { only: Some("case 1".to_owned()), other_seeds: 1, ..Selection::default() };
+    let report = run(&RunContext::new(effort, &|_| (), &|| false), effort, &selection).unwrap();
+    let says = |chapters: &[taustream_claims::Chapter]| -> Vec<String> {
+        chapters.iter().flat_map(|c| c.outcome.claims.iter().map(|claim| claim.says.clone())).collect()
+    };
+    let context = RunContext::new(effort, &|_| (), &|| false);
+    let experiment = EXPERIMENTS.iter().find(|e| e.name == "case 1").unwrap();
+    let repeated = (experiment.run)(&context.repeated(2)).unwrap();
+    assert_eq!(says(&report.chapters), repeated.claims.iter().map(|c| c.says.clone()).collect::<Vec<_>>());
+    let rows = |outcome: &taustream_claims::Outcome| outcome.tables[0].rows.len();
+    assert!(rows(&repeated) < rows(&report.chapters[0].outcome), "nothing was left out");
+    assert!(report.chapters[0].outcome.claims.iter().all(|c| c.other_seeds.len() == 1));
+}
+
 #[test]
 fn experiments_end_when_the_user_ends_them() {
     let effort = Effort { runs: None, quick: true, seed: 1, jobs: 1 };

@@ -1,6 +1,6 @@
 //! The results follow the numbers: corrupted numbers change every result.
 use taustream_claims::statistics::{Moments, Summary};
-use taustream_claims::{Effect, Sample, Verdict, agrees};
+use taustream_claims::{Claim, Effect, Sample, Verdict, agrees};
 
 fn sample(shift: f64) -> Sample {
     Sample::of((0..20).map(|i| f64::from(i).sin() + shift).collect())
@@ -75,4 +75,23 @@ fn mean_is_reproduced_when_it_is_near_or_not_significantly_different() {
     let zero = Summary::of(&[4.44e-16; 5]);
     assert!(agrees(printed(8.882e-16, 0.0), &zero), "rounding");
     assert!(!agrees(printed(1e-12, 0.0), &zero), "more than rounding");
+}
+
+/// Goal: a word that depends on the master seed is no word, and what the first seed said stays to be seen.
+#[test]
+fn claim_whose_word_depends_on_the_seed_is_not_told_apart() {
+    use Verdict::{DoesNotHold, Holds, Open};
+    let claim = |others: [Verdict; 3]| {
+        let mut claim = Claim::measured("it works", "a rule", true, String::new());
+        claim.repeat(others);
+        claim
+    };
+    let same = claim([Holds; 3]);
+    assert_eq!((same.verdict, same.agreement(), same.depends_on_the_seed()), (Holds, Some([3, 3]), false));
+    for others in [[Holds, DoesNotHold, Holds], [Open, Holds, Holds]] {
+        let other = claim(others);
+        assert_eq!((other.verdict, other.first_seed, other.agreement()), (Open, Holds, Some([2, 3])));
+        assert!(other.depends_on_the_seed());
+    }
+    assert_eq!(Claim::measured("it works", "a rule", true, String::new()).agreement(), None);
 }

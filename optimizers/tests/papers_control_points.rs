@@ -27,6 +27,21 @@ fn paper_cases_leave_both_ends_free_and_repeat() {
 }
 
 #[test]
+fn paper_cases_have_their_spheres_in_the_box() {
+    let (robot, model) = (ur5(), CostModel::default());
+    for (seed, size, is_ours) in [(1, 0.6, false), (2, 1.0, true), (3, 5.0, false)] {
+        let centres_m = Case::CENTRES_M.map(|ends| ends.map(|end| size * end));
+        let case = Case::random_within(&robot, &model, &centres_m, seed).expect("room");
+        for obstacle in &case.scene.obstacles {
+            let at = obstacle.pose.translation.vector;
+            let is_inside = centres_m.iter().zip(at.iter()).all(|([low, high], x)| low <= x && x <= high);
+            assert!(is_inside, "{at} is not in {centres_m:?}");
+        }
+        assert_eq!(is_ours, Case::random(&robot, &model, seed) == Some(case), "size {size}");
+    }
+}
+
+#[test]
 fn paper_problem_costs_what_its_motion_costs() {
     let (robot, case) = (ur5(), case(3));
     let problem = case.problem(&robot, CONTROL_POINTS, CostModel::default()).expect("fits");

@@ -121,6 +121,22 @@ fn two_link_via_points_stand_clear_but_the_lines_between_them_do_not() {
     assert!(nearest < 1.785, "nearest {nearest}");
 }
 
+/// Goal: a number of spheres puts them in the middles of equal parts; more of them see more of a link, and none nothing.
+#[test]
+fn two_link_spheres_stand_in_the_middles_of_equal_parts() {
+    let task = ViaTask::paper_004(Reading::Corrected);
+    let with = |spheres: u32| ViaTask { obstacles: vec![[0.0, 0.0, 2.5]], spheres, ..task.clone() };
+    // The first link stands upright, from 0 to 5.
+    for (spheres, nearest) in [(1, 0.0), (2, 1.25), (5, 0.0), (10, 0.25)] {
+        close("nearest", with(spheres).distance([0.0, 0.0]), nearest, 1e-12);
+    }
+    assert!(with(0).distance([0.0, 0.0]).is_infinite());
+    let near = ViaTask { reached_rad: 0.05, ..task.clone() };
+    let [exactly, roughly] =
+        [task, near].map(|task| task.walk(&Iwo::PAPER_004, 4_000, 3).expect("sane").via_rad.len());
+    assert!(roughly <= exactly, "{roughly} via points within 0.05 rad, {exactly} within 0.01");
+}
+
 #[test]
 fn two_link_walk_that_cannot_arrive_ends_and_says_so() {
     let mut task = ViaTask::paper_004(Reading::Corrected);

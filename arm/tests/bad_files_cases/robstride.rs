@@ -16,7 +16,7 @@ pub(crate) const CASES: &[Case] = &[
     (
         RobStride,
         "position_range_rad = 12.566370614359172",
-        "position_range_rad = 6.3",
+        "position_range_rad = 3.1",
         "servo[0].position_range_rad",
         "another motor: its firmware fixes the range",
     ),

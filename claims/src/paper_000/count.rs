@@ -11,7 +11,7 @@ use crate::table::{Cell, Table};
 use taustream_optimizers::papers::control_point_count::{Chosen, Growth};
 use taustream_optimizers::{End, Parameters, Progress, Reading, Run};
 
-const RUNS: usize = 40;
+const RUNS: usize = 16;
 const QUICK_EVALUATIONS: usize = 40;
 /// Fixed numbers of control points; the paper's is 3.
 const FIXED: std::ops::RangeInclusive<usize> = 1..=6;

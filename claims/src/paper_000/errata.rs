@@ -14,7 +14,7 @@ use taustream_optimizers::papers::control_points::CONTROL_POINTS;
 use taustream_optimizers::{Parameters, Reading, Swarming};
 use taustream_planner::rng::SeededRng;
 
-const RUNS: usize = 40;
+const RUNS: usize = 20;
 const QUICK: usize = 260;
 /// Random poses in random scenes.
 const POSES: usize = 4_000;

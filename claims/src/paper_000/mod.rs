@@ -4,11 +4,14 @@ mod contenders;
 pub(crate) mod count;
 mod course;
 pub(crate) mod errata;
+mod meeting;
 mod paper_field;
 mod path;
 mod pictures;
 pub(crate) mod planners;
 pub(crate) mod profiles;
+pub(crate) mod sweep;
+mod trees;
 mod verdicts;
 
 use crate::run_context::{RunContext, Stop};
@@ -17,7 +20,7 @@ use std::path::Path;
 use taustream_arm::Robot;
 use taustream_optimizers::Reading;
 use taustream_optimizers::cost::CostModel;
-use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
+use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case, Centres};
 
 /// The arm of the comparisons: the paper's six joints have no name.
 const UR5: &str = include_str!("../../../config/robots/ur5.toml");
@@ -32,7 +35,17 @@ fn ur5() -> Result<Robot, Stop> {
 
 /// The scene of a run, which is the same for all methods and readings.
 fn case(run_context: &RunContext, robot: &Robot, run: usize) -> Result<Case, Stop> {
-    let case = Case::random(robot, &CostModel::default(), run_context.seed(run));
+    case_within(run_context, robot, &Case::CENTRES_M, run)
+}
+
+/// The same with the spheres' centres in another box.
+fn case_within(
+    run_context: &RunContext,
+    robot: &Robot,
+    centres_m: &Centres,
+    run: usize,
+) -> Result<Case, Stop> {
+    let case = Case::random_within(robot, &CostModel::default(), centres_m, run_context.seed(run));
     case.ok_or_else(|| Stop::Refused(format!("{} has no room among the paper's spheres", robot.name)))
 }
 

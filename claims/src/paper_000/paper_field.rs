@@ -10,7 +10,7 @@ use taustream_optimizers::cost::CostModel;
 use taustream_planner::rng::SeededRng;
 use taustream_planner::tree::Field;
 
-/// Length of an edge of the tree, and between two poses of it that are checked (rad).
+/// Length of an edge of the tree, ours, and between two poses of it that are checked (rad).
 pub(super) const STEP_RAD: f64 = 0.4;
 pub(super) const CHECKED_RAD: f64 = 0.02;
 
@@ -18,13 +18,15 @@ pub(super) const CHECKED_RAD: f64 = 0.02;
 pub(super) struct PaperField<'a> {
     pub(super) robot: &'a Robot,
     pub(super) scene: &'a Scene,
+    /// Length of an edge (rad).
+    pub(super) step_rad: f64,
     pub(super) checks: Cell<usize>,
     pub(super) run_context: &'a RunContext<'a>,
 }
 
 impl Field for PaperField<'_> {
     fn step(&self) -> f64 {
-        STEP_RAD
+        self.step_rad
     }
 
     fn distance(&self, a: &JointArray, b: &JointArray) -> f64 {

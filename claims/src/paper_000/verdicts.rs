@@ -2,9 +2,10 @@
 //!
 //! The methods meet in the same scenes, so a difference is that of pairs. Only scenes in which both end free of collision
 //! count: elsewhere the penalty, which is a thousand times the rest, measures how deep a path collides.
-use super::cases::{Field, Trials};
+use super::cases::Trials;
 use super::contenders::PAPERS_OWN;
 use super::course::{Course, equal_evaluations};
+use super::meeting::Field;
 use crate::claim::{Claim, Verdict};
 use crate::effect::{Claimed, Effect};
 use crate::statistics::quantile;
@@ -53,13 +54,10 @@ fn compared(field: &Field, says: &str, [(i, ours), (j, theirs)]: [(usize, &str);
 
 /// Figures 2 and 3 show IBFOA below BFOA from the first iterations on.
 fn faster(field: &Field, title: &str) -> Claim {
-    let quarter = |i: usize| -> Vec<f64> {
-        field.free(&[0, 1]).filter_map(|run| field.of(i).get(run)?.after(0.25)).collect()
-    };
     Claim::tested(
         &format!("IBFOA converges faster than BFOA ({title})"),
         "the population's best after a quarter of the iterations is less: above 0 (holds), below 2 % (does not hold), or neither",
-        vec![Effect::ratio(("IBFOA", &quarter(1)), ("BFOA", &quarter(0)), FLOOR).margin(GAIN_PERCENT)],
+        vec![field.after_a_quarter([1, 0], "IBFOA", "BFOA")],
     )
 }
 
@@ -149,6 +147,14 @@ impl Field {
     pub(super) fn at_the_end(&self, [i, j]: [usize; 2], ours: &str, theirs: &str) -> Effect {
         let of = |k: usize| -> Vec<f64> {
             self.free(&[i, j]).filter_map(|run| self.of(k).get(run).map(Course::last)).collect()
+        };
+        Effect::ratio((ours, &of(i)), (theirs, &of(j)), FLOOR).margin(GAIN_PERCENT)
+    }
+
+    /// Population's best after a quarter of the iterations, method `i` against `j`.
+    pub(super) fn after_a_quarter(&self, [i, j]: [usize; 2], ours: &str, theirs: &str) -> Effect {
+        let of = |k: usize| -> Vec<f64> {
+            self.free(&[i, j]).filter_map(|run| self.of(k).get(run)?.after(0.25)).collect()
         };
         Effect::ratio((ours, &of(i)), (theirs, &of(j)), FLOOR).margin(GAIN_PERCENT)
     }

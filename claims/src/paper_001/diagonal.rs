@@ -10,9 +10,9 @@ use crate::trial::{Sample, Trial, minimise};
 use taustream_optimizers::papers::Function;
 use taustream_optimizers::{Isma, Optimizer, Reading, Setup, Sma};
 
-/// Runs and evaluations: 1000 iterations of SMA.
+/// Runs and evaluations: 500 iterations of SMA.
 const RUNS: usize = 10;
-const BUDGET: usize = 50 + 50 * 1000;
+const BUDGET: usize = 50 + 50 * 500;
 const QUICK: usize = 3_000;
 
 /// What is compared: reading, and the probability of a new start (`None`: the paper's).

@@ -3,3 +3,4 @@ pub(crate) mod benchmarks;
 pub(crate) mod diagonal;
 pub(crate) mod parts;
 pub(crate) mod spline;
+pub(crate) mod sweep;

@@ -6,6 +6,7 @@ use crate::effect::Effect;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
+use crate::swept::{At, label, places};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, minimise};
 use std::cmp::Ordering;
@@ -15,16 +16,18 @@ use taustream_optimizers::{Addition, Isma, Reading, Setup};
 /// Points of figures 1 and 2, and bins of their histograms.
 const POINTS: usize = 5_000;
 const BINS: usize = 10;
-/// Where both chains begin; the paper prints no start.
+/// Where both chains of the table begin; the paper prints no start.
 const START: f64 = 0.37;
+/// Other starts, in hundredths: with halves and quarters the logistic map falls to 0.
+const STARTS: [i32; 9] = [7, 13, 19, 29, 41, 53, 61, 83, 97];
 /// The paper's parameters of both maps.
 const LOGISTIC: f64 = 4.0;
 const BERNOULLI: f64 = 0.4;
 /// Exponents of figure 3, the chosen one among them.
 const EXPONENTS: [i32; 6] = [1, 2, 3, 4, 5, 6];
 /// Runs without an addition, on the moved functions, and evaluations of each.
-const RUNS: usize = 15;
-const BUDGET: usize = 25_050;
+const RUNS: usize = 10;
+const BUDGET: usize = 15_050;
 const QUICK: usize = 1_500;
 /// What is above the least value by less is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -40,9 +43,9 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
 }
 
 /// The largest distance of a bin's share from that of an even distribution.
-fn unevenness(map: impl Fn(f64) -> f64) -> ([f64; BINS], f64) {
+fn unevenness(map: impl Fn(f64) -> f64, start: f64) -> ([f64; BINS], f64) {
     let mut counts = [0.0; BINS];
-    let mut link = START;
+    let mut link = start;
     for _ in 0..POINTS {
         link = map(link);
         #[expect(
@@ -60,10 +63,21 @@ fn unevenness(map: impl Fn(f64) -> f64) -> ([f64; BINS], f64) {
 }
 
 fn maps(outcome: &mut Outcome) {
-    let logistic = unevenness(|x| LOGISTIC * x * (1.0 - x));
-    let bernoulli = unevenness(|x| {
-        if x <= 1.0 - BERNOULLI { x / (1.0 - BERNOULLI) } else { (x - 1.0 + BERNOULLI) / BERNOULLI }
+    let from = |start: f64| {
+        let logistic = unevenness(|x| LOGISTIC * x * (1.0 - x), start);
+        let bernoulli = unevenness(
+            |x| if x <= 1.0 - BERNOULLI { x / (1.0 - BERNOULLI) } else { (x - 1.0 + BERNOULLI) / BERNOULLI },
+            start,
+        );
+        [logistic, bernoulli]
+    };
+    let [logistic, bernoulli] = from(START);
+    let others = STARTS.map(|start| {
+        let start = f64::from(start) / 100.0;
+        let [logistic, bernoulli] = from(start);
+        At::exact(label("start", start), bernoulli.1 < logistic.1)
     });
+    let is_so = bernoulli.1 < logistic.1 && others.iter().all(|at| at.verdict == Verdict::Holds);
     let heading: Vec<String> = (0..BINS).map(|bin| format!("{:.1}..", bin as f64 / BINS as f64)).collect();
     let columns: Vec<&str> = std::iter::once("").chain(heading.iter().map(String::as_str)).collect();
     let note = format!("shares of {POINTS} points in ten bins; even would be 0.1 each");
@@ -74,9 +88,9 @@ fn maps(outcome: &mut Outcome) {
     outcome.tables.push(table);
     outcome.claims.push(Claim::exact(
         "Bernoulli's map fills the box more evenly than the logistic map (figures 1 and 2)",
-        "no bin's share is farther from a tenth than the logistic map's farthest",
-        bernoulli.1 < logistic.1,
-        format!("farthest by {} against {}", figures(bernoulli.1), figures(logistic.1)),
+        "no bin's share is farther from a tenth than the logistic map's farthest, whatever the start, which is not printed",
+        is_so,
+        format!("farthest by {} against {}; {}", figures(bernoulli.1), figures(logistic.1), places(&others)),
     ));
 }
 

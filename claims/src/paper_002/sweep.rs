@@ -6,6 +6,7 @@ use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::statistics::quantile;
+use crate::swept::{At, FACTORS, places};
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::planar::{Journey, Numbers, Obstacle, PlanarScene, PlanarShape};
 
@@ -13,13 +14,11 @@ use taustream_optimizers::papers::planar::{Journey, Numbers, Obstacle, PlanarSce
 const RUNS: usize = 30;
 const QUICK: usize = 2;
 /// Runs in which a number other than `H_o` changes.
-const OTHER_RUNS: usize = 10;
+const OTHER_RUNS: usize = 6;
 /// Steps after which a robot that has not arrived never will, nearly: RBF's slowest takes a third of them.
 const STEPS_MAX: usize = 1_500;
 /// Values of `H_o`: at 1 the goal's pull exceeds the repulsion everywhere, from 2 on it does not.
 const HEIGHTS: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
-/// A decade round ours, on its logarithm.
-const FACTORS: [f64; 2] = [0.316_227_766, 3.162_277_66];
 /// Sizes of a trap over ours; a larger one does not fit between start and goal.
 const SIZES: [f64; 5] = [0.316_227_766, 0.5, 0.7, 1.0, 1.4];
 /// Printed numbers of virtual obstacles in the L and in the U.
@@ -167,14 +166,10 @@ fn table<'a>(settings: impl Iterator<Item = &'a Setting>) -> Table {
 /// A claim that stands at some value of a number that is not printed.
 fn at_some(says: &str, rule: &str, settings: &[Setting], effect: impl Fn(&Setting) -> Effect) -> Claim {
     let effects: Vec<Effect> = settings.iter().map(effect).collect();
-    let verdict = Verdict::any(effects.iter().map(Effect::verdict));
-    let with = |wanted: bool| {
-        let settings =
-            settings.iter().zip(&effects).filter(|(_, e)| (e.verdict() == Verdict::Holds) == wanted);
-        settings.map(|(s, _)| s.label.trim_start_matches("H_o = ")).collect::<Vec<_>>().join(", ")
-    };
-    let numbers = format!("so at H_o = {}; not so at {}", or_none(&with(true)), or_none(&with(false)));
-    Claim::weighed(says, rule, verdict, effects).beside(numbers)
+    let at =
+        settings.iter().zip(&effects).map(|(s, effect)| At::all(&*s.label, std::slice::from_ref(effect)));
+    let at: Vec<At> = at.collect();
+    Claim::weighed(says, rule, Verdict::any(at.iter().map(|s| s.verdict)), effects).beside(places(&at))
 }
 
 fn or_none(text: &str) -> &str {

@@ -41,7 +41,7 @@ const PRINTED_GENERATIONS: [usize; 2] = [45, 180];
 /// The paper's precision: errors below it are rounding.
 pub(super) const PRECISION_MM: f64 = 1e-7;
 /// A cost that is less by less is not less: a hundredth of what its best rows differ by (s).
-const COST_MARGIN_S: f64 = 0.1;
+pub(super) const COST_MARGIN_S: f64 = 0.1;
 
 /// A method of the table with a schedule that fits the budget.
 pub(super) fn contender(name: &str, reading: Reading, budget: usize) -> Result<Contender, Stop> {

@@ -2,4 +2,5 @@
 pub(crate) mod methods;
 pub(crate) mod printed;
 pub(crate) mod reward;
+pub(crate) mod sweep;
 mod watched;

@@ -18,7 +18,7 @@ const EVALUATIONS: usize = 10_000;
 /// The way of the paper's test without obstacles: both angles in full steps of 20 degrees.
 const VIA_DEGREES: [f64; 6] = [0.0, 20.0, 40.0, 60.0, 80.0, 90.0];
 /// What counts as nothing, in the units of the quantities.
-const NOTHING: f64 = 1e-6;
+pub(super) const NOTHING: f64 = 1e-6;
 /// Half the side of the box in which IWO looks for a3 and b3, rad/s³.
 const BOX: f64 = 2.0;
 
@@ -102,6 +102,39 @@ fn piece(arm: TwoLink, angles_rad: [[f64; 2]; 2], speed_rad_s: [f64; 2]) -> Piec
     PieceEnergy { arm, angles_rad, speed_rad_s, piece_s: PIECE_S, bounds: [[-BOX, BOX]; 2] }
 }
 
+/// What the paper's way without obstacles costs at some gravity.
+pub(super) struct Spent {
+    /// Work of the joints: least energy with the printed sign, with z upward, and cubics that rest at every via point.
+    pub(super) work: [f64; 3],
+    /// Speed at the goal, with both signs.
+    pub(super) end_rad_s: [f64; 2],
+}
+
+/// The cubics of least energy at some gravity, the end left free as printed.
+pub(super) fn spent(run_context: &RunContext, gravity: f64) -> Result<Spent, Stop> {
+    let (via, truth) = (via_rad(), TwoLink { gravity, ..arm(Reading::Corrected) });
+    let mut work = [0.0, 0.0, resting(truth, &via).work(&truth)];
+    let mut end_rad_s = [0.0; 2];
+    for ((work, end), sign) in work.iter_mut().zip(&mut end_rad_s).zip([Reading::Printed, Reading::Corrected])
+    {
+        let cubics = free_end(run_context, TwoLink { reading: sign, ..truth }).through(&via)?;
+        (*work, *end) = (cubics.work(&truth), evaluate(&cubics).end_speed_rad_s);
+    }
+    Ok(Spent { work, end_rad_s })
+}
+
+/// IWO's search for cubics, the end left free as printed.
+fn free_end(run_context: &RunContext, arm: TwoLink) -> CubicSearch<'static> {
+    CubicSearch {
+        arm,
+        piece_s: PIECE_S,
+        optimizer: &Iwo::PAPER_004,
+        evaluations_max: EVALUATIONS,
+        seed: run_context.seed(0),
+        reading: Reading::Printed,
+    }
+}
+
 fn via_rad() -> Vec<[f64; 2]> {
     VIA_DEGREES.iter().map(|d| [d.to_radians(); 2]).collect()
 }
@@ -128,14 +161,7 @@ fn motions(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> 
     let mut all = Vec::new();
     let mut panel = Panel::new("time (s)", "speed of θ (rad/s)");
     for (label, sign, end) in cases {
-        let search = CubicSearch {
-            arm: arm(sign),
-            piece_s: PIECE_S,
-            optimizer: &Iwo::PAPER_004,
-            evaluations_max: EVALUATIONS,
-            seed: run_context.seed(0),
-            reading: end,
-        };
+        let search = CubicSearch { reading: end, ..free_end(run_context, arm(sign)) };
         all.push((label, search.through(&via)?));
     }
     all.push(("at rest at every via point", resting(truth, &via)));

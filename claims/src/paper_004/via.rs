@@ -8,17 +8,16 @@ use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
-use taustream_optimizers::papers::two_link::TwoLink;
 use taustream_optimizers::papers::two_link_energy::CubicSearch;
-use taustream_optimizers::papers::two_link_via::{STEP_RAD, ViaTask};
-use taustream_optimizers::{Iwo, Reading};
+use taustream_optimizers::papers::two_link_via::{STEP_RAD, ViaPath, ViaTask};
+use taustream_optimizers::{Iwo, Reading, Refusal};
 
 /// Runs; the paper shows one. Forty without an event make it less frequent than 9 in 100.
 const RUNS: usize = 40;
 /// Runs that tell in which angle the way bends.
 const BENDING_RUNS: usize = 400;
 /// Obstacles' radius as printed, which its figure 5 takes for the limit of the distance.
-const PRINTED_LIMIT: f64 = 1.29;
+pub(super) const PRINTED_LIMIT: f64 = 1.29;
 /// More than IWO's schedule can use.
 const EVALUATIONS: usize = 10_000;
 /// What the paper's penalty lacks: room on the radius of the arm's spheres.
@@ -36,18 +35,31 @@ const READINGS: [(&str, bool, Reading, f64); 4] = [
     ("penalty, radians, with a margin", true, Reading::Corrected, MARGIN),
 ];
 
+/// When φ bends more than θ.
+pub(super) const MAJORITY_RULE: &str = "radians: φ is farther from the way without obstacles than θ in most runs: above half (holds), by less than \
+     10 points (does not hold), or neither";
+
 /// One walk and its distances between centres of spheres.
 #[derive(Clone, Debug, PartialEq)]
-struct Walk {
+pub(super) struct Walk {
     via_rad: Vec<[f64; 2]>,
     reached: bool,
     /// Least at the via points, on straight pieces, on cubics.
-    least: [f64; 3],
+    pub(super) least: [f64; 3],
     /// Over the share of the way, on the cubics.
     along: Vec<(f64, f64)>,
 }
 
-fn task((_, has_penalty, reading, margin): (&str, bool, Reading, f64)) -> ViaTask {
+impl Walk {
+    /// Of which the via points alone are looked at.
+    pub(super) fn of_points(task: &ViaTask, path: ViaPath) -> Self {
+        let least = path.via_rad.iter().map(|q| task.distance(*q)).fold(f64::INFINITY, f64::min);
+        Self { via_rad: path.via_rad, reached: path.reached, least: [least; 3], along: Vec::new() }
+    }
+}
+
+/// The paper's task, with or without its penalty, and with a margin on the radius of the arm's spheres.
+pub(super) fn task(has_penalty: bool, reading: Reading, margin: f64) -> ViaTask {
     let mut task = ViaTask::paper_004(reading);
     if !has_penalty {
         task.weights[2] = 0.0;
@@ -56,10 +68,33 @@ fn task((_, has_penalty, reading, margin): (&str, bool, Reading, f64)) -> ViaTas
     task
 }
 
-fn walk(task: &ViaTask, seed: u64) -> Result<Walk, Stop> {
-    let path = task.walk(&Iwo::PAPER_004, EVALUATIONS, seed)?;
+/// Distance of centres at which spheres touch.
+pub(super) fn contact(task: &ViaTask) -> f64 {
+    task.radii.iter().sum()
+}
+
+/// Walks that touch at the via points (0), on straight pieces (1), on cubics (2).
+pub(super) fn touching(walks: &[Walk], contact: f64, which: usize) -> usize {
+    walks.iter().filter(|w| w.least[which] < contact - 1e-6).count()
+}
+
+/// How far the median least distance at the via points is from the printed one.
+pub(super) fn near(name: &str, walks: &[Walk]) -> Effect {
+    let least: Vec<f64> = walks.iter().map(|w| w.least[0]).collect();
+    let name = format!("the least distance, {name}");
+    Effect::near((&name, &least), PRINTED_LIMIT, (0.1 * PRINTED_LIMIT, ""))
+}
+
+/// The via points of a run.
+pub(super) fn via_points(task: &ViaTask, seed: u64) -> Result<ViaPath, Refusal> {
+    task.walk(&Iwo::PAPER_004, EVALUATIONS, seed)
+}
+
+/// Via points and the cubics through them.
+pub(super) fn walk(task: &ViaTask, seed: u64) -> Result<Walk, Stop> {
+    let path = via_points(task, seed)?;
     let search = CubicSearch {
-        arm: TwoLink::PAPER_004,
+        arm: task.arm,
         piece_s: PIECE_S,
         optimizer: &Iwo::PAPER_004,
         evaluations_max: EVALUATIONS,
@@ -92,7 +127,7 @@ fn walk(task: &ViaTask, seed: u64) -> Result<Walk, Stop> {
 /// Walks.
 pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let runs = run_context.runs(RUNS, 4);
-    let contact: f64 = ViaTask::paper_004(Reading::Corrected).radii.iter().sum();
+    let contact = contact(&ViaTask::paper_004(Reading::Corrected));
     let columns = [
         "",
         "paper, least distance",
@@ -113,8 +148,10 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     let mut all = Vec::new();
     for reading in READINGS {
         run_context.say(&format!("  {}, {runs} runs ..", reading.0));
-        let walks = run_context.each(runs, |run| walk(&task(reading), run_context.seed(run)))?;
-        let touching = |which: usize| walks.iter().filter(|w| w.least[which] < contact - 1e-6).count();
+        let (_, has_penalty, unit, margin) = reading;
+        let walks =
+            run_context.each(runs, |run| walk(&task(has_penalty, unit, margin), run_context.seed(run)))?;
+        let touching = |which: usize| touching(&walks, contact, which);
         let share = |count| Cell::Share { count, of: runs };
         let sample = |figure: &dyn Fn(&Walk) -> f64| Sample::of(walks.iter().map(figure).collect()).summary();
         let is_papers = reading.1 && reading.3 == 0.0;
@@ -144,16 +181,10 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
 
 fn claims(all: &[Vec<Walk>], contact: f64, bends: [usize; 2]) -> Vec<Claim> {
     let [free, degrees, radians, margin] = all else { return Vec::new() };
-    let touching =
-        |walks: &[Walk], which: usize| walks.iter().filter(|w| w.least[which] < contact - 1e-6).count();
+    let touching = |walks: &[Walk], which: usize| touching(walks, contact, which);
     let touch =
         |what: &str, walks: &[Walk], which: usize| Effect::never(what, touching(walks, which), walks.len());
-    let least = |walks: &[Walk]| walks.iter().map(|w| w.least[0]).collect::<Vec<f64>>();
     let rule = "no run has a via point whose spheres touch; one refutes it";
-    let near = |name: &str, walks: &[Walk]| {
-        let name = format!("the least distance, {name}");
-        Effect::near((&name, &least(walks)), PRINTED_LIMIT, (0.1 * PRINTED_LIMIT, ""))
-    };
     let near = vec![near("degrees", degrees), near("radians", radians)];
     let below = free.iter().filter(|w| w.least[0] >= PRINTED_LIMIT).count();
     vec![
@@ -193,8 +224,7 @@ fn claims(all: &[Vec<Walk>], contact: f64, bends: [usize; 2]) -> Vec<Claim> {
         ),
         Claim::tested(
             "θ goes on as without obstacles, φ bends away (figure 4)",
-            "radians: φ is farther from the way without obstacles than θ in most runs: above half (holds), by less than 10 points (does \
-             not hold), or neither",
+            MAJORITY_RULE,
             vec![Effect::majority("φ bends more", bends[0], bends[1])],
         ),
     ]
@@ -203,14 +233,14 @@ fn claims(all: &[Vec<Walk>], contact: f64, bends: [usize; 2]) -> Vec<Claim> {
 /// Runs in which φ bends more than θ, of enough runs to tell half from 60 in 100: the interval is ±5 points.
 fn bending(run_context: &RunContext) -> Result<[usize; 2], Stop> {
     let runs = run_context.runs(BENDING_RUNS, 4);
-    let task = task(READINGS[2]);
-    let goal = |run: usize| Ok(task.walk(&Iwo::PAPER_004, EVALUATIONS, run_context.seed(run))?.via_rad);
+    let task = task(true, Reading::Corrected, 0.0);
+    let goal = |run: usize| Ok(via_points(&task, run_context.seed(run))?.via_rad);
     let paths = run_context.each(runs, goal)?;
     Ok([bends(&paths), paths.len()])
 }
 
 /// Runs in which φ leaves the undisturbed way (both angles a full step at a time) farther than θ.
-fn bends(walks: &[Vec<[f64; 2]>]) -> usize {
+pub(super) fn bends(walks: &[Vec<[f64; 2]>]) -> usize {
     let goal = ViaTask::paper_004(Reading::Corrected).goal_rad;
     let off = |via_rad: &[[f64; 2]], j: usize| {
         let free = |i: usize| (i as f64 * STEP_RAD).min(goal[j]);

@@ -5,11 +5,11 @@ use taustream_claims::{EXPERIMENTS, Effort, PAPERS, Selection};
 
 const PAPERS_HELP: &str = "\
 Examples:
-  taustream bench papers --quick                        all five papers in under a minute; proves nothing
+  taustream bench papers --quick                        all five papers in half a minute; proves nothing
   taustream bench papers --paper 3 -o paper-003         report.md, tables.json and pictures in that directory
   taustream bench papers --paper 1 --runs 5 --jobs 2    fewer runs than the paper's 30
   taustream bench papers --only energy                  one experiment
-  taustream bench papers --seeds 4 -o report            the verdicts of four master seeds beside each other
+  taustream bench papers --seeds 4 -o page              the page claims/papers.md, with four master seeds
   taustream bench papers --quick --json | jq '.chapters[].claims[] | {says, verdict}'
 
 Papers: 0 or 000_518aefc8cd38e163 (IBFOA, Tau-J*), 1 or 001_5e4af5ebec08e134 (ISMA, B-splines), 2 or
@@ -20,7 +20,8 @@ corrected (corrected). Two methods are compared pair by pair at equal evaluation
 interval and the margin below which it counts as none. The result of a claim (holds, does not hold, not told apart,
 cannot be checked) follows from the numbers by the rule beside it. The papers' own values are the only constants.
 One seed gives one result with any --jobs. Ctrl-C aborts without output. With --quick nothing random is decided.
-A full run takes ten to twenty minutes, mostly papers 0 and 1; each further master seed takes as long again.";
+A full run takes about seven minutes, mostly papers 0 and 1; each further master seed takes as long again. Where master
+seeds give different verdicts, the result is not told apart, and the report names the row.";
 
 /// `taustream bench papers`
 #[derive(Args, Debug)]
@@ -32,7 +33,7 @@ pub(crate) struct PapersArgs {
     /// Run only the experiments whose name contains this: "case 1", "via points", "spline".
     #[arg(long, value_name = "NAME", value_parser = experiment)]
     pub(crate) only: Option<String>,
-    /// Number of master seeds: further ones count up from --seed, and their verdicts stand beside the first one's.
+    /// Number of master seeds, counting up from --seed; a verdict that they do not all give is "not told apart".
     #[arg(long, value_name = "K", allow_negative_numbers = true, default_value_t = 1, value_parser = seeds)]
     pub(crate) seeds: u64,
     /// Number of runs of each experiment; without it the papers' own numbers (or, with --quick, few).

@@ -42,7 +42,8 @@ impl StepTimer {
     #[must_use]
     pub fn new(period_us: u32) -> Self {
         let step = Nanos(u64::from(period_us) * 1_000 * STEP_PERIODS);
-        Self { step, now: Nanos(0), ticked: None, other_master: None }
+        // Not 0: that is "never" where a time is kept.
+        Self { step, now: Nanos(1), ticked: None, other_master: None }
     }
     /// One cycle at `time`, with this drive target.
     pub fn tick(&mut self, time: Nanos, drive_target: DriveTarget) -> BringUpCycle {

@@ -23,6 +23,8 @@ const REQUEST_AGAIN: Nanos = Nanos(20_000_000);
 const REPEAT: Nanos = Nanos(20_000_000);
 /// What a change of mode takes (Damiao's library).
 const SETTLE: Nanos = Nanos(100_000_000);
+/// Writes without a confirmation that are repeated before a value that differs is refused.
+const SEND_AGAIN_MAX: u8 = 10;
 /// Without feedback for so long, at one request a cycle, the motor is gone.
 const NO_REPLY: Nanos = Nanos(350_000_000);
 
@@ -91,6 +93,7 @@ pub struct Machine<M> {
     /// Clearing an error since, and when to repeat it.
     clearing: Option<(Nanos, Nanos)>,
     set_zero: bool,
+    sent_again: u8,
     sent_rad: f64,
 }
 
@@ -115,6 +118,7 @@ impl<M: AnsweringMotor> Machine<M> {
             measured_at: Nanos(0),
             clearing: None,
             set_zero: false,
+            sent_again: 0,
             sent_rad: 0.0,
         }
     }
@@ -311,7 +315,7 @@ impl<M: AnsweringMotor> Machine<M> {
     /// Back to the start, where nothing is changed before the motor has been looked at.
     fn observe(&mut self, now: Nanos, fault: Option<MotorFault>) {
         (self.requested, self.answer, self.clearing) = (None, None, None);
-        (self.fault, self.set_zero, self.looked) = (fault, false, false);
+        (self.fault, self.set_zero, self.looked, self.sent_again) = (fault, false, false, 0);
         self.stage = MotorStage::Observe { since: now };
     }
 

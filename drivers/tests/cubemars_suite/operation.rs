@@ -156,8 +156,10 @@ fn motors_of_a_master_that_vanished_go_limp_after_their_watchdog() {
     arm.steps(500);
     let held_rad = arm.servo(1).position_rad();
     let fallen_rad = |arm: &mut Arm, ms: u64| {
-        arm.now.0 += ms * 1_000_000;
-        arm.inject(&[]);
+        for _ in 0..ms {
+            arm.now.0 += 1_000_000;
+            arm.inject(&[]);
+        }
         (arm.servo(1).position_rad() - held_rad).abs()
     };
     let until_rad = fallen_rad(&mut arm, 95);

@@ -325,6 +325,7 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ),
     ("Settings files: servo[].limp_is_safe", "true with a brake or a balanced joint: it may lose torque."),
     ("Settings files: servo[].feedback_id", "Damiao, CubeMars: identifier of its feedback."),
+    ("Settings files: servo[].model", "MyActuator: its model, as it states it."),
     ("Settings files: servo[].host_id", "RobStride: identifier of this master; 253."),
     ("Settings files: servo[].mode", "Damiao: control mode."),
     ("Settings files: servo[].hardware", "ODrive: product line, version and variant that the drive states."),
@@ -445,6 +446,8 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: simulator.motor_torque_range_nm",
         "Packed frames: what the motor takes torques to span; as the servo states.",
     ),
+    ("Settings files: simulator.rmd_model", "MyActuator: the model that the simulated motor states; that of the settings."),
+    ("Settings files: simulator.rmd_brake_released", "MyActuator: the brake is released at power-up."),
     (
         "Settings files: simulator.motor_torque_limit_nm",
         "RobStride: `limit_torque` in the motor's flash; as the servo states.",

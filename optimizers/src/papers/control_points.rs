@@ -20,7 +20,7 @@ const SPHERES: usize = 3;
 /// Radius of an obstacle.
 const RADIUS_M: f64 = 0.18;
 /// Least and highest coordinates of an obstacle's centre.
-const CENTRES_M: [[f64; 2]; 3] = [[-0.8, 0.8], [-0.8, 0.8], [0.0, 0.9]];
+pub type Centres = [[f64; 2]; 3];
 /// Draws until a case is given up.
 const ATTEMPTS_MAX: usize = 10_000;
 
@@ -34,10 +34,19 @@ pub struct Case {
 }
 
 impl Case {
-    /// The case of a seed; `None` when no draw leaves both end poses free, which only an arm much larger than its
-    /// surroundings does.
+    /// Where the centres of the obstacles are (m): ours, the paper prints none.
+    pub const CENTRES_M: Centres = [[-0.8, 0.8], [-0.8, 0.8], [0.0, 0.9]];
+
+    /// The case of a seed, with centres in our box.
     #[must_use]
     pub fn random(robot: &Robot, model: &CostModel, seed: u64) -> Option<Self> {
+        Self::random_within(robot, model, &Self::CENTRES_M, seed)
+    }
+
+    /// The case of a seed, with centres in a box (m); `None` when no draw leaves both end poses free, which only an arm much larger than its
+    /// surroundings does.
+    #[must_use]
+    pub fn random_within(robot: &Robot, model: &CostModel, centres_m: &Centres, seed: u64) -> Option<Self> {
         let mut rng = SeededRng::new(seed, 5);
         let joints = robot.joints.len();
         let mut attempts = (0..ATTEMPTS_MAX).map(|_| {
@@ -46,7 +55,7 @@ impl Case {
             };
             let ends_rad = [pose(), pose()];
             let obstacles =
-                (0..SPHERES).map(|i| sphere(i, CENTRES_M.map(|[low, high]| rng.within(low, high))));
+                (0..SPHERES).map(|i| sphere(i, centres_m.map(|[low, high]| rng.within(low, high))));
             let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: obstacles.collect() };
             Self { ends_rad, scene }
         });

@@ -17,8 +17,8 @@ pub const REACHED_RAD: f64 = 0.01;
 pub const STEP_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Most steps; a greedy walk may be caught in front of an obstacle.
 const STEPS_MAX: usize = 200;
-/// Where the spheres are along a link.
-const SPHERES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+/// Spheres of a link, in the middles of as many equal parts: the paper draws them and gives no number.
+const SPHERES: u32 = 5;
 
 /// Obstacles, goal and prices.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,10 +31,14 @@ pub struct ViaTask {
     pub goal_rad: [f64; 2],
     /// Centres of the spherical obstacles.
     pub obstacles: Vec<[f64; 3]>,
+    /// Spheres of a link, in the middles of as many equal parts.
+    pub spheres: u32,
     /// Radii of the arm's spheres and of the obstacles.
     pub radii: [f64; 2],
     /// K1 to K4: way of θ, way of φ, penalty, an angle out of range.
     pub weights: [f64; 4],
+    /// How near the goal an angle has to come.
+    pub reached_rad: f64,
     /// Which reading.
     pub reading: Reading,
 }
@@ -49,9 +53,11 @@ impl ViaTask {
             start_rad: [0.0; 2],
             goal_rad: [quarter; 2],
             obstacles: vec![[3.0, 8.0, 3.0], [3.0, 9.5, 3.0], [3.0, 8.0, 4.5], [3.0, 9.5, 4.5]],
+            spheres: SPHERES,
             // Half the diagonal of a cube of side 1.5; the paper prints 1.29.
             radii: [0.5, 0.75 * 3.0_f64.sqrt()],
             weights: [10.0, 10.0, 100.0, 10_000.0],
+            reached_rad: REACHED_RAD,
             reading,
         }
     }
@@ -59,8 +65,12 @@ impl ViaTask {
     /// Distances between the arm's spheres and the obstacles.
     fn distances(&self, angles_rad: [f64; 2]) -> impl Iterator<Item = f64> + '_ {
         let [elbow, tip] = self.arm.points(angles_rad);
-        let spheres = [([0.0; 3], elbow), (elbow, tip)].into_iter().flat_map(|(from, to)| {
-            SPHERES.map(|share| -> [f64; 3] { std::array::from_fn(|i| from[i] + share * (to[i] - from[i])) })
+        let count = self.spheres;
+        let spheres = [([0.0; 3], elbow), (elbow, tip)].into_iter().flat_map(move |(from, to)| {
+            let shares = (0..count).map(move |i| (f64::from(i) + 0.5) / f64::from(count));
+            shares.map(move |share| -> [f64; 3] {
+                std::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
+            })
         });
         spheres.flat_map(move |sphere| {
             let distance =
@@ -120,7 +130,7 @@ impl ViaTask {
     }
 
     fn is_goal(&self, angles_rad: [f64; 2]) -> bool {
-        angles_rad.iter().zip(self.goal_rad).all(|(q, g)| (q - g).abs() <= REACHED_RAD)
+        angles_rad.iter().zip(self.goal_rad).all(|(q, g)| (q - g).abs() <= self.reached_rad)
     }
 }
 

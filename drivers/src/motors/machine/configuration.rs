@@ -1,7 +1,7 @@
 //! A motor that is only looked at, and the parameters that make it this master's: none is written to one that is energised.
 use super::super::fault::{differs, parameter_object};
 use super::super::{AnsweringMotor, Ask, Job, MotorFault, PowerWord};
-use super::{Machine, MotorStage, OBSERVE_AGAIN, OBSERVE_MIN, REQUEST_AGAIN, SETTLE, age};
+use super::{Machine, MotorStage, OBSERVE_AGAIN, SEND_AGAIN_MAX, OBSERVE_MIN, REQUEST_AGAIN, SETTLE, age};
 use crate::bring_up::timing::BringUpCycle;
 use crate::servo::{DriveTarget, Nanos};
 
@@ -67,6 +67,8 @@ impl<M: AnsweringMotor> Machine<M> {
         if let Some(value) = self.answer.take() {
             return match self.check_value(job, value) {
                 CheckResult::On(steps) => self.at_job(now, index + steps),
+                // A write that is not confirmed may have been lost on the way.
+                CheckResult::Differs if self.may_send_again(index, job) => self.at_job(now, index - 1),
                 CheckResult::Differs => {
                     let (code, object) = differs(M::CODES, job.parameter(), value);
                     self.stage = MotorStage::Refused { code, object };
@@ -123,6 +125,14 @@ impl<M: AnsweringMotor> Machine<M> {
             Job::Read(_) | Job::ReadToSkip(..) | Job::ReadSettled(_) => Ask::Read(parameter),
         };
         (!settling && !waiting).then(|| self.send_request(now, ask))
+    }
+
+    /// The job before wrote this parameter without a confirmation, not too often yet.
+    fn may_send_again(&mut self, index: usize, job: Job) -> bool {
+        let before = index.checked_sub(1).and_then(|before| self.motor.configure().get(before));
+        let again = before == Some(&Job::Send(job.parameter())) && self.sent_again < SEND_AGAIN_MAX;
+        self.sent_again += u8::from(again);
+        again
     }
 
     fn check_value(&self, job: Job, value: [u8; 4]) -> CheckResult {
