@@ -446,7 +446,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Settings files: simulator.motor_torque_range_nm",
         "Packed frames: what the motor takes torques to span; as the servo states.",
     ),
-    ("Settings files: simulator.rmd_model", "MyActuator: the model that the simulated motor states; that of the settings."),
+    (
+        "Settings files: simulator.rmd_model",
+        "MyActuator: the model that the simulated motor states; that of the settings.",
+    ),
     ("Settings files: simulator.rmd_brake_released", "MyActuator: the brake is released at power-up."),
     (
         "Settings files: simulator.motor_torque_limit_nm",

@@ -1,7 +1,7 @@
 //! A motor that is only looked at, and the parameters that make it this master's: none is written to one that is energised.
 use super::super::fault::{differs, parameter_object};
 use super::super::{AnsweringMotor, Ask, Job, MotorFault, PowerWord};
-use super::{Machine, MotorStage, OBSERVE_AGAIN, SEND_AGAIN_MAX, OBSERVE_MIN, REQUEST_AGAIN, SETTLE, age};
+use super::{Machine, MotorStage, OBSERVE_AGAIN, OBSERVE_MIN, REQUEST_AGAIN, SEND_AGAIN_MAX, SETTLE, age};
 use crate::bring_up::timing::BringUpCycle;
 use crate::servo::{DriveTarget, Nanos};
 
