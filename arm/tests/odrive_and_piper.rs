@@ -79,8 +79,8 @@ fn bad_odrive_settings_are_refused_at_their_key() {
                 "from 1 to 65535",
             ),
             (
-                "watchdog_ms = 100",
-                "watchdog_ms = 99",
+                "\nwatchdog_ms = 100",
+                "\nwatchdog_ms = 99",
                 "servo[0].watchdog_ms",
                 "at least cycle.drive_watchdog_ms",
             ),

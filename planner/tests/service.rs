@@ -228,7 +228,7 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
         assert_eq!((receipt.trajectory_id(), sent.generation), (sent.trajectory_id, 44));
 
         let mut other = robot.clone();
-        other.digest[3] ^= 1;
+        other.message_digest[3] ^= 1;
         let error = send_trajectory(&wire, &other, &still, Duration::from_secs(5)).unwrap_err();
         assert!(matches!(error, SendError::WrongRobot { .. }), "{error}");
     });

@@ -277,7 +277,8 @@ mod tests {
             (
                 refused(0x1_0008, 0x65_0200).at_joint(0),
                 "drive refused its configuration at joint 1 `pan`: object 0x6502:00: the drive does not offer cyclic \
-                 synchronous position (object 0x6502, bit 7)",
+                 synchronous position (object 0x6502, bit 7); one with interpolated position takes position_mode = \
+                 \"interpolated\" in its [[servo]]",
             ),
             (
                 cause(FaultReason::DriveDropped).at_joint(0).code(0x0250),

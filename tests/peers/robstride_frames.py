@@ -25,7 +25,7 @@ TABLES = (MODEL_MIT_POSITION_TABLE, MODEL_MIT_VELOCITY_TABLE, MODEL_MIT_TORQUE_T
 
 
 class Recorder:
-    """A bus that keeps what is sent, and gives back what it was told to."""
+    """A bus that keeps what is sent, and gives back what it was set to."""
 
     def __init__(self):
         self.sent = []

@@ -4,7 +4,7 @@ use crate::test_bench::{TIMEOUT, TestBench};
 use anyhow::{Context, Result, ensure};
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
-use taustream_arm::Reaction;
+use taustream_arm::{Reaction, Servo};
 use taustream_messages::{FaultReason, Phase};
 
 /// A spring under a load does not rest at its command: this far off it may rest. The shipped shoulder carries 10 Nm on
@@ -107,7 +107,9 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.streamer.await_end()?;
     let since = Instant::now();
     // Every motor has its own watchdog, and the brakes hold the arm; a servo that holds by itself keeps its torque.
-    let limp = bench.settings.servos.iter().filter(|servo| servo.reaction == Reaction::Limp).count();
+    // A CubeMars motor stays in its motor mode, without a command.
+    let says_so = |servo: &&Servo| servo.reaction == Reaction::Limp && servo.protocol.name() != "cubemars";
+    let limp = bench.settings.servos.iter().filter(says_so).count();
     while bench.simulator.said().matches("energised=false").count() < limp {
         ensure!(since.elapsed() < TIMEOUT, "motors keep their torque: {}", bench.simulator.said());
         bench.simulator.show("status")?;

@@ -78,11 +78,6 @@ fn robstride6() {
 }
 
 #[test]
-fn ak6() {
-    seeds_of("ak6");
-}
-
-#[test]
 fn odrive6() {
     seeds_of("odrive6");
 }

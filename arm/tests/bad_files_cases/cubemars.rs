@@ -25,7 +25,7 @@ pub(crate) const CASES: &[Case] = &[
     (
         CubeMars,
         "position_range_rad = 12.5",
-        "position_range_rad = 6.0",
+        "position_range_rad = 3.1",
         "servo[0].position_range_rad",
         "another motor: its firmware fixes the range",
     ),
@@ -38,11 +38,11 @@ pub(crate) const CASES: &[Case] = &[
         "up to 500",
     ),
     (CubeMars, "damping_nm_s_rad = 5.0", "damping_nm_s_rad = 5.1", "servo[0].damping_nm_s_rad", "up to 5"),
-    (CubeMars, "watchdog_ms = 100", "", "servo[0].watchdog_ms", "missing"),
+    (CubeMars, "\nwatchdog_ms = 100", "", "servo[0].watchdog_ms", "missing"),
     (
         CubeMars,
-        "watchdog_ms = 100",
-        "watchdog_ms = 99",
+        "\nwatchdog_ms = 100",
+        "\nwatchdog_ms = 99",
         "servo[0].watchdog_ms",
         "at least cycle.drive_watchdog_ms",
     ),

@@ -55,12 +55,12 @@ pub(crate) const CASES: &[Case] = &[
     (RobStride, "torque_limit_nm = 120.0", "torque_limit_nm = nan", "servo[0].torque_limit_nm", "finite"),
     (
         RobStride,
-        "watchdog_ms = 100",
-        "watchdog_ms = 99",
+        "\nwatchdog_ms = 100",
+        "\nwatchdog_ms = 99",
         "servo[0].watchdog_ms",
         "at least cycle.drive_watchdog_ms",
     ),
-    (RobStride, "watchdog_ms = 100", "watchdog_ms = 0", "servo[0].watchdog_ms", "from 1 to 10000"),
+    (RobStride, "\nwatchdog_ms = 100", "\nwatchdog_ms = 0", "servo[0].watchdog_ms", "from 1 to 10000"),
     (RobStride, "gain_ramp_ms = 200", "gain_ramp_ms = 3000", "servo[0].gain_ramp_ms", "a part of enabling"),
     (
         RobStride,

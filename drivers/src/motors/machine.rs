@@ -164,6 +164,8 @@ impl<M: AnsweringMotor> Machine<M> {
             MotorStage::Refused { .. } => DriveState::Refused,
             MotorStage::Gone => DriveState::Fault,
             _ if faulty || self.in_error() => DriveState::Fault,
+            // Who is configured reports where it stands.
+            MotorStage::Ready if self.measured.position_rad.is_nan() => DriveState::Configuring,
             MotorStage::Ready => DriveState::Disabled,
             MotorStage::Verify { .. }
             | MotorStage::Arm { .. }

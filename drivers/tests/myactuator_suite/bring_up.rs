@@ -23,7 +23,7 @@ fn motors_are_only_asked_until_they_are_known_and_get_their_watchdog() {
     arm.steps(2);
     for joint in 0..JOINTS {
         let off_rad = (arm.status(joint).position_rad - arm.servo(joint).position_rad()).abs();
-        assert!(off_rad < 1e-3, "joint {joint} is told {off_rad} rad off");
+        assert!(off_rad < 1e-3, "joint {joint} is reported {off_rad} rad off");
     }
 }
 

@@ -3,6 +3,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use taustream_arm::Damiao;
 use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::mit_setpoints::{self, LogEnds, check_setpoints};
 use taustream_tests::motor_commands;
@@ -87,7 +88,8 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     let ends = if scenario.kills { LogEnds::Early } else { LogEnds::WithTheStreamer };
     let log = cycle_log::parse(&text)?;
     // Damiao motors have a checker that compares gains and velocities too.
-    let check_result = match mit_setpoints::encodings(&settings) {
+    let are_damiao = settings.servos.iter().all(|servo| servo.protocol.get::<Damiao>().is_some());
+    let check_result = match mit_setpoints::encodings(&settings).filter(|_| are_damiao) {
         Some(motors) => check_setpoints((&frames, &log), 0, (&motors, period_s), ends)?,
         None => motor_commands::check(&frames, &log, &settings, ends)?,
     };

@@ -17,7 +17,7 @@ pub struct SimulatedArm {
 const FD_RATES: (&str, &str) = ("virtual = true", "bitrate_bit_s = 1000000\ndata_bitrate_bit_s = 5000000");
 
 /// Every arm.
-pub const ALL: [SimulatedArm; 10] = [
+pub const ALL: [SimulatedArm; 9] = [
     SimulatedArm { name: "vcan6", file: "vcan6.toml", replaced: &[] },
     SimulatedArm { name: "dual-bus", file: "dual-bus.toml", replaced: &[] },
     SimulatedArm { name: "one-bus", file: "one-bus.toml", replaced: &[] },
@@ -25,7 +25,6 @@ pub const ALL: [SimulatedArm; 10] = [
     SimulatedArm { name: "damiao6-fd", file: "damiao6.toml", replaced: &[FD_RATES] },
     SimulatedArm { name: "pos-vel", file: "damiao6.toml", replaced: POS_VEL },
     SimulatedArm { name: "robstride6", file: "robstride6.toml", replaced: &[] },
-    SimulatedArm { name: "ak6", file: "ak6.toml", replaced: &[] },
     SimulatedArm { name: "odrive6", file: "odrive6.toml", replaced: &[] },
     SimulatedArm { name: "vcan6-go-on", file: "vcan6.toml", replaced: GO_ON },
 ];

@@ -27,6 +27,9 @@ pub(super) const STEPS: &[Step] = &[
         scenarios(place, "motor-scenarios", &["--fd", "--only", "goals"])
     }),
     step("scenarios of MyActuator motors", |place| motor_goals(place, "rmd6")),
+    step("scenarios of RobStride motors", |place| motor_goals(place, "robstride6")),
+    step("scenarios of CubeMars motors", |place| motor_goals(place, "ak6")),
+    step("scenarios of ODrive drives", |place| motor_goals(place, "odrive6")),
     step("figures", figures),
 ];
 

@@ -192,8 +192,9 @@ impl AnsweringMotor for MyActuatorMotor {
             Ask::Refresh if self.status.is_some_and(|status| status.errors != 0 && status.is_released) => {
                 self.let_go()
             }
-            Ask::Refresh if self.take_turn(2) == 0 => Request::Angle,
-            Ask::Refresh => Request::Status,
+            // Whether it is energised comes first.
+            Ask::Refresh if self.status.is_none() || self.take_turn(2) == 0 => Request::Status,
+            Ask::Refresh => Request::Angle,
             Ask::Enable => {
                 out.push(Request::Release.encode(self.node_id));
                 Request::Status

@@ -3,7 +3,7 @@
 //! Source: `RobStride`, "RS00 User Manual" of 2026-04-28, sections 4.1.2 (six bits of each feedback) and 4.1.8 (fault report).
 
 /// Faults of a feedback, by bit.
-const TOLD: [&str; 6] = [
+const STATED: [&str; 6] = [
     "under-voltage; check the supply",
     "over-current; check for a blocked joint and a short circuit",
     "too hot; let it cool down",
@@ -36,7 +36,7 @@ pub(super) fn fault_words(error: u8, reported: u8) -> String {
         let bit = error & 0x1F;
         return format!("fault bit {bit}: {}", reported_words(bit));
     }
-    let told: Vec<&str> =
-        TOLD.iter().enumerate().filter(|(bit, _)| error >> bit & 1 != 0).map(|(_, words)| *words).collect();
-    if told.is_empty() { "no fault".to_owned() } else { format!("faults 0x{error:02X}: {}", told.join("; ")) }
+    let stated: Vec<&str> =
+        STATED.iter().enumerate().filter(|(bit, _)| error >> bit & 1 != 0).map(|(_, words)| *words).collect();
+    if stated.is_empty() { "no fault".to_owned() } else { format!("faults 0x{error:02X}: {}", stated.join("; ")) }
 }

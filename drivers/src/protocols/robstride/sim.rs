@@ -231,8 +231,8 @@ impl RobStrideMotor {
     fn fault_report(&self) -> CanFrame {
         const REPORTED: [(u8, u32); 6] =
             [(0x01, 1 << 2), (0x02, 1 << 16), (0x04, 1), (0x08, 1 << 8), (0x10, 1 << 14), (0x20, 1 << 7)];
-        let told = REPORTED.iter().filter(|(bit, _)| self.faults & bit != 0);
-        let faults = told.fold(self.reported, |all, (_, bit)| all | bit);
+        let stated = REPORTED.iter().filter(|(bit, _)| self.faults & bit != 0);
+        let faults = stated.fold(self.reported, |all, (_, bit)| all | bit);
         self.reply(Reply::Fault { faults, warnings: u32::from(self.warm) })
     }
 
