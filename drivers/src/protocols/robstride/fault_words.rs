@@ -38,5 +38,9 @@ pub(super) fn fault_words(error: u8, reported: u8) -> String {
     }
     let stated: Vec<&str> =
         STATED.iter().enumerate().filter(|(bit, _)| error >> bit & 1 != 0).map(|(_, words)| *words).collect();
-    if stated.is_empty() { "no fault".to_owned() } else { format!("faults 0x{error:02X}: {}", stated.join("; ")) }
+    if stated.is_empty() {
+        "no fault".to_owned()
+    } else {
+        format!("faults 0x{error:02X}: {}", stated.join("; "))
+    }
 }
