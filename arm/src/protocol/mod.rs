@@ -3,7 +3,7 @@
 //! A number of one protocol means nothing to another, so the keys of a protocol are unknown keys beside the name of
 //! another. Everything here moves the arm or says how it falls: no key that does has a default.
 //!
-//! A protocol is one file here (its keys, its checks, what it puts on a bus) and one line in [`REGISTRY`]; its frames,
+//! A protocol is one file here (its keys, its checks, what it puts on a bus) and one line in `REGISTRY`; its frames,
 //! bring-up and simulated servo are a folder of `drivers`.
 pub mod cia402;
 pub mod cubemars;

@@ -1,7 +1,7 @@
 //! Every servo protocol, and all drivers of one bus behind one: a bus may carry servos of several protocols, and the cycle
 //! need not know.
 //!
-//! A protocol is a folder here (frames, bring-up, simulated servo, words for its errors) and one line in [`REGISTRY`]; its
+//! A protocol is a folder here (frames, bring-up, simulated servo, words for its errors) and one line in `REGISTRY`; its
 //! keys are a file of `taustream_arm::protocol`. A servo whose motor answers each command is a table for
 //! [`crate::motors`]; any other implements [`ServoDriver`] itself.
 //!
