@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Commands of the source tree, and the step of `cargo xtask test` that covers each of them.
-const CHECKOUT_LINES: [(&str, &str); 12] = [
+const CHECKOUT_LINES: [(&str, &str); 14] = [
     ("cargo test --workspace --test histories", "tests"),
     ("cargo test --workspace --test virtual_arm", "tests"),
     ("cargo xtask planted --check", "planted faults"),
@@ -24,6 +24,8 @@ const CHECKOUT_LINES: [(&str, &str); 12] = [
     ("sudo systemctl enable --now systemd-networkd", "the installed services under systemd"),
     ("sudo cp /usr/share/taustream/network/", "the installed services under systemd"),
     ("cargo mutants -p taustream-", "nothing: it takes hours"),
+    ("cargo build --workspace --bins", "programs"),
+    ("target/debug/vcan-machine", "the scenarios of each protocol"),
 ];
 
 /// How a block is tested.

@@ -134,14 +134,24 @@ fn compare_joint(
 ) -> Result<usize, Flaw> {
     let mut rest = on_bus.iter();
     let mut compared = 0;
+    // A command without gains, which no cycle sent, may stand for the one that a cycle sent right behind it to the same place.
+    let (mut stood_for, mut last_rad) = (0_usize, f64::NAN);
     for cycle in cycles.iter().filter(|cycle| cycle.joint_sent.get(joint) == Some(&true)) {
         let flaw = |what: String| Flaw::Bus { sync: 0, tick: cycle.tick, what };
         let wanted_rad = cycle.position_rad.get(joint).copied().unwrap_or(f64::NAN);
-        let agrees =
-            |command: &Commanded| (command.position_rad - wanted_rad).abs() <= command.half_rad + ROOM_RAD;
-        let found = rest.by_ref().find(|command| command.holds || agrees(command));
+        let is_at =
+            |command: &Commanded, rad: f64| (command.position_rad - rad).abs() <= command.half_rad + ROOM_RAD;
+        let found = rest.by_ref().find(|command| {
+            let agrees = is_at(command, wanted_rad);
+            let is_behind = stood_for > 0 && command.holds && !agrees && is_at(command, last_rad);
+            stood_for -= usize::from(is_behind);
+            !is_behind && (command.holds || agrees)
+        });
         match found {
-            Some(command) if agrees(command) => compared += 1,
+            Some(command) if is_at(command, wanted_rad) => {
+                stood_for += usize::from(!command.holds);
+                (compared, last_rad) = (compared + 1, wanted_rad);
+            }
             Some(command) => {
                 let sent_rad = command.position_rad;
                 return Err(flaw(format!(
@@ -153,7 +163,7 @@ fn compare_joint(
         }
     }
     let unknown = rest.filter(|command| command.holds).count();
-    if unknown > 0 && ends == LogEnds::WithTheStreamer {
+    if unknown > stood_for && ends == LogEnds::WithTheStreamer {
         let joint = joint + 1;
         return Err(Flaw::Log(format!(
             "joint {joint} was commanded {unknown} times that the log does not know"
