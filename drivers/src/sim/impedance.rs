@@ -19,6 +19,20 @@ pub struct Mounting {
     pub step_ns: u64,
 }
 
+/// The torque of `kp (p - q) + kd (v - w) + t`, taken at the end of the step: stable for any gains. Motor side.
+pub(crate) fn spring_nm(
+    command: &MitCommand,
+    [q_rad, w_rad_s]: [f64; 2],
+    inertia_kg_m2: f64,
+    dt_s: f64,
+) -> f64 {
+    let (kp, kd) = (command.stiffness_nm_rad, command.damping_nm_s_rad);
+    let wanted_nm = kp * (command.position_rad - q_rad - dt_s * w_rad_s)
+        + kd * (command.velocity_rad_s - w_rad_s)
+        + command.torque_nm;
+    wanted_nm / (1.0 + dt_s * (kd + dt_s * kp) / inertia_kg_m2)
+}
+
 /// A motor on its joint. Angles are the motor's own unless they are said to be the link's.
 #[derive(Clone, Debug)]
 pub(crate) struct Impedance {
@@ -64,16 +78,10 @@ impl Impedance {
         }
     }
 
-    /// The torque of `kp (p - q) + kd (v - w) + t`, taken at the end of the step: stable for any gains.
     fn spring_nm(&self, dt_s: f64, torque_nm_max: f64) -> f64 {
-        let command = &self.commanded;
-        let (kp, kd) = (command.stiffness_nm_rad, command.damping_nm_s_rad);
-        let w_rad_s = self.mechanics.plant.velocity_rad_s * self.mounting.sign;
-        let wanted_nm = kp * (command.position_rad - self.read_rad(0.0) - dt_s * w_rad_s)
-            + kd * (command.velocity_rad_s - w_rad_s)
-            + command.torque_nm;
-        let soft = 1.0 + dt_s * (kd + dt_s * kp) / self.mounting.plant.inertia_kg_m2;
-        (wanted_nm / soft).clamp(-torque_nm_max, torque_nm_max)
+        let at = [self.read_rad(0.0), self.mechanics.plant.velocity_rad_s * self.mounting.sign];
+        let wanted_nm = spring_nm(&self.commanded, at, self.mounting.plant.inertia_kg_m2, dt_s);
+        wanted_nm.clamp(-torque_nm_max, torque_nm_max)
     }
 
     /// Angle of the output shaft as the motor reads it, `ahead_s` after the last whole step.

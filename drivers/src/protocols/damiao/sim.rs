@@ -15,6 +15,7 @@ use crate::codec::mit::{MitCommand, MitRanges, MitState};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
 use crate::sim::controller::Controller;
+use crate::sim::impedance::spring_nm;
 use crate::sim::mechanics::Mechanics;
 use crate::sim::settings::SimulatedJoint;
 use crate::sim::{Disturbance, LoopParameters, ModelParameters, PlantParameters, PlantedObject, ServoModel};
@@ -246,18 +247,13 @@ impl Motor {
         }
     }
 
-    /// The torque at the link of `kp (p - q) + kd (v - w) + t`, taken at the end of the step: stable for any gains.
+    /// The torque at the link of the spring and damper that a command makes of the motor.
     fn spring_nm(&self, dt_s: f64) -> f64 {
-        let command = &self.commanded;
         let sign = self.parameters.sign;
-        let (kp, kd) = (command.stiffness_nm_rad, command.damping_nm_s_rad);
-        let (q_rad, w_rad_s) = (self.motor_rad(0.0), self.mechanics.plant.velocity_rad_s * sign);
-        let wanted_nm = kp * (command.position_rad - q_rad - dt_s * w_rad_s)
-            + kd * (command.velocity_rad_s - w_rad_s)
-            + command.torque_nm;
-        let soft = 1.0 + dt_s * (kd + dt_s * kp) / self.parameters.plant.inertia_kg_m2;
+        let at = [self.motor_rad(0.0), self.mechanics.plant.velocity_rad_s * sign];
+        let wanted_nm = spring_nm(&self.commanded, at, self.parameters.plant.inertia_kg_m2, dt_s);
         let [.., reach_nm] = self.registers.ranges();
-        sign * (wanted_nm / soft).clamp(-reach_nm, reach_nm)
+        sign * wanted_nm.clamp(-reach_nm, reach_nm)
     }
 
     /// Angle of the output shaft as the motor reads it.
