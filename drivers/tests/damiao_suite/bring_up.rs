@@ -1,5 +1,5 @@
 //! From silence to a configured motor: what is looked at, what is written, and what is refused.
-use super::{Arm, JOINTS, edited, motor_of, pos_vel};
+use super::{Arm, DamiaoArm, JOINTS, edited, motor_of, pos_vel};
 use taustream_arm::BusKind;
 use taustream_drivers::protocols::damiao::frames::{Request, Special, Wire};
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, protocols};

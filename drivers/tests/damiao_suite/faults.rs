@@ -1,5 +1,6 @@
 //! What goes wrong with a motor in use, and that nothing comes back by itself.
-use super::{Arm, JOINTS, START_RAD, edited, file};
+use super::{Arm, DamiaoArm, JOINTS, START_RAD, edited};
+use crate::motor_bench::file;
 use taustream_arm::Settings;
 use taustream_drivers::{DriveState, DriveTarget, ServoDriver};
 

@@ -1,5 +1,5 @@
 //! Frames that should never be sent: nothing panics, nothing moves, nothing is believed that is not the motor's.
-use super::{Arm, JOINTS, edited};
+use super::{Arm, DamiaoArm, JOINTS, edited};
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_oneof, proptest};
 use taustream_drivers::protocols::damiao::frames::{Reply, Request, Special, Wire};
 use taustream_drivers::{CanFrame, CanId, DriveState, DriveTarget};

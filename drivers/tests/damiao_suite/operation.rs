@@ -1,5 +1,5 @@
 //! Energising, following, letting go.
-use super::{Arm, JOINTS, edited, motor_of, pos_vel};
+use super::{Arm, DamiaoArm, JOINTS, edited, motor_of, pos_vel};
 use taustream_arm::{Damiao, Settings};
 use taustream_drivers::codec::mit::{MitCommand, MitRanges};
 use taustream_drivers::protocols::damiao::frames::{Request, Special, Wire};

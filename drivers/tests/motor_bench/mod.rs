@@ -27,7 +27,7 @@ pub(crate) struct Arm {
     pub(crate) arriving: Vec<CanFrame>,
 }
 
-fn file(name: &str) -> PathBuf {
+pub(crate) fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings").join(name)
 }
 
