@@ -6,3 +6,4 @@
     reason = "a test ends by panicking"
 )]
 mod odrive_suite;
+mod shipped_bench;

@@ -1,81 +1,11 @@
 //! The shipped settings: the drivers of their bus against the simulated servos of their `[simulator]`.
-use std::path::Path;
+use crate::shipped_bench::{self, Arm};
 use taustream_arm::Settings;
-use taustream_drivers::protocols::{self, BusDriver};
-use taustream_drivers::sim::settings::drives;
-use taustream_drivers::sim::{FaultRequest, ServoSimulator};
-use taustream_drivers::{DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
-
-struct Arm {
-    driver: BusDriver,
-    simulator: ServoSimulator,
-    period_ns: u64,
-    now: Nanos,
-    target: DriveTarget,
-    commands: [JointCommand; 8],
-    arriving: Vec<taustream_drivers::CanFrame>,
-}
+use taustream_drivers::sim::FaultRequest;
+use taustream_drivers::{DriveState, ServoDriver};
 
 fn settings(edits: &[(&str, &str)]) -> Settings {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/odrive6.toml");
-    let mut text = std::fs::read_to_string(&path).unwrap();
-    for (from, to) in edits {
-        assert!(text.contains(from), "no {from:?}");
-        text = text.replace(from, to);
-    }
-    Settings::from_toml(&path, &text).unwrap_or_else(|faults| panic!("{faults}"))
-}
-
-impl Arm {
-    fn new(settings: &Settings) -> Self {
-        Self {
-            driver: protocols::of_bus(settings, 0).unwrap(),
-            simulator: ServoSimulator::new(drives(settings, None).unwrap(), 1, 1),
-            period_ns: u64::from(settings.cycle.period_us) * 1000,
-            now: Nanos(1_000_000_000),
-            target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
-            arriving: Vec::new(),
-        }
-    }
-
-    fn step(&mut self) {
-        let mut batch = FrameBatch::new();
-        self.driver.encode(self.now, self.target, &self.commands, &mut batch);
-        for frame in self.arriving.drain(..) {
-            self.driver.decode(self.now, &frame);
-        }
-        let mut out = [Vec::new()];
-        self.simulator.advance(self.now, &mut out);
-        self.simulator.receive(self.now, 0, batch.frames(), &mut out);
-        self.arriving.append(&mut out[0]);
-        self.now.0 += self.period_ns;
-    }
-
-    fn until(&mut self, state: DriveState) {
-        for _ in 0..3_000 {
-            if (0..6).all(|joint| self.driver.status(joint).state == state) {
-                return;
-            }
-            self.step();
-        }
-        let status = self.driver.status(0);
-        panic!(
-            "not {state:?}: {:?} {}",
-            status.state,
-            taustream_drivers::words::explain_refusal(&status.refusal())
-        );
-    }
-
-    fn enable(&mut self) {
-        self.until(DriveState::Disabled);
-        (0..20).for_each(|_| self.step());
-        for joint in 0..6 {
-            self.commands[joint].position_rad = self.driver.status(joint).position_rad;
-        }
-        self.target = DriveTarget::Enabled;
-        self.until(DriveState::Enabled);
-    }
+    shipped_bench::settings("odrive6.toml", edits)
 }
 
 #[test]
