@@ -1,7 +1,7 @@
 //! The size of an effect, its doubt, and what both say of a claim.
 use crate::claim::Verdict;
 use crate::number::figures;
-use crate::statistics::{Estimate, Paired, median, share, shift, spread, wilcoxon};
+use crate::statistics::{Estimate, Level, Paired, median, share, shift, spread, wilcoxon};
 use crate::trial::Sample;
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub enum Claimed {
     Never,
 }
 
-/// An effect with its 95 % interval and its margin, which was stated before anything was measured.
+/// An effect with its interval and its margin, which was stated before anything was measured.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Effect {
     /// What it compares, in words that end where the number begins.
@@ -65,11 +65,15 @@ impl Effect {
     /// By how many percent the first is less than the second, pair by pair: the shift of the ratios' logarithms. Values
     /// below `floor` count as it: what is below is rounding.
     #[must_use]
-    pub fn ratio((name, ours): (&str, &[f64]), (other, theirs): (&str, &[f64]), floor: f64) -> Self {
+    pub fn ratio(
+        (name, ours): (&str, &[f64]),
+        (other, theirs): (&str, &[f64]),
+        (floor, level): (f64, Level),
+    ) -> Self {
         let floored = |values: &[f64]| values.iter().map(|v| v.max(floor)).collect::<Vec<_>>();
         let (ours, theirs) = (floored(ours), floored(theirs));
         let logs: Vec<f64> = ours.iter().zip(&theirs).map(|(a, b)| (b / a).ln()).collect();
-        let estimate = shift(&logs).map(|log| 100.0 * (1.0 - (-log).exp()));
+        let estimate = shift(&logs, level).map(|log| 100.0 * (1.0 - (-log).exp()));
         Self {
             what: format!("{name} less than {other} by"),
             unit: "%",
@@ -87,13 +91,13 @@ impl Effect {
     pub fn difference(
         (name, ours): (&str, &Sample),
         (other, theirs): (&str, &Sample),
-        (margin, unit): (f64, &'static str),
+        (margin, unit, level): (f64, &'static str, Level),
     ) -> Self {
         let differences: Vec<f64> = ours.values.iter().zip(&theirs.values).map(|(a, b)| b - a).collect();
         Self {
             what: format!("{name} less than {other} by"),
             unit,
-            estimate: shift(&differences),
+            estimate: shift(&differences, level),
             margin,
             claimed: Claimed::Gain,
             p: Some(wilcoxon(&ours.values, &theirs.values).p),
@@ -104,8 +108,12 @@ impl Effect {
 
     /// By how many percent the first is spread less than the second, by Brown and Forsythe's test.
     #[must_use]
-    pub fn steadier((name, ours): (&str, &[f64]), (other, theirs): (&str, &[f64]), margin: f64) -> Self {
-        let (estimate, p) = spread(ours, theirs);
+    pub fn steadier(
+        (name, ours): (&str, &[f64]),
+        (other, theirs): (&str, &[f64]),
+        (margin, level): (f64, Level),
+    ) -> Self {
+        let (estimate, p) = spread(ours, theirs, level);
         let [low, high] = estimate.interval;
         let estimate = Estimate { value: -100.0 * estimate.value, interval: [-100.0 * high, -100.0 * low] };
         Self {
@@ -122,8 +130,8 @@ impl Effect {
 
     /// By how many points more than half of the runs do something.
     #[must_use]
-    pub fn majority(what: &str, count: usize, of: usize) -> Self {
-        let estimate = share(count, of).map(|share| 100.0 * (share - 0.5));
+    pub fn majority(what: &str, [count, of]: [usize; 2], level: Level) -> Self {
+        let estimate = share(count, of, level).map(|share| 100.0 * (share - 0.5));
         Self {
             what: format!("{what} in {count} of {of} runs, above half by"),
             unit: "points",
@@ -138,11 +146,11 @@ impl Effect {
 
     /// The share of runs that do what no run is claimed to do.
     #[must_use]
-    pub fn never(what: &str, count: usize, of: usize) -> Self {
+    pub fn never(what: &str, [count, of]: [usize; 2], level: Level) -> Self {
         Self {
             what: format!("{what} in {count} of {of} runs,"),
             unit: "%",
-            estimate: share(count, of).map(|share| 100.0 * share),
+            estimate: share(count, of, level).map(|share| 100.0 * share),
             margin: NEVER_PERCENT,
             claimed: Claimed::Never,
             p: None,
@@ -153,8 +161,8 @@ impl Effect {
 
     /// How far a median is below a value.
     #[must_use]
-    pub fn below((name, values): (&str, &[f64]), at_most: f64, unit: &'static str) -> Self {
-        let median = median(values);
+    pub fn below((name, values): (&str, &[f64]), at_most: f64, (unit, level): (&'static str, Level)) -> Self {
+        let median = median(values, level);
         let [low, high] = median.interval;
         let estimate = Estimate { value: at_most - median.value, interval: [at_most - high, at_most - low] };
         Self {
@@ -171,7 +179,7 @@ impl Effect {
 
     /// How far a median is above a value.
     #[must_use]
-    pub fn above((name, values): (&str, &[f64]), at_least: f64, unit: &'static str) -> Self {
+    pub fn above((name, values): (&str, &[f64]), at_least: f64, unit: (&'static str, Level)) -> Self {
         let below = Self::below((name, values), at_least, unit);
         let Estimate { value, interval: [low, high] } = below.estimate;
         Self {
@@ -183,8 +191,12 @@ impl Effect {
 
     /// How far a median is from a printed value, either way.
     #[must_use]
-    pub fn near((name, values): (&str, &[f64]), printed: f64, (margin, unit): (f64, &'static str)) -> Self {
-        let median = median(values);
+    pub fn near(
+        (name, values): (&str, &[f64]),
+        printed: f64,
+        (margin, unit, level): (f64, &'static str, Level),
+    ) -> Self {
+        let median = median(values, level);
         let [low, high] = median.interval.map(|end| (end - printed).abs());
         let value = (median.value - printed).abs();
         let nearest =
@@ -207,11 +219,11 @@ impl Effect {
 
     /// A rise in percent that is claimed not to be there.
     #[must_use]
-    pub fn no_rise(what: &str, logs: &[f64], margin: f64) -> Self {
+    pub fn no_rise(what: &str, logs: &[f64], (margin, level): (f64, Level)) -> Self {
         Self {
             what: what.to_owned(),
             unit: "%",
-            estimate: shift(logs).map(|log| 100.0 * (log.exp() - 1.0)),
+            estimate: shift(logs, level).map(|log| 100.0 * (log.exp() - 1.0)),
             margin,
             claimed: Claimed::Nothing,
             p: Some(wilcoxon(logs, &vec![0.0; logs.len()]).p),

@@ -1,4 +1,5 @@
 //! How much work an experiment may do, and how its runs are spread over threads.
+use crate::looks::Looks;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use taustream_optimizers::Refusal;
 use taustream_optimizers::papers::spline::SplineError;
@@ -95,6 +96,22 @@ impl<'a> RunContext<'a> {
         self.effort.runs.unwrap_or_else(|| self.choose(full, quick)).clamp(1, RUNS_MAX)
     }
 
+    /// Looks at a full run's numbers of runs; else one look, at as many as the user asked for, or `quick`.
+    #[must_use]
+    pub fn looks(&self, full: Looks, quick: usize) -> Looks {
+        match self.effort.runs {
+            None if !self.effort.quick => full,
+            Some(_) | None => Looks::new(self.runs(full.first(), quick), 1),
+        }
+    }
+
+    /// The same, never more than in a full run: `--runs` asks for few of everything.
+    #[must_use]
+    pub fn looks_at_most(&self, full: Looks, quick: usize) -> Looks {
+        let looks = self.looks(full, quick);
+        if looks.last() > full.last() { full } else { looks }
+    }
+
     /// The seed of a run. All methods get the same one for the same run, so that they begin with the same random
     /// numbers and are compared pair by pair.
     #[must_use]
@@ -112,6 +129,21 @@ impl<'a> RunContext<'a> {
     #[must_use]
     pub fn is_over(&self) -> bool {
         (self.is_over)()
+    }
+
+    /// Does `one` for every further number below `count`, and keeps what is there.
+    ///
+    /// # Errors
+    /// As [`Self::each`].
+    pub fn up_to<T: Send>(
+        &self,
+        count: usize,
+        done: &mut Vec<T>,
+        one: impl Fn(usize) -> Result<T, Stop> + Sync,
+    ) -> Result<(), Stop> {
+        let from = done.len();
+        done.extend(self.each(count.saturating_sub(from), |i| one(from + i))?);
+        Ok(())
     }
 
     /// Does `one` for every number below `count`, on all threads; the answers in the order of the numbers.

@@ -2,6 +2,7 @@
 use crate::claim::{Claim, Verdict};
 use crate::effect::Effect;
 use crate::number::figures;
+use crate::statistics::Level;
 
 /// A decade round ours, on its logarithm.
 pub(crate) const FACTORS: [f64; 2] = [0.316_227_766, 3.162_277_66];
@@ -14,16 +15,63 @@ pub(crate) struct At {
     pub(crate) verdict: Verdict,
 }
 
+/// How many values a claim is looked at, and the level of all of them together.
+#[derive(Clone, Copy)]
+pub(crate) struct Values {
+    pub(crate) count: usize,
+    pub(crate) level: Level,
+}
+
+impl Values {
+    /// So many, in a single look.
+    pub(crate) const fn of(count: usize) -> Self {
+        Self { count, level: Level::FIVE_PERCENT }
+    }
+
+    /// What all effects say at the level of one value alone, and at that of one of so many.
+    fn words(self, effects: impl Fn(Level) -> Vec<Effect>) -> [Verdict; 2] {
+        let levels = [self.level, self.level.over(self.count)];
+        levels.map(|level| Verdict::all(effects(level).iter().map(Effect::verdict)))
+    }
+}
+
 impl At {
-    /// The claim stands there when all of these effects do.
-    pub(crate) fn all(label: impl Into<String>, effects: &[Effect]) -> Self {
-        Self { label: label.into(), verdict: Verdict::all(effects.iter().map(Effect::verdict)) }
+    /// For a claim that one value suffices for: what speaks for it is held to the level of one of so many values, what
+    /// speaks against it, which has to be so at all of them, to that of one.
+    pub(crate) fn some(
+        label: impl Into<String>,
+        values: Values,
+        effects: impl Fn(Level) -> Vec<Effect>,
+    ) -> Self {
+        Self { label: label.into(), verdict: words_for_some(values.words(effects)) }
+    }
+
+    /// For a claim that has to stand at all values: the other way round.
+    pub(crate) fn every(
+        label: impl Into<String>,
+        values: Values,
+        effects: impl Fn(Level) -> Vec<Effect>,
+    ) -> Self {
+        let verdict = match values.words(effects) {
+            [_, Verdict::DoesNotHold] => Verdict::DoesNotHold,
+            [Verdict::DoesNotHold, _] => Verdict::Open,
+            [alone, _] => alone,
+        };
+        Self { label: label.into(), verdict }
     }
 
     /// What a calculation says.
     pub(crate) fn exact(label: impl Into<String>, holds: bool) -> Self {
         let verdict = if holds { Verdict::Holds } else { Verdict::DoesNotHold };
         Self { label: label.into(), verdict }
+    }
+}
+
+/// The word at one value, from those at the level of one value and of one of so many.
+pub(crate) fn words_for_some([alone, of_many]: [Verdict; 2]) -> Verdict {
+    match alone {
+        Verdict::Holds => of_many,
+        Verdict::DoesNotHold | Verdict::Open | Verdict::CannotBeChecked => alone,
     }
 }
 
@@ -61,6 +109,23 @@ pub(crate) fn at_every(says: &str, rule: &str, settings: &[At]) -> Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Goal: six of eight coins on one side are no news among forty handfuls.
+    #[test]
+    fn one_of_many_values_needs_more_evidence_than_a_single_one() {
+        let effects = |count: usize| move |level| vec![Effect::majority("it bends", [count, 100], level)];
+        let words = |count: usize, values: usize| {
+            let values = Values::of(values);
+            [At::some("a", values, effects(count)), At::every("a", values, effects(count))]
+                .map(|at| at.verdict)
+        };
+        use Verdict::{DoesNotHold, Holds, Open};
+        assert_eq!(words(61, 1), [Holds, Holds]);
+        assert_eq!(words(61, 40), [Open, Holds], "one of forty holds by chance");
+        assert_eq!(words(49, 1), [DoesNotHold, DoesNotHold]);
+        assert_eq!(words(49, 40), [DoesNotHold, Open], "one of forty does not by chance");
+        assert_eq!(words(75, 40), [Holds, Holds]);
+    }
 
     #[test]
     fn swept_claim_names_the_values_by_their_words_and_needs_one_or_all() {

@@ -6,7 +6,7 @@ use crate::effect::{Claimed, Effect};
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Summary, wilcoxon};
+use crate::statistics::{Level, Summary, wilcoxon};
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::control_point_count::{Chosen, Growth};
 use taustream_optimizers::{End, Parameters, Progress, Reading, Run};
@@ -58,7 +58,11 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
         let free = criterion.iter().zip(&fixed).filter(|((_, a), (_, b))| !a && !b);
         let (ours, theirs): (Vec<f64>, Vec<f64>) = free.map(|((a, _), (b, _))| (*a, *b)).unzip();
         let name = format!("M = {count}");
-        let effect = Effect::ratio((&name, &theirs), ("the criterion", &ours), f64::MIN_POSITIVE);
+        let effect = Effect::ratio(
+            (&name, &theirs),
+            ("the criterion", &ours),
+            (f64::MIN_POSITIVE, Level::FIVE_PERCENT),
+        );
         effects.push(effect.claimed(Claimed::Nothing));
         table.row(
             format!("fixed, M = {count}"),

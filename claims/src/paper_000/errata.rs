@@ -8,7 +8,7 @@ use crate::effect::Effect;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Summary, wilcoxon};
+use crate::statistics::{Level, Summary, wilcoxon};
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::control_points::CONTROL_POINTS;
 use taustream_optimizers::{Parameters, Reading, Swarming};
@@ -55,7 +55,7 @@ fn summed_distance(run_context: &RunContext) -> Result<Claim, Stop> {
         "The penalty of eq. 3.8 and 3.9, with the distances to all links added up, sees collisions",
         "more than half of random poses of a UR5 with a link nearer than radius and expansion have a penalty: above 0 (holds), below \
          10 points (does not hold), or neither",
-        vec![Effect::majority("a penalty", seen, touching)],
+        vec![Effect::majority("a penalty", [seen, touching], Level::FIVE_PERCENT)],
     ))
 }
 
@@ -88,7 +88,7 @@ fn swarming(run_context: &RunContext) -> Result<(Table, Claim), Stop> {
     let claim = Claim::tested(
         "Swarming (eq. 3.3) guides the bacteria",
         "with it BFOA finds less than without, at equal evaluations: above 0 (holds), below 1 % (does not hold), or neither",
-        vec![Effect::ratio(("with swarming", &a), ("without", &b), f64::MIN_POSITIVE)],
+        vec![Effect::ratio(("with swarming", &a), ("without", &b), (f64::MIN_POSITIVE, Level::FIVE_PERCENT))],
     )
     .beside(format!("J_ar of 11 neighbours is at most {} beside costs from {}", figures(largest), figures(least_cost)));
     Ok((table, claim))

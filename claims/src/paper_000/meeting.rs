@@ -14,13 +14,11 @@ pub(super) struct Meeting {
     pub(super) fair: CostModel,
     /// Box of the spheres' centres (m).
     pub(super) centres_m: Centres,
-    /// How many scenes.
-    pub(super) runs: usize,
     /// Most evaluations.
     pub(super) budget: usize,
 }
 
-/// What came of it.
+/// What came of it. A method may have met fewer scenes than another.
 pub(super) struct Field {
     /// Method by method, run by run.
     pub(super) courses: Vec<Vec<Course>>,
@@ -30,36 +28,46 @@ pub(super) struct Field {
     pub(super) collides: Vec<Vec<bool>>,
 }
 
+impl Field {
+    /// Nothing yet, of so many methods.
+    pub(super) fn new(methods: usize) -> Self {
+        Self {
+            courses: (0..methods).map(|_| Vec::new()).collect(),
+            straight: Vec::new(),
+            collides: vec![Vec::new(); methods],
+        }
+    }
+}
+
 impl Meeting {
-    /// All runs of one method.
-    pub(super) fn courses(
+    /// Runs one method in every scene below `runs` that it has not met. What is free is decided by the least distance,
+    /// whatever was optimised.
+    pub(super) fn run(
         &self,
         run_context: &RunContext,
+        (field, method): (&mut Field, usize),
         make: &(dyn Fn() -> Box<dyn Optimizer> + Sync),
-    ) -> Result<Vec<Course>, Stop> {
+        runs: usize,
+    ) -> Result<(), Stop> {
         let robot = ur5()?;
-        run_context.each(self.runs, |run| {
+        let (Some(courses), Some(collides)) = (field.courses.get_mut(method), field.collides.get_mut(method))
+        else {
+            return Ok(());
+        };
+        run_context.up_to(runs, courses, |run| {
             let case = case_within(run_context, &robot, &self.centres_m, run)?;
             let problem = case.problem(&robot, CONTROL_POINTS, self.model).map_err(refused)?;
             follow(run_context, make().as_ref(), &problem, run_context.seed(run), self.budget)
-        })
-    }
-
-    /// What is free is decided by the least distance, whatever was optimised.
-    pub(super) fn field(&self, run_context: &RunContext, courses: Vec<Vec<Course>>) -> Result<Field, Stop> {
-        let robot = ur5()?;
-        let mut field = Field { collides: vec![Vec::new(); courses.len()], courses, straight: Vec::new() };
-        for run in 0..self.runs {
+        })?;
+        for (run, course) in courses.iter().enumerate().skip(collides.len()) {
             let case = case_within(run_context, &robot, &self.centres_m, run)?;
             let problem = case.problem(&robot, CONTROL_POINTS, self.fair).map_err(refused)?;
-            let straight = problem.straight();
-            let rated = problem.rate_exactly(&straight);
-            field.straight.push(rated.map_or((f64::NAN, false), |c| (c.cost, !c.collision)));
-            for (collides, courses) in field.collides.iter_mut().zip(&field.courses) {
-                let rated = courses.get(run).and_then(|c| problem.rate_exactly(&c.found.x));
-                collides.push(rated.is_none_or(|c| c.collision));
+            collides.push(problem.rate_exactly(&course.found.x).is_none_or(|c| c.collision));
+            if run == field.straight.len() {
+                let rated = problem.rate_exactly(&problem.straight());
+                field.straight.push(rated.map_or((f64::NAN, false), |c| (c.cost, !c.collision)));
             }
         }
-        Ok(field)
+        Ok(())
     }
 }

@@ -12,7 +12,7 @@ use crate::effect::Effect;
 use crate::figure::Figure;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Summary, quantile};
+use crate::statistics::{Level, Summary, quantile};
 use crate::table::{Cell, Table};
 use taustream_arm::Robot;
 use taustream_motion::profile::{Profile, TauJ, TauJStar};
@@ -22,6 +22,8 @@ use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
 use taustream_optimizers::{Parameters, Reading};
 
 const RUNS: usize = 30;
+/// Scenes in which a collision is looked for until one refutes the claim: two in a hundred refute it in 99 of 100 seeds.
+const COLLISION_RUNS: usize = 240;
 const QUICK_EVALUATIONS: usize = 200;
 /// What a jump of the jerk is at least: rounding (rad/s³).
 pub(super) const LEAST: f64 = 1e-9;
@@ -47,7 +49,8 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
          as the bacteria's evaluations have; its way is timed by Tau-J* strokes that share the paper's 24 s for equal peaks of the jerk"
     ));
     outcome.tables.push(table(&all));
-    outcome.claims = claims(&robot, &all);
+    outcome.claims = vec![collisions(run_context, &robot, &all)?];
+    outcome.claims.extend(claims(&robot, &all));
     outcome.figures = figures(&robot, &all);
     Ok(outcome)
 }
@@ -160,7 +163,7 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
             Some((figure(of(0)?), figure(of(other)?)))
         });
         let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs.unzip();
-        Effect::ratio((WAYS[0], &ours), (WAYS[other], &theirs), LEAST)
+        Effect::ratio((WAYS[0], &ours), (WAYS[other], &theirs), (LEAST, Level::FIVE_PERCENT))
     };
     let against_both = |says: &str, what: &str, figure: fn(&PathCost) -> f64| {
         let rule = format!(
@@ -168,16 +171,7 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
         );
         Claim::tested(says, &rule, [1, 2].map(|other| compare(other, figure)).to_vec())
     };
-    let lost = |tip_path: usize| {
-        let free = worths(all, tip_path).iter().filter(|w| !w.cost.collision).count();
-        Effect::never(&format!("{} collides or finds nothing", WAYS[tip_path]), all.len() - free, all.len())
-    };
     vec![
-        Claim::tested(
-            "All three find collision-free trajectories",
-            "in every scene each finds a path, and it is free by the least distance of the links to the spheres; one refutes it",
-            (0..3).map(lost).collect(),
-        ),
         against_both("IBFOA-Tau-J* finds the shortest path of the tip", "its path", |w| w.cost.path_length_m),
         against_both(
             "IBFOA-Tau-J*'s motion is the most compliant: no jump of the jerk at control points",
@@ -192,6 +186,32 @@ fn claims(robot: &Robot, all: &[Run]) -> Vec<Claim> {
         unbounded(robot, &worths(all, 0)),
         torque(robot, all),
     ]
+}
+
+/// Which of the three found a path that is free.
+fn is_free(run: &Run) -> [bool; 3] {
+    run.found.each_ref().map(|found| found.as_ref().is_some_and(|(_, worth)| !worth.cost.collision))
+}
+
+/// The scenes of the table, and further ones until one refutes the claim.
+fn collisions(run_context: &RunContext, robot: &Robot, all: &[Run]) -> Result<Claim, Stop> {
+    let mut free: Vec<[bool; 3]> = all.iter().map(is_free).collect();
+    let most = if all.len() < RUNS { all.len() } else { COLLISION_RUNS };
+    while free.len() < most && free.iter().flatten().all(|free| *free) {
+        let runs = free.len() + RUNS;
+        run_context.say(&format!("  a collision of one of the three, {runs} scenes .."));
+        run_context.up_to(runs, &mut free, |run| Ok(is_free(&one(run_context, robot, run)?)))?;
+    }
+    let lost = |(way, name): (usize, &str)| {
+        let lost = free.iter().filter(|free| !free[way]).count();
+        let what = format!("{name} collides or finds nothing");
+        Effect::never(&what, [lost, free.len()], Level::FIVE_PERCENT)
+    };
+    let rule = format!(
+        "in every scene each finds a path, and it is free by the least distance of the links to the spheres; one of {most} scenes refutes it"
+    );
+    let effects = WAYS.into_iter().enumerate().map(lost).collect();
+    Ok(Claim::tested("All three find collision-free trajectories", &rule, effects))
 }
 
 /// Figures 6 and 7 show torques and call them reasonable by design.
@@ -212,7 +232,7 @@ fn torque(robot: &Robot, all: &[Run]) -> Claim {
     Claim::tested(
         says,
         "no motion of IBFOA-Tau-J* needs more than the UR5's joints have (150 Nm, wrists 28 Nm); one refutes it",
-        vec![Effect::never("a torque is exceeded", beyond, shares.len())],
+        vec![Effect::never("a torque is exceeded", [beyond, shares.len()], Level::FIVE_PERCENT)],
     )
     .beside(format!("the most loaded joint uses {median} % of its torque in the median scene, {most} % at most"))
 }
@@ -236,7 +256,7 @@ fn unbounded(robot: &Robot, worths: &[PathCost]) -> Claim {
     Claim::tested(
         "Velocity, acceleration and jerk are reasonable by design: no constraints need to be evaluated",
         "no motion of IBFOA-Tau-J* exceeds the UR5's limits; one refutes it",
-        vec![Effect::never("a limit is exceeded", beyond, worths.len())],
+        vec![Effect::never("a limit is exceeded", [beyond, worths.len()], Level::FIVE_PERCENT)],
     )
     .beside(format!(
         "a step of 2π asks for {} rad/s and {} rad/s³ whatever the arm: it is T = 6 s that keeps them low, not the method",

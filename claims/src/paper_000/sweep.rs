@@ -2,17 +2,26 @@
 use super::contenders::{BFOA, BSO, IBFOA};
 use super::meeting::{Field, Meeting};
 use super::{Unit, trees};
+use crate::claim::Claim;
 use crate::effect::Effect;
+use crate::looks::{self, Look, settle};
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::swept::{At, FACTORS, at_some, label};
+use crate::statistics::Level;
+use crate::swept::{At, FACTORS, Values, at_some, label};
 use crate::table::{Cell, Table};
 use taustream_optimizers::cost::CostModel;
 use taustream_optimizers::papers::control_points::Case;
-use taustream_optimizers::{Bso, Parameters, Reading, Setup};
+use taustream_optimizers::{Bso, Optimizer, Parameters, Reading, Setup};
 
-const RUNS: usize = 14;
+/// Places of the claims.
+const BETTER: usize = 0;
+const FASTER: usize = 1;
+const BETTER_THAN_BSO: usize = 2;
+/// The place of BSO with our constants.
+const PAPERS_BSO: usize = 2;
+
 const QUICK_RUNS: usize = 2;
 const QUICK: usize = 130;
 /// Weights of L over ours, which is 7 a metre; the last one is 7 a millimetre.
@@ -33,107 +42,134 @@ const SWEPT: [Swept; 3] = [
     Swept { name: "c_2", ours: Bso::PULLS[1], make: |c, ours| Bso { pulls: [Bso::PULLS[0], c], ..ours } },
 ];
 
-/// The paper's three at one value; with BSO's constants, IBFOA against BSO alone.
-struct Setting {
-    label: String,
-    free: usize,
-    of: usize,
-    /// IBFOA less than BFOA: at the end, after a quarter.
-    bfoa: Option<[Effect; 2]>,
-    /// IBFOA less than BSO at the end.
-    bso: Effect,
+/// The methods at one weight of L and one size of the box: BFOA, IBFOA, BSO, and BSO with other constants.
+struct Arena {
+    meeting: Meeting,
+    makes: Vec<Box<dyn Fn() -> Box<dyn Optimizer> + Sync>>,
+    field: Field,
+    /// What stands in the table: a value, and the BSO there.
+    rows: Vec<(String, usize)>,
 }
 
-impl Setting {
-    /// The methods are BFOA, IBFOA, BSO, and BSO's variants.
-    fn of(label: String, field: &Field, bso: usize) -> Self {
-        let both = [1, 0];
-        let bfoa = (bso == 2)
-            .then(|| [field.at_the_end(both, "IBFOA", "BFOA"), field.after_a_quarter(both, "IBFOA", "BFOA")]);
-        Self {
-            label,
-            free: field.free(&[1, bso]).count(),
-            of: field.straight.len(),
-            bfoa,
-            bso: field.at_the_end([1, bso], "IBFOA", "BSO"),
+impl Arena {
+    /// At a weight of L and a size of the box over ours, also with other constants of BSO.
+    fn new(
+        run_context: &RunContext,
+        label: String,
+        [weight, size]: [f64; 2],
+        constants: &'static [Swept],
+    ) -> Self {
+        let mut model = Unit::Metres.model(Reading::Corrected);
+        model.weights[0] *= weight;
+        let meeting = Meeting {
+            model,
+            fair: model,
+            centres_m: Case::CENTRES_M.map(|ends| ends.map(|end| size * end)),
+            budget: run_context.choose(usize::MAX, QUICK),
+        };
+        let mut makes: Vec<Box<dyn Fn() -> Box<dyn Optimizer> + Sync>> = Vec::new();
+        for contender in [BFOA, IBFOA, BSO] {
+            makes.push(Box::new(move || (contender.make)(Parameters::CASE_1)));
         }
+        let mut rows = vec![(label, PAPERS_BSO)];
+        for Swept { name, ours, make } in constants {
+            for value in FACTORS.map(|factor| factor * ours) {
+                rows.push((self::label(&format!("BSO: {name}"), value), makes.len()));
+                let paper = || Bso { parameters: Parameters::CASE_1, ..Bso::set_up(Setup::default()) };
+                makes.push(Box::new(move || Box::new(make(value, paper()))));
+            }
+        }
+        Self { meeting, field: Field::new(makes.len()), makes, rows }
     }
 
-    fn cells(&self) -> Vec<Cell> {
-        let of = |which: usize| {
-            self.bfoa.as_ref().map_or(Cell::None, |effects| Cell::estimate(effects[which].estimate))
-        };
-        vec![Cell::Share { count: self.free, of: self.of }, of(0), of(1), Cell::estimate(self.bso.estimate)]
+    /// All methods at the first look; later the paper's own two or the BSOs, as their claims are open.
+    fn run(&mut self, run_context: &RunContext, look: &Look) -> Result<(), Stop> {
+        let label = self.rows.first().map_or("", |(label, _)| label.as_str());
+        run_context.say(&format!("  {label}, {} scenes ..", look.runs));
+        let is_bfoa_open = look.is_open(BETTER) || look.is_open(FASTER);
+        for (method, make) in self.makes.iter().enumerate() {
+            let is_needed = match method {
+                0 => is_bfoa_open,
+                1 => is_bfoa_open || look.is_open(BETTER_THAN_BSO),
+                _ => look.is_open(BETTER_THAN_BSO),
+            };
+            if is_needed {
+                self.meeting.run(run_context, (&mut self.field, method), make.as_ref(), look.runs)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn at_the_end(&self, bso: usize, level: Level) -> Effect {
+        self.field.at_the_end([1, bso], ["IBFOA", "BSO"], level)
+    }
+
+    /// IBFOA less than BFOA, at the end and after a quarter.
+    fn bfoa(&self, level: Level) -> [Effect; 2] {
+        let names = ["IBFOA", "BFOA"];
+        [self.field.at_the_end([1, 0], names, level), self.field.after_a_quarter([1, 0], names, level)]
+    }
+
+    fn cells(&self, bso: usize) -> Vec<Cell> {
+        let level = Level::FIVE_PERCENT;
+        let bfoa = self
+            .bfoa(level)
+            .map(|effect| if bso == PAPERS_BSO { Cell::estimate(effect.estimate) } else { Cell::None });
+        let of = self.field.of(1).len().min(self.field.of(bso).len());
+        let free = Cell::Share { count: self.field.free(&[1, bso]).count(), of };
+        let bso = Cell::estimate(self.at_the_end(bso, level).estimate);
+        std::iter::once(free).chain(bfoa).chain([bso]).collect()
     }
 }
 
 /// Runs them.
 pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
-    let mut settings = Vec::new();
+    let mut arenas = Vec::new();
     for (i, factor) in UNITS.into_iter().enumerate() {
         let label = label("weight of L (1/m)", factor * CostModel::default().weights[0]);
         let constants = if i == 0 { &SWEPT[..] } else { &[] };
-        settings.extend(meet(run_context, label, [factor, 1.0], constants)?);
+        arenas.push(Arena::new(run_context, label, [factor, 1.0], constants));
     }
     for size in BOXES {
         let label = format!("centres' box times {}", figures(size));
-        settings.extend(meet(run_context, label, [1.0, size], &[])?);
+        arenas.push(Arena::new(run_context, label, [1.0, size], &[]));
     }
-    let (tree_table, tree_claim) =
-        trees::over_steps(run_context, run_context.runs(RUNS, QUICK_RUNS).min(RUNS))?;
+    let looks = run_context.looks_at_most(looks::UNPRINTED_000, QUICK_RUNS);
+    let claims = settle(looks, |look| {
+        arenas.iter_mut().try_for_each(|arena| arena.run(run_context, look))?;
+        Ok::<_, Stop>(claims(&arenas, look.level))
+    })?;
+    let (tree_table, tree_claim) = trees::over_steps(run_context, looks.first())?;
+    let tables = vec![table(&arenas), tree_table];
+    Ok(Outcome { tables, claims: [claims, vec![tree_claim]].concat(), ..Outcome::default() })
+}
+
+/// In the order of [`BETTER`], [`FASTER`], [`BETTER_THAN_BSO`].
+fn claims(arenas: &[Arena], level: Level) -> Vec<Claim> {
+    let values = Values { count: arenas.len(), level };
     let bfoa = |which: usize| -> Vec<At> {
-        let at =
-            |s: &Setting| s.bfoa.as_ref().map(|effects| At::all(s.label.clone(), &effects[which..=which]));
-        settings.iter().filter_map(at).collect()
+        let at = |arena: &Arena| {
+            let label = arena.rows.first().map_or("", |(label, _)| label.as_str());
+            At::some(label, values, |level| arena.bfoa(level)[which..=which].to_vec())
+        };
+        arenas.iter().map(at).collect()
     };
-    let bso: Vec<At> =
-        settings.iter().map(|s| At::all(s.label.clone(), std::slice::from_ref(&s.bso))).collect();
+    let rows = || arenas.iter().flat_map(|arena| arena.rows.iter().map(move |row| (arena, row)));
+    let values = Values { count: rows().count(), level };
+    let bso = rows().map(|(arena, (label, bso))| {
+        At::some(label.as_str(), values, |level| vec![arena.at_the_end(*bso, level)])
+    });
     let rule = "in scenes that both leave without collision, the population's best at the end is less: above 0 (holds), below 2 % (does not \
                 hold), or neither";
     let quarter = "the population's best after a quarter of the iterations is less: above 0 (holds), below 2 % (does not hold), or neither";
-    let claims = vec![
+    vec![
         at_some("IBFOA finds better solutions than BFOA", rule, &bfoa(0)),
         at_some("IBFOA converges faster than BFOA", quarter, &bfoa(1)),
-        at_some("IBFOA finds better solutions than BSO", rule, &bso),
-        tree_claim,
-    ];
-    Ok(Outcome { tables: vec![table(&settings), tree_table], claims, ..Outcome::default() })
+        at_some("IBFOA finds better solutions than BSO", rule, &bso.collect::<Vec<_>>()),
+    ]
 }
 
-/// The methods at a weight of L and a size of the box over ours, also with other constants of BSO.
-fn meet(
-    run_context: &RunContext,
-    label: String,
-    [weight, size]: [f64; 2],
-    constants: &[Swept],
-) -> Result<Vec<Setting>, Stop> {
-    run_context.say(&format!("  {label} .."));
-    let mut model = Unit::Metres.model(Reading::Corrected);
-    model.weights[0] *= weight;
-    let meeting = Meeting {
-        model,
-        fair: model,
-        centres_m: Case::CENTRES_M.map(|ends| ends.map(|end| size * end)),
-        runs: run_context.runs(RUNS, QUICK_RUNS).min(RUNS),
-        budget: run_context.choose(usize::MAX, QUICK),
-    };
-    let mut courses = Vec::new();
-    for contender in [BFOA, IBFOA, BSO] {
-        courses.push(meeting.courses(run_context, &|| (contender.make)(Parameters::CASE_1))?);
-    }
-    let mut labels = vec![(label, 2)];
-    for Swept { name, ours, make } in constants {
-        for value in FACTORS.map(|factor| factor * ours) {
-            labels.push((self::label(&format!("BSO: {name}"), value), courses.len()));
-            let paper = || Bso { parameters: Parameters::CASE_1, ..Bso::set_up(Setup::default()) };
-            courses.push(meeting.courses(run_context, &|| Box::new(make(value, paper())))?);
-        }
-    }
-    let field = meeting.field(run_context, courses)?;
-    Ok(labels.into_iter().map(|(label, bso)| Setting::of(label, &field, bso)).collect())
-}
-
-fn table(settings: &[Setting]) -> Table {
+fn table(arenas: &[Arena]) -> Table {
     let columns = [
         "",
         "scenes free of collision",
@@ -149,6 +185,8 @@ fn table(settings: &[Setting]) -> Table {
         Bso::PULLS[1]
     );
     let mut table = Table::new("Numbers that the paper does not print", "cost J_c", &note, &columns);
-    settings.iter().for_each(|setting| table.row(setting.label.clone(), setting.cells()));
+    for arena in arenas {
+        arena.rows.iter().for_each(|(label, bso)| table.row(label.clone(), arena.cells(*bso)));
+    }
     table
 }

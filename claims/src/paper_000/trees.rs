@@ -7,8 +7,8 @@ use super::{K, case, ur5};
 use crate::claim::Claim;
 use crate::effect::Effect;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::quantile;
-use crate::swept::{At, FACTORS, at_every, label};
+use crate::statistics::{Level, quantile};
+use crate::swept::{At, FACTORS, Values, at_every, label};
 use crate::table::{Cell, Table};
 use std::cell::Cell as Count;
 use taustream_arm::Robot;
@@ -71,17 +71,17 @@ pub(super) fn over_steps(run_context: &RunContext, runs: usize) -> Result<(Table
         let pairs =
             lengths.iter().filter_map(|all| Some((all.first().copied()??, all.get(i + 1).copied()??)));
         let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs.unzip();
-        let effect = Effect::ratio(("IBFOA", &ours), ("RRT", &theirs), LEAST);
+        let effect = |level: Level| Effect::ratio(("IBFOA", &ours), ("RRT", &theirs), (LEAST, level));
         let label = label("RRT: step (rad)", step_rad);
         table.row(
             label.clone(),
             vec![
                 Cell::Share { count: lengths.iter().filter(|all| all[i + 1].is_some()).count(), of: runs },
                 Cell::number(quantile(&theirs, 0.5)),
-                Cell::estimate(effect.estimate),
+                Cell::estimate(effect(Level::FIVE_PERCENT).estimate),
             ],
         );
-        settings.push(At::all(label, &[effect]));
+        settings.push(At::every(label, Values::of(steps.len()), |level| vec![effect(level)]));
     }
     let claim = at_every(
         "IBFOA-Tau-J* finds a shorter path of the tip than RRT",

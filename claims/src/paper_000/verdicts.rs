@@ -8,7 +8,7 @@ use super::course::{Course, equal_evaluations};
 use super::meeting::Field;
 use crate::claim::{Claim, Verdict};
 use crate::effect::{Claimed, Effect};
-use crate::statistics::quantile;
+use crate::statistics::{Level, quantile};
 
 /// A mean distance from the median that is smaller by less than this is as large (%); the paper claims 7.
 const STEADIER_PERCENT: f64 = 2.0;
@@ -25,45 +25,63 @@ const FLOOR: f64 = f64::MIN_POSITIVE;
 const BOTH_FREE: &str = "in scenes that both leave without collision, the population's best at the end is less: the interval lies above 0 \
      (holds), below 2 % (does not hold), or neither";
 
+/// The methods, by their places among the contenders, that each of [`claims`] looks at.
+pub(super) fn methods(trials: &Trials) -> Vec<Vec<usize>> {
+    let own = [vec![0, 1], vec![1, 2], vec![0, 1], (0..PAPERS_OWN.len()).collect(), vec![0, 1], vec![0, 1]];
+    let pairs = variant_pairs(trials).into_iter().map(|(_, pair)| pair.map(|(i, _)| i).to_vec());
+    own.into_iter().chain(pairs).collect()
+}
+
 /// The verdicts.
-pub(super) fn claims(trials: &Trials, field: &Field) -> Vec<Claim> {
+pub(super) fn claims(trials: &Trials, field: &Field, level: Level) -> Vec<Claim> {
     let title = trials.title();
     let less = |i: usize, name: &str| {
         let says = format!("IBFOA finds better solutions than {name} ({title})");
-        compared(field, &says, [(1, "IBFOA"), (i, name)])
+        compared((field, level), &says, [(1, "IBFOA"), (i, name)])
     };
-    let mut claims = vec![less(0, "BFOA"), less(2, "BSO"), faster(field, &title), steadier(field, &title)];
-    claims.push(elite(trials, field));
+    let mut claims = vec![
+        less(0, "BFOA"),
+        less(2, "BSO"),
+        faster((field, level), &title),
+        steadier((field, level), &title),
+    ];
+    claims.push(elite(trials, (field, level)));
     let logs = field.logs([1, 0], |c| Some(c.evaluations()));
     claims.push(Claim::tested(
         &format!("IBFOA needs nearly no extra computation ({title})"),
         "its evaluations are less than 1 % more than BFOA's",
-        vec![Effect::no_rise("evaluations of IBFOA over BFOA's, more by", &logs, RISE_PERCENT)],
+        vec![Effect::no_rise("evaluations of IBFOA over BFOA's, more by", &logs, (RISE_PERCENT, level))],
     ));
-    claims.extend(variants(trials, field));
+    claims.extend(variants(trials, (field, level)));
     claims
 }
 
-fn compared(field: &Field, says: &str, [(i, ours), (j, theirs)]: [(usize, &str); 2]) -> Claim {
-    let (end, best) =
-        (field.at_the_end([i, j], ours, theirs), field.at_equal_evaluations([i, j], ours, theirs));
+fn compared(
+    (field, level): (&Field, Level),
+    says: &str,
+    [(i, ours), (j, theirs)]: [(usize, &str); 2],
+) -> Claim {
+    let (end, best) = (
+        field.at_the_end([i, j], [ours, theirs], level),
+        field.at_equal_evaluations([i, j], [ours, theirs], level),
+    );
     let verdict = end.verdict();
     Claim::weighed(says, BOTH_FREE, verdict, vec![end])
         .beside(format!("best so far at equal evaluations: {best}"))
 }
 
 /// Figures 2 and 3 show IBFOA below BFOA from the first iterations on.
-fn faster(field: &Field, title: &str) -> Claim {
+fn faster((field, level): (&Field, Level), title: &str) -> Claim {
     Claim::tested(
         &format!("IBFOA converges faster than BFOA ({title})"),
         "the population's best after a quarter of the iterations is less: above 0 (holds), below 2 % (does not hold), or neither",
-        vec![field.after_a_quarter([1, 0], "IBFOA", "BFOA")],
+        vec![field.after_a_quarter([1, 0], ["IBFOA", "BFOA"], level)],
     )
 }
 
 /// The paper reads stability off the deviation over scenes, which is mostly that of the scenes. What is left of it after
 /// each scene's median over the paper's methods is taken off says more.
-fn steadier(field: &Field, title: &str) -> Claim {
+fn steadier((field, level): (&Field, Level), title: &str) -> Claim {
     let all: Vec<usize> = (0..PAPERS_OWN.len()).collect();
     let own = |i: usize| -> Vec<f64> {
         let of = |k: usize, run: usize| field.of(k).get(run).map_or(f64::NAN, |c| c.last().ln());
@@ -76,12 +94,12 @@ fn steadier(field: &Field, title: &str) -> Claim {
         &format!("IBFOA is more stable than BFOA: a deviation 7 % less ({title})"),
         "the logarithm of the population's best at the end, less the scene's median over the three methods, is spread less by Brown \
          and Forsythe's test, in scenes that no population ends in collision: above 0 (holds), below 2 % (does not hold), or neither",
-        vec![Effect::steadier(("IBFOA", &own(1)), ("BFOA", &own(0)), STEADIER_PERCENT)],
+        vec![Effect::steadier(("IBFOA", &own(1)), ("BFOA", &own(0)), (STEADIER_PERCENT, level))],
     )
 }
 
 /// The mean curve at dispersals: figures 2 and 3 show it rising with BFOA, and not with IBFOA.
-fn elite(trials: &Trials, field: &Field) -> Claim {
+fn elite(trials: &Trials, (field, level): (&Field, Level)) -> Claim {
     let every = trials.parameters.tumbles * trials.parameters.reproductions;
     let rises = |i: usize| -> Vec<f64> {
         let of = |c: &Course| {
@@ -91,8 +109,8 @@ fn elite(trials: &Trials, field: &Field) -> Claim {
         field.free(&[0, 1]).filter_map(|run| field.of(i).get(run).map(of)).collect()
     };
     let name = |who: &str| format!("{who}'s curve rises at a dispersal by");
-    let ours = Effect::no_rise(&name("IBFOA"), &rises(1), RISE_PERCENT);
-    let theirs = Effect::no_rise(&name("BFOA"), &rises(0), RISE_PERCENT).claimed(Claimed::Gain);
+    let ours = Effect::no_rise(&name("IBFOA"), &rises(1), (RISE_PERCENT, level));
+    let theirs = Effect::no_rise(&name("BFOA"), &rises(0), (RISE_PERCENT, level)).claimed(Claimed::Gain);
     let up: usize = field.of(1).iter().map(Course::rises).sum();
     let steps: usize = field.of(1).iter().map(Course::steps).sum();
     Claim::tested(
@@ -105,7 +123,15 @@ fn elite(trials: &Trials, field: &Field) -> Claim {
 }
 
 /// What carries the difference, where the variants were run.
-fn variants(trials: &Trials, field: &Field) -> Vec<Claim> {
+fn variants(trials: &Trials, (field, level): (&Field, Level)) -> Vec<Claim> {
+    let claim = |(says, pair): (&str, [(usize, &str); 2])| {
+        compared((field, level), &format!("{says} ({})", trials.title()), pair)
+    };
+    variant_pairs(trials).into_iter().map(claim).collect()
+}
+
+/// What is claimed of each variant that was run, and the two methods that decide it.
+fn variant_pairs(trials: &Trials) -> Vec<(&'static str, [(usize, &'static str); 2])> {
     const ELITE: &str = "BFOA with the printed elite, no decay";
     let at = |name: &str| trials.contenders.iter().position(|c| c.name == name);
     let (elite, greedy) = (at(ELITE), at("greedy BFOA"));
@@ -123,10 +149,7 @@ fn variants(trials: &Trials, field: &Field) -> Vec<Claim> {
             greedy.map(|g| [(g, "greedy BFOA"), (1, "IBFOA")]),
         ),
     ];
-    let claim = |(says, pair): (&str, Option<[(usize, &str); 2]>)| {
-        Some(compared(field, &format!("{says} ({})", trials.title()), pair?))
-    };
-    pairs.into_iter().filter_map(claim).collect()
+    pairs.into_iter().filter_map(|(says, pair)| Some((says, pair?))).collect()
 }
 
 impl Field {
@@ -144,28 +167,38 @@ impl Field {
     }
 
     /// Population's best at the end, method `i` against `j`.
-    pub(super) fn at_the_end(&self, [i, j]: [usize; 2], ours: &str, theirs: &str) -> Effect {
+    pub(super) fn at_the_end(&self, [i, j]: [usize; 2], [ours, theirs]: [&str; 2], level: Level) -> Effect {
         let of = |k: usize| -> Vec<f64> {
             self.free(&[i, j]).filter_map(|run| self.of(k).get(run).map(Course::last)).collect()
         };
-        Effect::ratio((ours, &of(i)), (theirs, &of(j)), FLOOR).margin(GAIN_PERCENT)
+        Effect::ratio((ours, &of(i)), (theirs, &of(j)), (FLOOR, level)).margin(GAIN_PERCENT)
     }
 
     /// Population's best after a quarter of the iterations, method `i` against `j`.
-    pub(super) fn after_a_quarter(&self, [i, j]: [usize; 2], ours: &str, theirs: &str) -> Effect {
+    pub(super) fn after_a_quarter(
+        &self,
+        [i, j]: [usize; 2],
+        [ours, theirs]: [&str; 2],
+        level: Level,
+    ) -> Effect {
         let of = |k: usize| -> Vec<f64> {
             self.free(&[i, j]).filter_map(|run| self.of(k).get(run)?.after(0.25)).collect()
         };
-        Effect::ratio((ours, &of(i)), (theirs, &of(j)), FLOOR).margin(GAIN_PERCENT)
+        Effect::ratio((ours, &of(i)), (theirs, &of(j)), (FLOOR, level)).margin(GAIN_PERCENT)
     }
 
     /// Best so far at equal evaluations, method `i` against `j`.
-    pub(super) fn at_equal_evaluations(&self, [i, j]: [usize; 2], ours: &str, theirs: &str) -> Effect {
+    pub(super) fn at_equal_evaluations(
+        &self,
+        [i, j]: [usize; 2],
+        [ours, theirs]: [&str; 2],
+        level: Level,
+    ) -> Effect {
         let [a, b] = equal_evaluations(self.of(i), self.of(j));
         let free = |values: &[f64]| -> Vec<f64> {
             self.free(&[i, j]).filter_map(|run| values.get(run).copied()).collect()
         };
-        Effect::ratio((ours, &free(&a)), (theirs, &free(&b)), FLOOR).margin(GAIN_PERCENT)
+        Effect::ratio((ours, &free(&a)), (theirs, &free(&b)), (FLOOR, level)).margin(GAIN_PERCENT)
     }
 
     /// All runs of a method.
@@ -177,7 +210,11 @@ impl Field {
 /// Eq. 3.9 adds the distances to all links: what its optima are worth.
 pub(super) fn as_printed(field: &Field, runs: usize) -> Claim {
     let missed = |(contender, collides): (&super::contenders::Contender, &Vec<bool>)| {
-        Effect::never(&format!("{} collides", contender.name), collides.iter().filter(|c| **c).count(), runs)
+        Effect::never(
+            &format!("{} collides", contender.name),
+            [collides.iter().filter(|c| **c).count(), runs],
+            Level::FIVE_PERCENT,
+        )
     };
     let effects: Vec<Effect> = PAPERS_OWN.iter().zip(&field.collides).map(missed).collect();
     Claim::weighed(

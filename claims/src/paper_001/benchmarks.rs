@@ -3,10 +3,11 @@ use crate::chart::Panel;
 use crate::claim::{Claim, Verdict, agrees};
 use crate::effect::Effect;
 use crate::figure::Figure;
+use crate::looks::{self, Looks, settle};
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{Moments, wilcoxon};
+use crate::statistics::{Level, Moments, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, convergence, minimise};
 use taustream_optimizers::papers::{Benchmark, Function};
@@ -38,8 +39,6 @@ pub(super) const DIMENSIONS: usize = 30;
 /// Runs of the paper's own schedules, of which ISMA's takes a million evaluations: enough to see whether a mean is within a
 /// tenth.
 const OWN_RUNS: usize = 2;
-/// Runs at equal evaluations or iterations: what all of ten pairs agree on has p = 0.002.
-const RUNS: usize = 10;
 /// Evaluations of each, a tenth of the paper's schedule: 500 iterations of SMA.
 const EQUAL: usize = POPULATION + POPULATION * 500;
 /// Evaluations of an iteration of most methods, of the sparrows with their watch, and of ISMA.
@@ -65,20 +64,28 @@ struct Case {
 
 impl Case {
     fn trials(self, run_context: &RunContext, runs: usize) -> Result<Vec<Trial>, Stop> {
+        let mut trials = Vec::new();
+        self.more_trials(run_context, &mut trials, runs)?;
+        Ok(trials)
+    }
+
+    /// Further trials until there are so many.
+    fn more_trials(self, run_context: &RunContext, trials: &mut Vec<Trial>, runs: usize) -> Result<(), Stop> {
         let setup = Setup { reading: self.reading, evaluations: self.evaluations };
         let optimizer = |_| by_name(self.method, setup).map_err(|e| Stop::Refused(e.to_string()));
-        run_context.each(runs, |run| {
-            let problem = problem(run_context, self.function, self.is_moved);
+        run_context.up_to(runs, trials, |run| {
+            let problem = problem(run_context, self.function, self.is_moved, run);
             let budget = self.evaluations.unwrap_or(ENOUGH);
             minimise(run_context, optimizer(run)?.as_ref(), &problem, run_context.seed(run), budget)
         })
     }
 }
 
-/// The function as printed, or moved by the same random vector in every run.
-pub(super) fn problem(run_context: &RunContext, function: Function, is_moved: bool) -> Benchmark {
+/// The function as printed, or moved by a random vector: another one in each run, the same for all methods. One for all runs
+/// would be a sample of a single place, and the words would depend on where it lies.
+pub(super) fn problem(run_context: &RunContext, function: Function, is_moved: bool, run: usize) -> Benchmark {
     if is_moved {
-        Benchmark::shifted(function, DIMENSIONS, run_context.seed(0))
+        Benchmark::shifted(function, DIMENSIONS, run_context.seed(run))
     } else {
         Benchmark::new(function, DIMENSIONS)
     }
@@ -114,9 +121,14 @@ fn own_schedules(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), 
         "D = 30, {schedule}, {runs} runs of ours, 30 of the paper; best so far. Only SMA and ISMA have two readings."
     );
     let mut table = Table::new("Tables 2 and 3: mean ± deviation", "", &note, &columns);
-    let mut same = [0; 2];
+    let (mut same, mut seen) = ([0; 2], 0);
     for (f, function) in Function::ALL.into_iter().enumerate() {
         for (m, method) in METHODS.into_iter().enumerate() {
+            // Once neither reading reproduces every mean, the rest is for the table alone.
+            if run_context.is_repeat() && !same.contains(&seen) {
+                continue;
+            }
+            seen += 1;
             run_context.say(&format!("  {} {method}, {runs} runs ..", function.name()));
             let case = Case { method, reading: Reading::Corrected, function, is_moved: false, evaluations };
             let corrected = Sample::best(&case.trials(run_context, runs)?);
@@ -178,11 +190,12 @@ fn in_the_papers_own_table() -> Claim {
 /// The paper gives all methods the same number of iterations, whatever they take: a tenth of its 5000, from the runs at equal
 /// evaluations where those are the same.
 fn equal_iterations(run_context: &RunContext, equal: &[Vec<Sample>]) -> Result<Claim, Stop> {
-    let runs = run_context.runs(RUNS, 5).min(RUNS);
+    let runs = looks_of(run_context).first();
     let iterations = (run_context.choose(EQUAL, QUICK) - POPULATION) / POPULATION;
-    let mut best = Ranking::default();
+    let mut best = Ranking::at(Level::FIVE_PERCENT);
     for (function, samples) in Function::ALL.into_iter().zip(equal) {
         let mut samples = samples.clone();
+        samples.iter_mut().for_each(|sample| sample.values.truncate(runs));
         for (method, each) in [("ssa", BY_SPARROWS), ("isma", BY_ISMA)] {
             run_context.say(&format!("  {} {method}, {iterations} iterations ..", function.name()));
             let (reading, evaluations) = (Reading::Corrected, Some(POPULATION + each * iterations));
@@ -204,59 +217,113 @@ fn equal_iterations(run_context: &RunContext, equal: &[Vec<Sample>]) -> Result<C
 struct Placed {
     table: Table,
     figure: Figure,
-    claims: [Claim; 2],
+    claims: Vec<Claim>,
     /// Function by function, method by method.
     samples: Vec<Vec<Sample>>,
 }
 
+/// The looks at equal evaluations.
+fn looks_of(run_context: &RunContext) -> Looks {
+    run_context.looks_at_most(looks::FUNCTIONS, 5)
+}
+
+/// Trials at equal evaluations: function by function, method by method.
+struct Equal {
+    is_moved: bool,
+    budget: usize,
+    trials: Vec<[Vec<Trial>; METHODS.len()]>,
+}
+
+impl Equal {
+    fn place(&self) -> &'static str {
+        if self.is_moved { "optimum moved" } else { "optimum as printed" }
+    }
+
+    /// Every method on every function, until each has so many trials.
+    fn run(&mut self, run_context: &RunContext, runs: usize) -> Result<(), Stop> {
+        for (function, trials) in Function::ALL.into_iter().zip(&mut self.trials) {
+            let (name, place) = (function.name(), if self.is_moved { "moved" } else { "as printed" });
+            run_context.say(&format!("  {name} at equal evaluations, optimum {place}, {runs} runs .."));
+            for (method, trials) in METHODS.into_iter().zip(trials) {
+                let (reading, evaluations) = (Reading::Corrected, Some(self.budget));
+                let case = Case { method, reading, function, is_moved: self.is_moved, evaluations };
+                case.more_trials(run_context, trials, runs)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Who is best at the end, and who after a quarter.
+    fn claims(&self, level: Level) -> Vec<Claim> {
+        let (mut best, mut fast) = (Ranking::at(level), Ranking::at(level));
+        for (function, trials) in Function::ALL.into_iter().zip(&self.trials) {
+            best.add(function, &trials.each_ref().map(|t| Sample::best(t)));
+            fast.add(
+                function,
+                &trials.each_ref().map(|t| Sample::from_trials(t, |t| quarter(t, self.budget))),
+            );
+        }
+        let (evaluations, place) = (figures(self.budget as f64), self.place());
+        vec![
+            best.claim(&format!(
+                "ISMA is the most accurate of the five: at {evaluations} evaluations each, {place}"
+            )),
+            fast.claim(&format!("ISMA converges fastest: after a quarter of those evaluations, {place}")),
+        ]
+    }
+
+    fn table(&self, run_context: &RunContext) -> Table {
+        let mut columns = vec!["".to_owned()];
+        columns.extend(METHODS.iter().map(|m| (*m).to_owned()));
+        columns.extend(METHODS.iter().take(4).map(|m| format!("isma less:more than {m}")));
+        let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+        let (runs, first) = (self.runs(), looks_of(run_context).first());
+        let note = format!(
+            "D = {DIMENSIONS}, {runs} runs (of {first} at the first look), corrected readings, {} evaluations each; median [quartiles]",
+            self.budget
+        );
+        let mut table = Table::new(&format!("Equal evaluations, {}", self.place()), "", &note, &columns);
+        for (function, trials) in Function::ALL.into_iter().zip(&self.trials) {
+            let samples = trials.each_ref().map(|t| Sample::best(t));
+            let mut cells: Vec<Cell> = samples.iter().map(|s| Cell::Median(s.summary())).collect();
+            cells.extend(against_last(&samples).map(Cell::Test));
+            table.row(function.name(), cells);
+        }
+        table
+    }
+
+    fn figure(&self) -> Figure {
+        let mut panels = Vec::new();
+        for (function, trials) in Function::ALL.into_iter().zip(&self.trials) {
+            let least = function.least(DIMENSIONS);
+            let mut panel = Panel::new("evaluations", &format!("{}: best so far - least", function.name()));
+            panel.is_log = true;
+            for (method, trials) in METHODS.iter().zip(trials) {
+                let above = |(x, y): (f64, [f64; 3])| (x, y.map(|y| y - least));
+                panel.spread(method, &convergence(trials).into_iter().map(above).collect::<Vec<_>>());
+            }
+            panels.push(panel);
+        }
+        let file = if self.is_moved { "001-convergence-moved.svg" } else { "001-convergence.svg" };
+        let title = format!("Paper 001, {}: median and quartiles of {} runs", self.place(), self.runs());
+        Figure::of(file, &title, 2, &panels)
+    }
+
+    fn runs(&self) -> usize {
+        self.trials.first().map_or(0, |trials| trials[0].len())
+    }
+}
+
 /// All methods at the same number of evaluations, pair by pair against ISMA.
 fn equal_evaluations(run_context: &RunContext, is_moved: bool) -> Result<Placed, Stop> {
-    let runs = run_context.runs(RUNS, 5).min(RUNS);
-    let budget = run_context.choose(EQUAL, QUICK);
-    let place = if is_moved { "optimum moved" } else { "optimum as printed" };
-    let mut columns = vec!["".to_owned()];
-    columns.extend(METHODS.iter().map(|m| (*m).to_owned()));
-    columns.extend(METHODS.iter().take(4).map(|m| format!("isma less:more than {m}")));
-    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let note =
-        format!("D = 30, {runs} runs, corrected readings, {budget} evaluations each; median [quartiles]");
-    let mut table = Table::new(&format!("Equal evaluations, {place}"), "", &note, &columns);
-    let mut panels = Vec::new();
-    let (mut best, mut fast, mut placed) = (Ranking::default(), Ranking::default(), Vec::new());
-    for function in Function::ALL {
-        run_context.say(&format!("  {} at equal evaluations, {place} ..", function.name()));
-        let least = function.least(DIMENSIONS);
-        let mut all = Vec::new();
-        for method in METHODS {
-            let (reading, evaluations) = (Reading::Corrected, Some(budget));
-            all.push(Case { method, reading, function, is_moved, evaluations }.trials(run_context, runs)?);
-        }
-        let samples: Vec<Sample> = all.iter().map(|t| Sample::best(t)).collect();
-        let early: Vec<Sample> = all.iter().map(|t| Sample::from_trials(t, |t| quarter(t, budget))).collect();
-        let mut cells: Vec<Cell> = samples.iter().map(|s| Cell::Median(s.summary())).collect();
-        cells.extend(against_last(&samples).map(Cell::Test));
-        table.row(function.name(), cells);
-        best.add(function, &samples);
-        fast.add(function, &early);
-        let mut panel = Panel::new("evaluations", &format!("{}: best so far - least", function.name()));
-        panel.is_log = true;
-        for (method, trials) in METHODS.iter().zip(&all) {
-            let above = |(x, y): (f64, [f64; 3])| (x, y.map(|y| y - least));
-            panel.spread(method, &convergence(trials).into_iter().map(above).collect::<Vec<_>>());
-        }
-        panels.push(panel);
-        placed.push(samples);
-    }
-    let file = if is_moved { "001-convergence-moved.svg" } else { "001-convergence.svg" };
-    let title = format!("Paper 001, {place}: median and quartiles of {runs} runs");
-    let evaluations = figures(budget as f64);
-    let claims = [
-        best.claim(&format!(
-            "ISMA is the most accurate of the five: at {evaluations} evaluations each, {place}"
-        )),
-        fast.claim(&format!("ISMA converges fastest: after a quarter of those evaluations, {place}")),
-    ];
-    Ok(Placed { table, figure: Figure::of(file, &title, 2, &panels), claims, samples: placed })
+    let trials = Function::ALL.iter().map(|_| std::array::from_fn(|_| Vec::new())).collect();
+    let mut equal = Equal { is_moved, budget: run_context.choose(EQUAL, QUICK), trials };
+    let claims = settle(looks_of(run_context), |look| {
+        equal.run(run_context, look.runs)?;
+        Ok::<_, Stop>(equal.claims(look.level))
+    })?;
+    let samples = equal.trials.iter().map(|trials| trials.iter().map(|t| Sample::best(t)).collect());
+    Ok(Placed { table: equal.table(run_context), figure: equal.figure(), claims, samples: samples.collect() })
 }
 
 /// Best so far when a quarter of the budget was used.
@@ -273,14 +340,19 @@ fn against_last(samples: &[Sample]) -> impl Iterator<Item = crate::statistics::P
 }
 
 /// ISMA against the other four, function by function.
-#[derive(Default)]
 pub(super) struct Ranking {
+    level: Level,
     verdicts: Vec<(&'static str, Verdict)>,
     /// What decides each function.
     effects: Vec<Effect>,
 }
 
 impl Ranking {
+    /// Of no function yet, by intervals of a level.
+    pub(super) fn at(level: Level) -> Self {
+        Self { level, verdicts: Vec::new(), effects: Vec::new() }
+    }
+
     /// The last sample against the others, by what is above the least value. Where all of its runs reach that but for
     /// rounding, nothing can be better.
     pub(super) fn add(&mut self, function: Function, samples: &[Sample]) {
@@ -293,10 +365,9 @@ impl Ranking {
             return;
         }
         let isma = format!("{} isma", function.name());
-        let effects = METHODS
-            .iter()
-            .zip(others)
-            .map(|(name, other)| Effect::ratio((&isma, &ours), (name, &above(other)), ROUNDING));
+        let effects = METHODS.iter().zip(others).map(|(name, other)| {
+            Effect::ratio((&isma, &ours), (name, &above(other)), (ROUNDING, self.level))
+        });
         let effects: Vec<Effect> = effects.collect();
         let verdict = Verdict::all(effects.iter().map(Effect::verdict));
         self.verdicts.push((function.name(), verdict));

@@ -5,6 +5,7 @@ use crate::effect::Effect;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
+use crate::statistics::Level;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
 use taustream_optimizers::papers::Function;
@@ -47,9 +48,9 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
             run_context.say(&format!("  diagonal: {method} on {} ..", function.name()));
             for (label, reading, restart) in VARIANTS {
                 let ran = |is_moved| -> Result<Sample, Stop> {
-                    let problem = problem(run_context, function, is_moved);
                     let method = |_| optimizer(method, reading, restart, budget);
                     let trials: Vec<Trial> = run_context.each(runs, |run| {
+                        let problem = problem(run_context, function, is_moved, run);
                         minimise(run_context, method(run).as_ref(), &problem, run_context.seed(run), budget)
                     })?;
                     Ok(Sample::from_trials(&trials, |t| t.found.cost - least))
@@ -81,7 +82,7 @@ fn carries_over(function: Function, here: &Sample, moved: &Sample) -> Claim {
     Claim::tested(
         &format!("{} shows ISMA's ability, not where the optimum lies", function.name()),
         "what is left above the least value is at most twice as large (100 % more) once the optimum is moved",
-        vec![Effect::no_rise(what, &logs, 100.0)],
+        vec![Effect::no_rise(what, &logs, (100.0, Level::FIVE_PERCENT))],
     )
     .beside(format!("medians {} as printed, {} moved", figures(a), figures(b)))
 }

@@ -3,12 +3,14 @@
 use super::benchmarks::{DIMENSIONS, problem};
 use crate::claim::{Claim, Verdict};
 use crate::effect::Effect;
+use crate::looks::{self, settle};
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
+use crate::statistics::Level;
 use crate::swept::{At, label, places};
 use crate::table::{Cell, Table};
-use crate::trial::{Sample, minimise};
+use crate::trial::{Sample, Trial, minimise};
 use std::cmp::Ordering;
 use taustream_optimizers::papers::Function;
 use taustream_optimizers::{Addition, Isma, Reading, Setup};
@@ -25,8 +27,6 @@ const LOGISTIC: f64 = 4.0;
 const BERNOULLI: f64 = 0.4;
 /// Exponents of figure 3, the chosen one among them.
 const EXPONENTS: [i32; 6] = [1, 2, 3, 4, 5, 6];
-/// Runs without an addition, on the moved functions, and evaluations of each.
-const RUNS: usize = 10;
 const BUDGET: usize = 15_050;
 const QUICK: usize = 1_500;
 /// What is above the least value by less is rounding.
@@ -126,51 +126,89 @@ fn feedback(outcome: &mut Outcome) {
     ));
 }
 
-/// What is left above the least value without each addition, on the functions whose optimum was moved.
-fn ablation(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
-    let (runs, budget) = (run_context.runs(RUNS, 3), run_context.choose(BUDGET, QUICK));
-    let setup = Setup { reading: Reading::Corrected, evaluations: Some(budget) };
-    let columns: Vec<&str> = std::iter::once("").chain(Function::ALL.iter().map(|f| f.name())).collect();
-    let note = format!(
-        "D = {DIMENSIONS}, {runs} runs of {budget} evaluations each, corrected, optimum moved; median [quartiles] above the least \
-         value"
-    );
-    let mut table = Table::new("ISMA without each of its additions", "", &note, &columns);
-    let without = |addition: Option<Addition>| -> Result<Vec<Sample>, Stop> {
-        let name = addition.map_or("nothing", Addition::name);
-        run_context.say(&format!("  isma without {name} .."));
-        let on = |function: Function| {
-            let problem = problem(run_context, function, true);
-            let trials = run_context.each(runs, |run| {
-                let optimizer = Isma::without(setup, addition);
+/// What is left above the least value, function by function.
+struct Left {
+    addition: Option<Addition>,
+    trials: Vec<Vec<Trial>>,
+}
+
+impl Left {
+    fn without(addition: Option<Addition>) -> Self {
+        Self { addition, trials: Function::ALL.iter().map(|_| Vec::new()).collect() }
+    }
+
+    fn name(&self) -> String {
+        self.addition.map_or("ISMA".to_owned(), |addition| format!("without {}", addition.name()))
+    }
+
+    /// Until there are so many runs on each function.
+    fn run(&mut self, run_context: &RunContext, runs: usize) -> Result<(), Stop> {
+        let budget = run_context.choose(BUDGET, QUICK);
+        let setup = Setup { reading: Reading::Corrected, evaluations: Some(budget) };
+        run_context
+            .say(&format!("  isma {}, {runs} runs ..", self.addition.map_or("itself", Addition::name)));
+        for (function, trials) in Function::ALL.into_iter().zip(&mut self.trials) {
+            run_context.up_to(runs, trials, |run| {
+                let optimizer = Isma::without(setup, self.addition);
+                let problem = problem(run_context, function, true, run);
                 minimise(run_context, &optimizer, &problem, run_context.seed(run), budget)
             })?;
+        }
+        Ok(())
+    }
+
+    fn samples(&self) -> impl Iterator<Item = (Function, Sample)> + '_ {
+        Function::ALL.into_iter().zip(&self.trials).map(|(function, trials)| {
             let least = function.least(DIMENSIONS);
-            Ok(Sample::from_trials(&trials, |t| t.found.cost - least))
-        };
-        Function::ALL.into_iter().map(on).collect()
-    };
-    let row = |samples: &[Sample]| samples.iter().map(|s| Cell::Median(s.summary())).collect();
-    let whole = without(None)?;
-    table.row("ISMA", row(&whole));
-    for addition in Addition::ALL {
-        let part = without(Some(addition))?;
-        table.row(format!("without {}", addition.name()), row(&part));
-        outcome.claims.push(helps(addition, &whole, &part));
+            (function, Sample::from_trials(trials, |t| t.found.cost - least))
+        })
+    }
+}
+
+/// ISMA without each addition, on the functions whose optimum was moved.
+fn ablation(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
+    let looks = run_context.looks(looks::PARTS, 3);
+    let mut whole = Left::without(None);
+    let mut parts = Addition::ALL.map(|addition| Left::without(Some(addition)));
+    let claims = settle(looks, |look| {
+        whole.run(run_context, look.runs)?;
+        for (_, part) in parts.iter_mut().enumerate().filter(|(i, _)| look.is_open(*i)) {
+            part.run(run_context, look.runs)?;
+        }
+        Ok::<_, Stop>(
+            Addition::ALL
+                .into_iter()
+                .zip(&parts)
+                .map(|(a, part)| helps(a, &whole, part, look.level))
+                .collect(),
+        )
+    })?;
+    let columns: Vec<&str> = ["", "runs"].into_iter().chain(Function::ALL.iter().map(|f| f.name())).collect();
+    let note = format!(
+        "D = {DIMENSIONS}, {} evaluations each, corrected, optimum moved; median [quartiles] above the least value",
+        run_context.choose(BUDGET, QUICK)
+    );
+    let mut table = Table::new("ISMA without each of its additions", "", &note, &columns);
+    for left in std::iter::once(&whole).chain(&parts) {
+        let runs = Cell::number(left.trials.first().map_or(0, Vec::len) as f64);
+        let medians = left.samples().map(|(_, sample)| Cell::Median(sample.summary()));
+        table.row(left.name(), std::iter::once(runs).chain(medians).collect());
     }
     outcome.tables.push(table);
+    outcome.claims.extend(claims);
     Ok(())
 }
 
 /// An addition helps when ISMA is worse without it on more functions than better.
-fn helps(addition: Addition, whole: &[Sample], part: &[Sample]) -> Claim {
-    let name = format!("without {}", addition.name());
-    let effects: Vec<Effect> = Function::ALL
-        .iter()
-        .zip(whole.iter().zip(part))
-        .map(|(function, (whole, part))| {
+fn helps(addition: Addition, whole: &Left, part: &Left, level: Level) -> Claim {
+    // Six functions have six chances.
+    let level = level.over(Function::ALL.len());
+    let effects: Vec<Effect> = whole
+        .samples()
+        .zip(part.samples())
+        .map(|((function, whole), (_, without))| {
             let isma = format!("{}: ISMA", function.name());
-            Effect::ratio((&isma, &whole.values), (&name, &part.values), ROUNDING)
+            Effect::ratio((&isma, &whole.values), (&part.name(), &without.values), (ROUNDING, level))
         })
         .collect();
     let is_better = |e: &&Effect| e.verdict() == Verdict::Holds;
@@ -185,7 +223,7 @@ fn helps(addition: Addition, whole: &[Sample], part: &[Sample]) -> Claim {
     Claim::weighed(
         &format!("{} improves SMA's search", addition.title()),
         "at equal evaluations ISMA leaves less above the least value than without it on more of the six functions than more (holds), on \
-         fewer or on none (does not hold), or some are open (not told apart)",
+         fewer or on none (does not hold), or some are open (not told apart); each function at a sixth of the level",
         verdict,
         effects,
     )

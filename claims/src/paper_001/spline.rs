@@ -6,8 +6,8 @@ use crate::figure::Figure;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{quantile, wilcoxon};
-use crate::swept::{At, FACTORS, at_every};
+use crate::statistics::{Level, quantile, wilcoxon};
+use crate::swept::{At, FACTORS, Values, at_every};
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
 use taustream_optimizers::papers::spline::{Spline, conditions};
@@ -226,17 +226,22 @@ fn limits(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop> {
         let of = |figure: &dyn Fn(&SplineCost) -> f64| found.iter().map(figure).collect::<Vec<f64>>();
         let (impacts, as_even) =
             (of(&|c| c.jerk_rad_s3), of(&|c| even.jerk_rad_s3 * (even.time_s / c.time_s).powi(3)));
-        let effect =
-            Effect::ratio(("isma's times", &impacts), ("even times as long", &as_even), f64::MIN_POSITIVE);
+        let effect = |level: Level| {
+            Effect::ratio(
+                ("isma's times", &impacts),
+                ("even times as long", &as_even),
+                (f64::MIN_POSITIVE, level),
+            )
+        };
+        let label = format!("limits times {}", figures(factor));
+        settings.push(At::every(&*label, Values::of(3), |level| vec![effect(level)]));
+        let estimate = Cell::estimate(effect(Level::FIVE_PERCENT).estimate);
         let broken = of(&|c| c.broken as f64);
         let medians = [of(&|c| c.time_s), impacts, as_even].map(|v| Cell::number(quantile(&v, 0.5)));
-        let estimate = Cell::estimate(effect.estimate);
-        let label = format!("limits times {}", figures(factor));
         table.row(
-            label.clone(),
+            label,
             medians.into_iter().chain([estimate, Cell::number(quantile(&broken, 1.0))]).collect(),
         );
-        settings.push(At::all(label, &[effect]));
     }
     outcome.tables.push(table);
     outcome.claims.push(at_every(

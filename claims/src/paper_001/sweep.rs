@@ -2,17 +2,16 @@
 //! methods that it is compared with.
 use super::benchmarks::{DIMENSIONS, METHODS, Ranking, problem};
 use crate::claim::{Claim, Verdict};
+use crate::looks::{self, settle};
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::quantile;
-use crate::swept::{At, FACTORS, label, places};
+use crate::statistics::{Level, quantile};
+use crate::swept::{At, FACTORS, label, places, words_for_some};
 use crate::table::{Cell, Table};
-use crate::trial::{Sample, minimise};
+use crate::trial::{Sample, Trial, minimise};
 use taustream_optimizers::papers::Function;
 use taustream_optimizers::{Boa, Gwo, Isma, Optimizer, Reading, Schedule, Setup, Sma, Ssa, by_name};
 
-/// Runs of each setting: six is the least of which a signed-rank test can say anything.
-const RUNS: usize = 8;
 const QUICK_RUNS: usize = 2;
 /// Evaluations of each.
 const BUDGET: usize = 10_050;
@@ -101,116 +100,128 @@ fn crossing(crossover: f64, setup: Setup) -> Box<dyn Optimizer> {
     Box::new(Isma { crossover, sma, ..ours })
 }
 
-/// What a method left above the least value: function by function.
-type Left = Vec<Sample>;
+/// What makes a method.
+type Make = Box<dyn Fn() -> Result<Box<dyn Optimizer>, Stop> + Sync>;
 
-struct Bench<'a> {
-    run_context: &'a RunContext<'a>,
-    runs: usize,
-    budget: usize,
-}
-
-impl Bench<'_> {
-    fn setup(&self) -> Setup {
-        Setup { reading: Reading::Corrected, evaluations: Some(self.budget) }
-    }
-
-    fn left(&self, make: &(dyn Fn() -> Result<Box<dyn Optimizer>, Stop> + Sync)) -> Result<Left, Stop> {
-        let on = |function: Function| {
-            let problem = problem(self.run_context, function, true);
-            let trials = self.run_context.each(self.runs, |run| {
-                let seed = self.run_context.seed(run);
-                minimise(self.run_context, make()?.as_ref(), &problem, seed, self.budget)
-            })?;
-            Ok(Sample::best(&trials))
-        };
-        Function::ALL.into_iter().map(on).collect()
-    }
-
-    fn named(&self, method: &str) -> Result<Left, Stop> {
-        self.run_context.say(&format!("  {method} .."));
-        self.left(&|| by_name(method, self.setup()).map_err(|e| Stop::Refused(e.to_string())))
-    }
-}
-
-/// The five at one value, ISMA last.
-struct Setting {
+/// One method at one value: its trials, function by function.
+struct Entry {
     label: String,
-    verdict: Verdict,
-    /// Function by function: the word there.
-    words: Vec<Verdict>,
-    /// Medians above the least value of the method whose number it is.
-    left: Vec<f64>,
+    /// Its place among [`METHODS`].
+    method: usize,
+    make: Make,
+    trials: Vec<Vec<Trial>>,
 }
 
-impl Setting {
-    /// All five, of which number `changed` is another sample.
-    fn of(label: String, five: &[Left], changed: Option<(usize, &Left)>) -> Self {
-        let mut ranking = Ranking::default();
-        let mut left = Vec::new();
-        for (f, function) in Function::ALL.into_iter().enumerate() {
-            let of = |(m, ours): (usize, &Left)| match changed {
-                Some((index, other)) if index == m => other.get(f).cloned(),
-                Some(_) | None => ours.get(f).cloned(),
-            };
-            let samples: Vec<Sample> = five.iter().enumerate().filter_map(of).collect();
-            let shown = changed.map_or(METHODS.len() - 1, |(index, _)| index);
-            let values: Vec<f64> = samples.get(shown).map_or(Vec::new(), |s| s.values.clone());
-            left.push(quantile(&values, 0.5) - function.least(DIMENSIONS));
-            ranking.add(function, &samples);
-        }
-        Self { label, verdict: ranking.verdict(), words: ranking.words(), left }
+impl Entry {
+    fn new(label: String, method: usize, make: Make) -> Self {
+        Self { label, method, make, trials: Function::ALL.iter().map(|_| Vec::new()).collect() }
     }
+
+    /// Until there are so many runs on each function.
+    fn run(&mut self, run_context: &RunContext, (runs, budget): (usize, usize)) -> Result<(), Stop> {
+        run_context.say(&format!("  {}, {runs} runs ..", self.label));
+        for (function, trials) in Function::ALL.into_iter().zip(&mut self.trials) {
+            run_context.up_to(runs, trials, |run| {
+                let problem = problem(run_context, function, true, run);
+                minimise(run_context, (self.make)()?.as_ref(), &problem, run_context.seed(run), budget)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The five on each function, this one instead of the one whose number it changes.
+    fn ranking(&self, five: &[Self], level: Level) -> Ranking {
+        let mut ranking = Ranking::at(level);
+        for (f, function) in Function::ALL.into_iter().enumerate() {
+            let of = |(m, ours): (usize, &Self)| {
+                let entry = if m == self.method { self } else { ours };
+                entry.trials.get(f).map(|trials| Sample::best(trials))
+            };
+            ranking.add(function, &five.iter().enumerate().filter_map(of).collect::<Vec<_>>());
+        }
+        ranking
+    }
+}
+
+fn entries(budget: usize) -> (Vec<Entry>, Vec<Entry>) {
+    let setup = Setup { reading: Reading::Corrected, evaluations: Some(budget) };
+    let named = |(m, method): (usize, &&'static str)| {
+        let method = *method;
+        let make = move || by_name(method, setup).map_err(|e| Stop::Refused(e.to_string()));
+        Entry::new(method.to_owned(), m, Box::new(make))
+    };
+    let five = METHODS.iter().enumerate().map(named).collect();
+    let mut swept = Vec::new();
+    for Swept { method, number, values, make } in &SWEPT {
+        let Some(index) = METHODS.iter().position(|m| m == method) else { continue };
+        let make = *make;
+        for value in *values {
+            let label = label(&format!("{method}: {number}"), value);
+            swept.push(Entry::new(label, index, Box::new(move || Ok(make(value, setup)))));
+        }
+    }
+    (five, swept)
 }
 
 /// Runs them.
 pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
-    let bench = Bench {
-        run_context,
-        runs: run_context.runs(RUNS, QUICK_RUNS).min(RUNS),
-        budget: run_context.choose(BUDGET, QUICK),
-    };
-    let five = METHODS.iter().map(|method| bench.named(method)).collect::<Result<Vec<_>, _>>()?;
-    let mut settings = vec![Setting::of("ours".to_owned(), &five, None)];
-    for Swept { method, number, values, make } in &SWEPT {
-        let Some(index) = METHODS.iter().position(|m| m == method) else { continue };
-        for value in *values {
-            let label = label(&format!("{method}: {number}"), value);
-            run_context.say(&format!("  {label} .."));
-            let left = bench.left(&|| Ok(make(value, bench.setup())))?;
-            settings.push(Setting::of(label, &five, Some((index, &left))));
+    let budget = run_context.choose(BUDGET, QUICK);
+    let looks = run_context.looks_at_most(looks::UNPRINTED_001, QUICK_RUNS);
+    let (mut five, mut swept) = entries(budget);
+    let claims = settle(looks, |look| {
+        for entry in five.iter_mut().chain(&mut swept) {
+            entry.run(run_context, (look.runs, budget))?;
         }
-    }
-    let at: Vec<At> = settings.iter().map(|s| At { label: s.label.clone(), verdict: s.verdict }).collect();
-    let claim = Claim::weighed(
+        Ok::<_, Stop>(vec![claim(&five, &swept, look.level)])
+    })?;
+    Ok(Outcome { tables: vec![table(&five, &swept, budget)], claims, ..Outcome::default() })
+}
+
+/// The values that are looked at: ours, and each swept one.
+fn settings<'a>(five: &'a [Entry], swept: &'a [Entry]) -> impl Iterator<Item = (&'a str, &'a Entry)> {
+    let ours = five.last().map(|isma| ("ours", isma));
+    ours.into_iter().chain(swept.iter().map(|entry| (entry.label.as_str(), entry)))
+}
+
+fn claim(five: &[Entry], swept: &[Entry], level: Level) -> Claim {
+    let of_many = level.over(settings(five, swept).count());
+    let at = settings(five, swept).map(|(label, entry)| {
+        let words = [level, of_many].map(|level| entry.ranking(five, level).verdict());
+        At { label: label.to_owned(), verdict: words_for_some(words) }
+    });
+    let at: Vec<At> = at.collect();
+    Claim::weighed(
         "ISMA is the most accurate of the five at equal evaluations, optimum moved, at some value of what is not printed",
         "at some value over a decade of a number that is not printed ISMA leaves less above the least value than each other method on each \
          of the six functions, by the margin of the rows above",
         Verdict::any(at.iter().map(|s| s.verdict)),
         Vec::new(),
     )
-    .beside(places(&at));
-    Ok(Outcome { tables: vec![table(&settings, &bench)], claims: vec![claim], ..Outcome::default() })
+    .beside(places(&at))
 }
 
-fn table(settings: &[Setting], bench: &Bench) -> Table {
+fn table(five: &[Entry], swept: &[Entry], budget: usize) -> Table {
     let heading: Vec<String> = Function::ALL
         .iter()
         .flat_map(|f| [format!("{}: ISMA the best", f.name()), format!("{}: left", f.name())])
         .collect();
     let columns: Vec<&str> = std::iter::once("").chain(heading.iter().map(String::as_str)).collect();
+    let runs = five.first().and_then(|entry| entry.trials.first()).map_or(0, Vec::len);
     let note = format!(
-        "D = {DIMENSIONS}, corrected, optimum moved, {} runs of {} evaluations; left: median above the least value of the method whose number \
-         it is, or of ISMA; each row changes one number",
-        bench.runs, bench.budget
+        "D = {DIMENSIONS}, corrected, optimum moved, {runs} runs of {budget} evaluations; left: median above the least value of the method whose \
+         number it is, or of ISMA; each row changes one number"
     );
     let mut table = Table::new("Numbers that the paper does not print", "", &note, &columns);
-    for Setting { label, words, left, .. } in settings {
+    for (label, entry) in settings(five, swept) {
+        let words = entry.ranking(five, Level::FIVE_PERCENT).words();
+        let left = Function::ALL.into_iter().zip(&entry.trials).map(|(function, trials)| {
+            quantile(&Sample::best(trials).values, 0.5) - function.least(DIMENSIONS)
+        });
         let cells = words
             .iter()
             .zip(left)
-            .flat_map(|(word, left)| [Cell::words(word.to_string()), Cell::number(*left)]);
-        table.row(label.clone(), cells.collect());
+            .flat_map(|(word, left)| [Cell::words(word.to_string()), Cell::number(left)]);
+        table.row(label, cells.collect());
     }
     table
 }

@@ -4,7 +4,7 @@ use crate::claim::{Claim, Verdict};
 use crate::effect::Effect;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::quantile;
+use crate::statistics::{Level, quantile};
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::planar::{Journey, Numbers};
 
@@ -81,14 +81,18 @@ fn claims(visits: &[Visit]) -> Vec<Claim> {
         move |v: &&Visit| {
             Effect::never(
                 &format!("{}: {} lost", v.scene.name, method.name()),
-                lost(v, method),
-                v.of(method).len(),
+                [lost(v, method), v.of(method).len()],
+                Level::FIVE_PERCENT,
             )
         }
     };
     let stuck = |v: &&Visit| {
         let journeys = v.of(Method::Plain);
-        Effect::never(&format!("{}: BFO arrives", v.scene.name), arrived(journeys), journeys.len())
+        Effect::never(
+            &format!("{}: BFO arrives", v.scene.name),
+            [arrived(journeys), journeys.len()],
+            Level::FIVE_PERCENT,
+        )
     };
     let out = traps.iter().map(never_lost(Method::Robust)).chain(traps.iter().map(stuck));
     claims.push(Claim::tested(
@@ -105,7 +109,11 @@ fn claims(visits: &[Visit]) -> Vec<Claim> {
     let touched = |v: &&Visit| {
         let journeys = v.of(Method::Robust);
         let missed = journeys.iter().filter(|j| j.nearest_cm <= 0.0 || !has_arrived(j)).count();
-        Effect::never(&format!("{}: touched or lost", v.scene.name), missed, journeys.len())
+        Effect::never(
+            &format!("{}: touched or lost", v.scene.name),
+            [missed, journeys.len()],
+            Level::FIVE_PERCENT,
+        )
     };
     claims.push(Claim::tested(
         "RBF reaches the goal past one and three discs that stand still without touching them",
@@ -126,8 +134,8 @@ fn on_the_line(on: Option<&Visit>, off: Option<&Visit>) -> Option<Claim> {
         let journeys = v.of(Method::Plain);
         Effect::never(
             &format!("{}: BFO lost", v.scene.name),
-            journeys.len() - arrived(journeys),
-            journeys.len(),
+            [journeys.len() - arrived(journeys), journeys.len()],
+            Level::FIVE_PERCENT,
         )
     };
     let effects = vec![bfo(on)];
@@ -171,14 +179,14 @@ fn limits(room: Option<&Visit>, trap: Option<&Visit>) -> [Claim; 2] {
             "In a closed room virtual obstacles are made without end",
             "no run arrives, and the median run makes more than the nine of the U (we cap them)",
             vec![
-                Effect::never("closed room: RBF arrives", arrived(&room), room.len()),
-                Effect::above(("virtual obstacles", &made), VIRTUAL_U, "obstacles"),
+                Effect::never("closed room: RBF arrives", [arrived(&room), room.len()], Level::FIVE_PERCENT),
+                Effect::above(("virtual obstacles", &made), VIRTUAL_U, ("obstacles", Level::FIVE_PERCENT)),
             ],
         ),
         Claim::tested(
             "A robot that starts in a trap has no trace to go back along and stays",
             "no run arrives; one refutes it (ours goes back to its start and on from there)",
-            vec![Effect::never("start in a trap: RBF arrives", freed, trap.len())],
+            vec![Effect::never("start in a trap: RBF arrives", [freed, trap.len()], Level::FIVE_PERCENT)],
         ),
     ]
 }

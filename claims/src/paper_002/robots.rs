@@ -4,7 +4,7 @@ use crate::claim::Claim;
 use crate::effect::Effect;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::Summary;
+use crate::statistics::{Level, Summary};
 use crate::table::{Cell, Table};
 use taustream_optimizers::papers::planar::{Journey, PlanarScene};
 
@@ -90,8 +90,12 @@ fn left_behind(plain: &[Journey], robust: &[Journey]) -> Claim {
         "Of four robots plain BFO leaves three behind, RBF brings all to their goals",
         "every run of BFO leaves three behind and every run of RBF none (the scene is ours); one refutes it",
         vec![
-            Effect::never("BFO leaves more or fewer than three", others, plain.len()),
-            Effect::never("RBF leaves one", robust.len() - arrived(robust), robust.len()),
+            Effect::never("BFO leaves more or fewer than three", [others, plain.len()], Level::FIVE_PERCENT),
+            Effect::never(
+                "RBF leaves one",
+                [robust.len() - arrived(robust), robust.len()],
+                Level::FIVE_PERCENT,
+            ),
         ],
     )
 }
@@ -101,7 +105,7 @@ fn sharing(scene: &str, shared: &[Journey], alone: &[Journey]) -> Claim {
     let compare = |figure: fn(&Journey) -> f64, what: &str| {
         let [ours, theirs] = [shared, alone].map(|j| j.iter().map(figure).collect::<Vec<f64>>());
         let name = format!("{what} with sharing");
-        Effect::ratio((&name, &ours), ("without", &theirs), f64::MIN_POSITIVE)
+        Effect::ratio((&name, &ours), ("without", &theirs), (f64::MIN_POSITIVE, Level::FIVE_PERCENT))
     };
     Claim::tested(
         &format!("Sharing virtual obstacles among the robots saves time and way ({scene})"),

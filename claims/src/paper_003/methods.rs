@@ -8,7 +8,7 @@ use crate::figure::Figure;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::{quantile, wilcoxon};
+use crate::statistics::{Level, quantile, wilcoxon};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
 use taustream_optimizers::papers::reach::{FiveJointArm, Reach};
@@ -216,7 +216,10 @@ fn claims(ran: &[Ran]) -> Vec<Claim> {
     let ratio = |figure: fn(&Reaching) -> f64, floor: f64| -> Vec<Effect> {
         let of = |ran: &Ran| counted(&ran.sample(figure).values);
         let ours = of(iepso);
-        others.iter().map(|o| Effect::ratio(("iepso", &ours), (&o.label, &of(o)), floor)).collect()
+        others
+            .iter()
+            .map(|o| Effect::ratio(("iepso", &ours), (&o.label, &of(o)), (floor, Level::FIVE_PERCENT)))
+            .collect()
     };
     let rule = |what: &str, margin: &str| {
         format!(
@@ -224,9 +227,13 @@ fn claims(ran: &[Ran]) -> Vec<Claim> {
              (does not hold), or neither"
         )
     };
-    let cost = others
-        .iter()
-        .map(|o| Effect::difference(("iepso", &iepso.cost()), (&o.label, &o.cost()), (COST_MARGIN_S, "s")));
+    let cost = others.iter().map(|o| {
+        Effect::difference(
+            ("iepso", &iepso.cost()),
+            (&o.label, &o.cost()),
+            (COST_MARGIN_S, "s", Level::FIVE_PERCENT),
+        )
+    });
     let mut claims = vec![
         Claim::tested(
             "IEPSO's error is the least of the five",
@@ -256,7 +263,11 @@ fn poor_swarms(ran: &[Ran]) -> Claim {
     let swarms = ran.iter().zip(ROWS).filter(|(_, (name, ..))| ["pso", "spso"].contains(name));
     let above = |(ran, _): (&Ran, _)| {
         let errors = ran.sample(|r| r.error_mm);
-        Effect::above((&format!("{}'s error", ran.label), &errors.values), precision_mm, "mm")
+        Effect::above(
+            (&format!("{}'s error", ran.label), &errors.values),
+            precision_mm,
+            ("mm", Level::FIVE_PERCENT),
+        )
     };
     Claim::tested(
         "PSO and SPSO are caught in local optima and cannot meet the precision",
@@ -293,7 +304,11 @@ fn exchange(ran: &[Ran]) -> Claim {
         return Claim::unchecked("The exchange φ3 helps the global search", "no such runs", String::new());
     };
     let against = |name: &str, sample: &Sample| {
-        Effect::difference((name, sample), ("without φ3", &without), (COST_MARGIN_S, "s"))
+        Effect::difference(
+            (name, sample),
+            ("without φ3", &without),
+            (COST_MARGIN_S, "s", Level::FIVE_PERCENT),
+        )
     };
     let effects = vec![against("with φ3 signed", &with), against("with φ3 as printed", &printed)];
     Claim::weighed(
@@ -313,7 +328,11 @@ fn rest(iepso: &Ran) -> [Claim; 2] {
     };
     let (then, end) = (Sample::of(at(0, cost_at)), Sample::of(at(0, usize::MAX)));
     let margin = 0.01 * quantile(&end.values, 0.5).abs();
-    let fallen = Effect::difference(("F at the end", &end), ("F at generation 45", &then), (margin, "s"));
+    let fallen = Effect::difference(
+        ("F at the end", &end),
+        ("F at generation 45", &then),
+        (margin, "s", Level::FIVE_PERCENT),
+    );
     let error = at(1, error_at);
     [
         Claim::tested(
@@ -324,7 +343,7 @@ fn rest(iepso: &Ran) -> [Claim; 2] {
         Claim::tested(
             "The error is zero at about generation 180 (figure 4)",
             "the median error is then within the precision of 0.005 mm",
-            vec![Effect::below(("the error at generation 180", &error), 0.005, "mm")],
+            vec![Effect::below(("the error at generation 180", &error), 0.005, ("mm", Level::FIVE_PERCENT))],
         ),
     ]
 }

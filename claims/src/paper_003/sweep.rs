@@ -4,9 +4,11 @@ use super::methods::{BUDGET, COST_MARGIN_S, PRECISION_MM, QUICK, contender, coun
 use super::watched::{Contender, Objective, Reaching, reach};
 use crate::claim::{Claim, Verdict};
 use crate::effect::Effect;
+use crate::looks::{self, settle};
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::swept::{At, FACTORS, at_some, label, places};
+use crate::statistics::Level;
+use crate::swept::{At, FACTORS, Values, at_some, label, places, words_for_some};
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
 use taustream_optimizers::papers::reach::{FiveJointArm, Reach, Reward};
@@ -116,11 +118,18 @@ fn replacing(replaced: usize, budget: usize) -> Contender {
     Contender { optimizer: Box::new(Iepso { replaced, schedule, ..Iepso::set_up(setup) }), per_generation }
 }
 
-/// IEPSO against one other method at one value: error, generation, F.
+/// Most values at which another method is compared: ours, both of each of its three numbers, and both of the largest error
+/// and of the replaced particles.
+const VALUES: usize = 11;
+
+/// IEPSO against one other method at one value.
 struct Compared {
     label: String,
     other: &'static str,
+    /// Error, generation, F.
     effects: [Effect; 3],
+    /// Their words.
+    words: [Verdict; 3],
 }
 
 impl Compared {
@@ -128,16 +137,19 @@ impl Compared {
         let of = |runs: &[Reaching], figure: fn(&Reaching) -> f64| -> Vec<f64> {
             counted(&runs.iter().map(figure).collect::<Vec<_>>())
         };
-        let ratio = |figure: fn(&Reaching) -> f64, floor: f64| {
-            Effect::ratio(("iepso", &of(ours, figure)), (other, &of(theirs, figure)), floor)
+        let effects = |level: Level| {
+            let ratio = |figure: fn(&Reaching) -> f64, floor: f64| {
+                Effect::ratio(("iepso", &of(ours, figure)), (other, &of(theirs, figure)), (floor, level))
+            };
+            let cost = |runs: &[Reaching]| Sample::of(runs.iter().map(|r| r.trial.found.cost).collect());
+            let margin = (COST_MARGIN_S, "s", level);
+            let cost = Effect::difference(("iepso", &cost(ours)), (other, &cost(theirs)), margin);
+            [ratio(|r| r.error_mm, PRECISION_MM), ratio(|r| r.generation, 1.0), cost]
         };
-        let cost = |runs: &[Reaching]| Sample::of(runs.iter().map(|r| r.trial.found.cost).collect());
-        let cost = Effect::difference(("iepso", &cost(ours)), (other, &cost(theirs)), (COST_MARGIN_S, "s"));
-        Self {
-            label,
-            other,
-            effects: [ratio(|r| r.error_mm, PRECISION_MM), ratio(|r| r.generation, 1.0), cost],
-        }
+        let [alone, of_many] = [Level::FIVE_PERCENT, Level::FIVE_PERCENT.over(VALUES)]
+            .map(|level| effects(level).map(|e| e.verdict()));
+        let words = [0, 1, 2].map(|which: usize| words_for_some([alone[which], of_many[which]]));
+        Self { label, other, effects: effects(Level::FIVE_PERCENT), words }
     }
 }
 
@@ -196,7 +208,7 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
     }
     let plain = || contender("iepso", Reading::Corrected, bench.budget);
     let without = bench.reach(&plain, (task, Objective::TimeAndError))?;
-    let mut rewards = vec![Rewarded::of("ours".to_owned(), &iepso, &without)];
+    let mut rewards = vec![Rewarded::new("ours".to_owned(), task, &iepso)];
     for factor in FACTORS {
         let error_max_m = factor * task.reward.error_max_m;
         let task = Reach { reward: Reward { error_max_m, ..task.reward }, ..task };
@@ -205,11 +217,11 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
         for name in OTHERS {
             compared.push(Compared::of(label.clone(), &ours, (name, &bench.named(name, task)?)));
         }
-        rewards.push(Rewarded::of(label, &ours, &without));
+        rewards.push(Rewarded::new(label, task, &ours));
     }
     let mut outcome = Outcome { tables: vec![table(&compared, &bench)], ..Outcome::default() };
     outcome.claims = claims(&compared);
-    outcome.claims.extend(rewarded(&rewards));
+    outcome.claims.extend(rewarded(&bench, rewards, &without)?);
     Ok(outcome)
 }
 
@@ -220,7 +232,7 @@ fn table(compared: &[Compared], bench: &Bench) -> Table {
         bench.runs, bench.budget
     );
     let mut table = Table::new("Numbers that the paper does not print", "", &note, &columns);
-    for Compared { label, other, effects } in compared {
+    for Compared { label, other, effects, .. } in compared {
         let cells = effects.iter().map(|e| Cell::estimate(e.estimate));
         table.row(label.clone(), std::iter::once(Cell::words(*other)).chain(cells).collect());
     }
@@ -237,7 +249,7 @@ fn claims(compared: &[Compared]) -> Vec<Claim> {
     let claim = |(which, says): (usize, &str)| {
         let against = |name: &str| -> Vec<At> {
             let rows = compared.iter().filter(|c| c.other == name);
-            rows.map(|c| At::all(c.label.clone(), &c.effects[which..=which])).collect()
+            rows.map(|c| At { label: c.label.clone(), verdict: c.words[which] }).collect()
         };
         let each = OTHERS.map(|name| (name, against(name)));
         let verdict = Verdict::all(each.iter().map(|(_, at)| Verdict::any(at.iter().map(|s| s.verdict))));
@@ -254,29 +266,71 @@ fn claims(compared: &[Compared]) -> Vec<Claim> {
     says.into_iter().enumerate().map(claim).collect()
 }
 
-/// IEPSO with the reward against IEPSO without: generation and error.
-struct Rewarded {
-    label: String,
-    effects: [Effect; 2],
+/// What the runs of IEPSO brought on one objective: generation and error.
+struct Figures {
+    task: Reach<'static>,
+    objective: Objective,
+    runs: Vec<[f64; 2]>,
 }
 
-impl Rewarded {
-    fn of(label: String, with: &[Reaching], without: &[Reaching]) -> Self {
-        let of = |figure: fn(&Reaching) -> f64, floor: f64| {
-            let [a, b] = [with, without].map(|runs| counted(&runs.iter().map(figure).collect::<Vec<_>>()));
-            Effect::ratio(("with reward", &a), ("without", &b), floor)
-        };
-        Self { label, effects: [of(|r| r.generation, 1.0), of(|r| r.error_mm, PRECISION_MM)] }
+impl Figures {
+    fn new((task, objective): (Reach<'static>, Objective), runs: &[Reaching]) -> Self {
+        Self { task, objective, runs: runs.iter().map(Self::of).collect() }
+    }
+
+    fn of(run: &Reaching) -> [f64; 2] {
+        [run.generation, run.error_mm]
+    }
+
+    fn up_to(&mut self, bench: &Bench, runs: usize) -> Result<(), Stop> {
+        let (task, objective) = (self.task, self.objective);
+        bench.run_context.up_to(runs, &mut self.runs, |run| {
+            let contender = contender("iepso", Reading::Corrected, bench.budget)?;
+            reach(bench.run_context, &contender, (task, objective), run, bench.budget).map(|r| Self::of(&r))
+        })
+    }
+
+    fn which(&self, which: usize) -> Vec<f64> {
+        counted(&self.runs.iter().map(|figures| figures[which]).collect::<Vec<_>>())
     }
 }
 
-fn rewarded(rewards: &[Rewarded]) -> [Claim; 2] {
+/// IEPSO with the reward at one largest error.
+struct Rewarded {
+    label: String,
+    with: Figures,
+}
+
+impl Rewarded {
+    fn new(label: String, task: Reach<'static>, runs: &[Reaching]) -> Self {
+        Self { label, with: Figures::new((task, Objective::Reward), runs) }
+    }
+
+    fn effect(&self, without: &Figures, which: usize, level: Level) -> Effect {
+        let floor = [1.0, PRECISION_MM][which];
+        let (with, without) = (self.with.which(which), without.which(which));
+        Effect::ratio(("with reward", &with), ("without", &without), (floor, level))
+    }
+}
+
+/// IEPSO with the reward against IEPSO without: generation and error.
+fn rewarded(bench: &Bench, mut rewards: Vec<Rewarded>, without: &[Reaching]) -> Result<Vec<Claim>, Stop> {
     let rule = "IEPSO, corrected: less with the reward, at some e_max over a decade: above 0 (holds), below 1 % (does not hold), or neither";
-    let at = |which: usize| -> Vec<At> {
-        rewards.iter().map(|r| At::all(r.label.clone(), &r.effects[which..=which])).collect()
-    };
-    [
-        at_some("The reward makes IEPSO converge faster", rule, &at(0)),
-        at_some("The reward makes IEPSO more accurate", rule, &at(1)),
-    ]
+    let task = FiveJointArm::task(Reading::Corrected);
+    let mut without = Figures::new((task, Objective::TimeAndError), without);
+    let looks = bench.run_context.looks_at_most(looks::UNPRINTED_003, QUICK_RUNS);
+    settle(looks, |look| {
+        without.up_to(bench, look.runs)?;
+        rewards.iter_mut().try_for_each(|rewarded| rewarded.with.up_to(bench, look.runs))?;
+        let values = Values { count: rewards.len(), level: look.level };
+        let at = |which: usize| -> Vec<At> {
+            let at =
+                |r: &Rewarded| At::some(&*r.label, values, |level| vec![r.effect(&without, which, level)]);
+            rewards.iter().map(at).collect()
+        };
+        Ok(vec![
+            at_some("The reward makes IEPSO converge faster", rule, &at(0)),
+            at_some("The reward makes IEPSO more accurate", rule, &at(1)),
+        ])
+    })
 }

@@ -7,6 +7,7 @@ use crate::figure::Figure;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
+use crate::statistics::Level;
 use crate::table::{Cell, Table};
 use crate::trial::{Sample, Trial, minimise};
 use taustream_optimizers::papers::two_link::{Moving, TwoLink};
@@ -266,7 +267,11 @@ fn needs_iwo(run_context: &RunContext, outcome: &mut Outcome) -> Result<(), Stop
         })?;
         let above = Sample::from_trials(&trials, |t| (t.found.cost - exact) / exact.abs());
         newtons = newtons.max(evaluations);
-        effects.push(Effect::below((&format!("the gap {label}"), &above.values), 1e-6, "of it"));
+        effects.push(Effect::below(
+            (&format!("the gap {label}"), &above.values),
+            1e-6,
+            ("of it", Level::FIVE_PERCENT),
+        ));
         table.row(
             label,
             vec![

@@ -8,8 +8,8 @@ use crate::claim::Claim;
 use crate::effect::Effect;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
-use crate::statistics::quantile;
-use crate::swept::{At, FACTORS, at_every, at_some, label};
+use crate::statistics::{Level, quantile};
+use crate::swept::{At, FACTORS, Values, at_every, at_some, label};
 use crate::table::{Cell, Table};
 use taustream_optimizers::Reading;
 use taustream_optimizers::papers::two_link::TwoLink;
@@ -70,8 +70,8 @@ impl Setting {
         })
     }
 
-    fn never(&self, what: &str, walks: &[Walk], which: usize) -> Effect {
-        Effect::never(what, touching(walks, self.contact, which), walks.len())
+    fn never(&self, walks: &[Walk], which: usize, level: Level) -> Vec<Effect> {
+        vec![Effect::never("touch", [touching(walks, self.contact, which), walks.len()], level)]
     }
 
     fn cells(&self) -> Vec<Cell> {
@@ -137,12 +137,20 @@ fn table(settings: &[Setting]) -> Table {
 }
 
 fn claims(settings: &[Setting]) -> Vec<Claim> {
-    let each = |effects: &dyn Fn(&Setting) -> Vec<Effect>| -> Vec<At> {
-        settings.iter().map(|s| At::all(s.label.clone(), &effects(s))).collect()
+    let values = Values::of(settings.len());
+    let some = |effects: &dyn Fn(&Setting, Level) -> Vec<Effect>| -> Vec<At> {
+        settings.iter().map(|s| At::some(&*s.label, values, |level| effects(s, level))).collect()
+    };
+    let every = |effects: &dyn Fn(&Setting, Level) -> Vec<Effect>| -> Vec<At> {
+        settings.iter().map(|s| At::every(&*s.label, values, |level| effects(s, level))).collect()
     };
     let touch = "no run has a via point whose spheres touch; one refutes it";
     let nearest = |setting: &Setting| {
-        let at = |name: &str, walks: &[Walk]| At::all(setting.label.clone(), &[near(name, walks)]).verdict;
+        // Either reading will do: as many values again.
+        let values = Values::of(2 * settings.len());
+        let at = |name: &str, walks: &[Walk]| {
+            At::some(&*setting.label, values, |level| vec![near(name, walks, level)]).verdict
+        };
         let readings = [at("degrees", &setting.degrees), at("radians", &setting.radians)];
         At { label: setting.label.clone(), verdict: crate::claim::Verdict::any(readings) }
     };
@@ -150,17 +158,17 @@ fn claims(settings: &[Setting]) -> Vec<Claim> {
         at_some(
             "With K = 10, 10, 100 the via points avoid the obstacles (angles in degrees)",
             touch,
-            &each(&|s| vec![s.never("touch", &s.degrees, 0)]),
+            &some(&|s, level| s.never(&s.degrees, 0, level)),
         ),
         at_every(
             "With K = 10, 10, 100 the via points avoid the obstacles (angles in radians)",
             touch,
-            &each(&|s| vec![s.never("touch", &s.radians, 0)]),
+            &every(&|s, level| s.never(&s.radians, 0, level)),
         ),
         at_some(
             "The fitted trajectory avoids the obstacles (angles in radians)",
             "no run's cubics touch; one refutes it",
-            &each(&|s| vec![s.never("touch", &s.radians, 2)]),
+            &some(&|s, level| s.never(&s.radians, 2, level)),
         ),
         at_some(
             "The least distance stays near 1.29 (figure 5)",
@@ -170,15 +178,15 @@ fn claims(settings: &[Setting]) -> Vec<Claim> {
         at_every(
             "Without the penalty the distance falls below 1.29 (figure 6)",
             "in every run; one refutes it",
-            &each(&|s| {
+            &every(&|s, level| {
                 let above = s.free.iter().filter(|w| w.least[0] >= PRINTED_LIMIT).count();
-                vec![Effect::never("it stays above", above, s.free.len())]
+                vec![Effect::never("it stays above", [above, s.free.len()], level)]
             }),
         ),
         at_some(
             "θ goes on as without obstacles, φ bends away (figure 4)",
             MAJORITY_RULE,
-            &each(&|s| vec![Effect::majority("φ bends more", s.bends[0], s.bends[1])]),
+            &some(&|s, level| vec![Effect::majority("φ bends more", s.bends, level)]),
         ),
     ]
 }

@@ -6,6 +6,7 @@ use crate::figure::Figure;
 use crate::number::figures;
 use crate::registry::Outcome;
 use crate::run_context::{RunContext, Stop};
+use crate::statistics::Level;
 use crate::table::{Cell, Table};
 use crate::trial::Sample;
 use taustream_optimizers::papers::two_link_energy::CubicSearch;
@@ -79,10 +80,10 @@ pub(super) fn touching(walks: &[Walk], contact: f64, which: usize) -> usize {
 }
 
 /// How far the median least distance at the via points is from the printed one.
-pub(super) fn near(name: &str, walks: &[Walk]) -> Effect {
+pub(super) fn near(name: &str, walks: &[Walk], level: Level) -> Effect {
     let least: Vec<f64> = walks.iter().map(|w| w.least[0]).collect();
     let name = format!("the least distance, {name}");
-    Effect::near((&name, &least), PRINTED_LIMIT, (0.1 * PRINTED_LIMIT, ""))
+    Effect::near((&name, &least), PRINTED_LIMIT, (0.1 * PRINTED_LIMIT, "", level))
 }
 
 /// The via points of a run.
@@ -182,10 +183,12 @@ pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
 fn claims(all: &[Vec<Walk>], contact: f64, bends: [usize; 2]) -> Vec<Claim> {
     let [free, degrees, radians, margin] = all else { return Vec::new() };
     let touching = |walks: &[Walk], which: usize| touching(walks, contact, which);
-    let touch =
-        |what: &str, walks: &[Walk], which: usize| Effect::never(what, touching(walks, which), walks.len());
+    let level = Level::FIVE_PERCENT;
+    let touch = |what: &str, walks: &[Walk], which: usize| {
+        Effect::never(what, [touching(walks, which), walks.len()], level)
+    };
     let rule = "no run has a via point whose spheres touch; one refutes it";
-    let near = vec![near("degrees", degrees), near("radians", radians)];
+    let near = vec![near("degrees", degrees, level), near("radians", radians, level)];
     let below = free.iter().filter(|w| w.least[0] >= PRINTED_LIMIT).count();
     vec![
         Claim::tested(
@@ -220,12 +223,12 @@ fn claims(all: &[Vec<Walk>], contact: f64, bends: [usize; 2]) -> Vec<Claim> {
         Claim::tested(
             "Without the penalty the distance falls below 1.29 (figure 6)",
             "in every run; one refutes it",
-            vec![Effect::never("it stays above", below, free.len())],
+            vec![Effect::never("it stays above", [below, free.len()], level)],
         ),
         Claim::tested(
             "θ goes on as without obstacles, φ bends away (figure 4)",
             MAJORITY_RULE,
-            vec![Effect::majority("φ bends more", bends[0], bends[1])],
+            vec![Effect::majority("φ bends more", bends, level)],
         ),
     ]
 }

@@ -1,17 +1,13 @@
-//! Effects with their 95 % intervals.
+//! Effects with their intervals.
 //!
 //! Sources: Hodges and Lehmann, "Estimates of location based on rank tests", Annals of Mathematical Statistics 34, 1963;
 //! Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
 //! tests/statistics.rs holds them against scipy and R.
-use super::quantile;
+use super::wilcoxon::ranks_outside;
+use super::{Level, quantile};
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// Quantile of the standard normal distribution for 95 %.
-const Z: f64 = 1.959_963_984_540_054;
-/// Fewest pairs of which a signed-rank test can say anything at 5 %: with five, the least p is 0.0625.
-pub const PAIRS_MIN: usize = 6;
-
-/// An estimate with the interval that holds the truth in 95 of 100 experiments.
+/// An estimate with the interval that misses the truth as often as a [`Level`] allows.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Estimate {
     /// The estimate.
@@ -32,9 +28,10 @@ impl Estimate {
 }
 
 /// The shift of differences (Hodges and Lehmann): the median of the means of all pairs of them, with the interval of the
-/// signed-rank test. Differences that are no numbers are left out.
+/// signed-rank test; without one where the sample is too small for the level. Differences that are no numbers are left
+/// out.
 #[must_use]
-pub fn shift(differences: &[f64]) -> Estimate {
+pub fn shift(differences: &[f64], level: Level) -> Estimate {
     let known: Vec<f64> = differences.iter().copied().filter(|d| d.is_finite()).collect();
     let mut means = Vec::with_capacity(known.len() * (known.len() + 1) / 2);
     for (i, a) in known.iter().enumerate() {
@@ -45,42 +42,34 @@ pub fn shift(differences: &[f64]) -> Estimate {
     }
     means.sort_by(f64::total_cmp);
     let value = quantile(&means, 0.5);
-    if known.len() < PAIRS_MIN {
+    let Some(outer) = ranks_outside(known.len(), level) else {
         return Estimate { value, ..Estimate::UNKNOWN };
-    }
-    let n = known.len() as f64;
-    let below = n * (n + 1.0) / 4.0 - Z * (n * (n + 1.0) * (2.0 * n + 1.0) / 24.0).sqrt();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "from 0 to the number of means"
-    )]
-    let outer = below.floor().max(0.0) as usize;
+    };
     let at = |i: usize| means.get(i).copied().unwrap_or(f64::NAN);
     Estimate { value, interval: [at(outer), at(means.len() - 1 - outer)] }
 }
 
 /// A share of runs, with Wilson's interval.
 #[must_use]
-pub fn share(count: usize, of: usize) -> Estimate {
+pub fn share(count: usize, of: usize, level: Level) -> Estimate {
     if of == 0 {
         return Estimate::UNKNOWN;
     }
-    let (p, n) = (count as f64 / of as f64, of as f64);
-    let middle = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
-    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt() / (1.0 + Z * Z / n);
+    let (p, n, z) = (count as f64 / of as f64, of as f64, level.z());
+    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
     Estimate { value: p, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] }
 }
 
-/// The median, between the order statistics that hold it in 95 of 100 samples.
+/// The median, between the order statistics that hold it.
 #[must_use]
-pub fn median(values: &[f64]) -> Estimate {
+pub fn median(values: &[f64], level: Level) -> Estimate {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);
     let (value, n) = (quantile(&sorted, 0.5), sorted.len());
     let Ok(coin) = Binomial::new(0.5, n as u64) else { return Estimate::UNKNOWN };
     // So many of the lowest and of the highest may be left out.
-    let outer = (0..n / 2).take_while(|k| coin.cdf(*k as u64) <= 0.025).count();
+    let outer = (0..n / 2).take_while(|k| coin.cdf(*k as u64) <= level.tail()).count();
     if outer == 0 {
         return Estimate { value, ..Estimate::UNKNOWN };
     }

@@ -3,6 +3,7 @@
 //! Source: Wilcoxon, "Individual comparisons by ranking methods", Biometrics Bulletin 1, 1945; equal pairs are left
 //! out, as he does. Exact for up to [`EXACT_MAX`] pairs without ties, otherwise normal with corrections for ties and
 //! continuity, as in scipy's `wilcoxon(correction=True)`.
+use super::Level;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Most pairs for which all sums of ranks are counted.
@@ -66,8 +67,8 @@ fn ranks(sorted: &[f64]) -> (Vec<f64>, f64) {
     (ranks, ties)
 }
 
-/// Share of all 2^n signs whose sum of positive ranks is as far out as this one.
-fn exact(n: usize, positive: f64) -> f64 {
+/// Share of all 2^n signs by the sum of their positive ranks.
+fn shares(n: usize) -> Vec<f64> {
     let all = n * (n + 1) / 2;
     let mut shares = vec![0.0; all + 1];
     shares[0] = 1.0;
@@ -77,9 +78,38 @@ fn exact(n: usize, positive: f64) -> f64 {
             shares[sum] = 0.5 * (shares[sum] + with);
         }
     }
-    let outer = positive.min(all as f64 - positive);
-    let tail: f64 = shares.iter().enumerate().filter(|(sum, _)| *sum as f64 <= outer).map(|(_, s)| s).sum();
+    shares
+}
+
+/// Share of all 2^n signs whose sum of positive ranks is as far out as this one.
+fn exact(n: usize, positive: f64) -> f64 {
+    let outer = positive.min((n * (n + 1) / 2) as f64 - positive);
+    let tail: f64 =
+        shares(n).iter().enumerate().filter(|(sum, _)| *sum as f64 <= outer).map(|(_, s)| s).sum();
     (2.0 * tail).min(1.0)
+}
+
+/// The largest sum of ranks that is still outside at a level: as many of the means of pairs lie beyond either end of the
+/// interval. `None` where even the sum 0 is not: with five pairs its two-sided probability is 0.0625.
+pub(super) fn ranks_outside(n: usize, level: Level) -> Option<usize> {
+    if n <= EXACT_MAX {
+        let mut tail = 0.0;
+        let outside = shares(n).into_iter().take_while(|share| {
+            tail += share;
+            tail <= level.tail()
+        });
+        return outside.count().checked_sub(1);
+    }
+    let n = n as f64;
+    let mean = n * (n + 1.0) / 4.0;
+    let outer = mean - 0.5 - level.z() * (n * (n + 1.0) * (2.0 * n + 1.0) / 24.0).sqrt();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to the number of means"
+    )]
+    let outer = outer.floor().max(0.0) as usize;
+    Some(outer)
 }
 
 fn normal(n: usize, positive: f64, ties: f64) -> f64 {

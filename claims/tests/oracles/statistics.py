@@ -21,8 +21,11 @@ print("quartiles", np.quantile(A, [0.25, 0.5, 0.75]), "sd", np.std(A, ddof=1), "
 
 differences = np.array(A) - np.array(B)
 means = sorted((differences[i] + differences[j]) / 2 for i in range(12) for j in range(i, 12))
-outer = int(12 * 13 / 4 - stats.norm.ppf(0.975) * np.sqrt(12 * 13 * 25 / 24))
-print("shift", np.median(means), means[outer], means[-1 - outer])
+# All signs of twelve ranks: the sums that are still outside at a level.
+sums = np.bincount([sum(r for r in range(1, 13) if signs >> (r - 1) & 1) for signs in range(2**12)]) / 2**12
+for level in [0.05, 0.05 / 4]:
+    outer = int(np.searchsorted(np.cumsum(sums), level / 2, side="right")) - 1
+    print("shift", level, np.median(means), means[outer], means[-1 - outer])
 for count, of in [(0, 30), (52, 100)]:
     print("share", count, of, stats.binomtest(count, of).proportion_ci(method="wilson"))
 for name, sample in [("A", A), ("LONG_A", LONG_A)]:

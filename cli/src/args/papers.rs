@@ -20,7 +20,7 @@ corrected (corrected). Two methods are compared pair by pair at equal evaluation
 interval and the margin below which it counts as none. The result of a claim (holds, does not hold, not told apart,
 cannot be checked) follows from the numbers by the rule beside it. The papers' own values are the only constants.
 One seed gives one result with any --jobs. Ctrl-C aborts without output. With --quick nothing random is decided.
-A full run takes about seven minutes, mostly papers 0 and 1; each further master seed takes as long again. Where master
+A full run takes about ten minutes, mostly papers 0 and 1; each further master seed takes as long again. Where master
 seeds give different verdicts, the result is not told apart, and the report names the row.";
 
 /// `taustream bench papers`
