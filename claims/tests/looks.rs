@@ -17,8 +17,7 @@ fn run(rng: &mut SeededRng, saved: f64, noise: f64) -> [f64; 2] {
 }
 
 /// The claim that the first is less, margin 1 %, and the runs that it took.
-#[expect(clippy::unwrap_used, reason = "a helper of tests, outside of any #[test] function")]
-fn judged(seed: u64, (saved, noise): (f64, f64), level: impl Fn(Level) -> Level) -> (Verdict, usize) {
+fn sequential(seed: u64, (saved, noise): (f64, f64), level: impl Fn(Level) -> Level) -> (Verdict, usize) {
     let mut rng = SeededRng::new(seed, 1);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let claims = settle(LOOKS, |look| {
@@ -34,7 +33,7 @@ fn judged(seed: u64, (saved, noise): (f64, f64), level: impl Fn(Level) -> Level)
 }
 
 fn count(truth: (f64, f64), level: impl Fn(Level) -> Level + Copy, wanted: Verdict) -> u64 {
-    (0..SEEDS).filter(|seed| judged(*seed, truth, level).0 == wanted).count() as u64
+    (0..SEEDS).filter(|seed| sequential(*seed, truth, level).0 == wanted).count() as u64
 }
 
 /// Goal: a word that three seeds share is a word that nearly every seed gives.
@@ -53,7 +52,7 @@ fn clear_effect_holds_and_a_tie_is_not_told_apart_at_nearly_every_seed() {
 fn looks_keep_the_promised_rate_of_errors() {
     let seeds = 4 * SEEDS;
     let wrong = |level: &dyn Fn(Level) -> Level| {
-        (0..seeds).filter(|seed| judged(*seed, (0.0, 0.3), level).0 == Verdict::Holds).count() as f64
+        (0..seeds).filter(|seed| sequential(*seed, (0.0, 0.3), level).0 == Verdict::Holds).count() as f64
     };
     // One side of 5 %, and three deviations of what chance makes of it.
     let promised = 0.025 * seeds as f64;
@@ -67,8 +66,8 @@ fn looks_keep_the_promised_rate_of_errors() {
 #[test]
 fn clear_claim_takes_few_runs_and_a_tie_all() {
     let same = |level: Level| level;
-    assert_eq!(judged(1, (0.5, 0.1), same), (Verdict::Holds, 12));
-    assert_eq!(judged(1, (0.0, 0.3), same), (Verdict::Open, 96));
+    assert_eq!(sequential(1, (0.5, 0.1), same), (Verdict::Holds, 12));
+    assert_eq!(sequential(1, (0.0, 0.3), same), (Verdict::Open, 96));
     assert_eq!((LOOKS.first(), LOOKS.last()), (12, 96));
     assert!((LOOKS.level().share() - 0.0125).abs() < 1e-15);
 }

@@ -43,7 +43,7 @@ const SWEPT: [Swept; 3] = [
 ];
 
 /// The methods at one weight of L and one size of the box: BFOA, IBFOA, BSO, and BSO with other constants.
-struct Arena {
+struct Comparison {
     meeting: Meeting,
     makes: Vec<Box<dyn Fn() -> Box<dyn Optimizer> + Sync>>,
     field: Field,
@@ -51,7 +51,7 @@ struct Arena {
     rows: Vec<(String, usize)>,
 }
 
-impl Arena {
+impl Comparison {
     /// At a weight of L and a size of the box over ours, also with other constants of BSO.
     fn new(
         run_context: &RunContext,
@@ -124,40 +124,41 @@ impl Arena {
 
 /// Runs them.
 pub(crate) fn run(run_context: &RunContext) -> Result<Outcome, Stop> {
-    let mut arenas = Vec::new();
+    let mut comparisons = Vec::new();
     for (i, factor) in UNITS.into_iter().enumerate() {
         let label = label("weight of L (1/m)", factor * CostModel::default().weights[0]);
         let constants = if i == 0 { &SWEPT[..] } else { &[] };
-        arenas.push(Arena::new(run_context, label, [factor, 1.0], constants));
+        comparisons.push(Comparison::new(run_context, label, [factor, 1.0], constants));
     }
     for size in BOXES {
         let label = format!("centres' box times {}", figures(size));
-        arenas.push(Arena::new(run_context, label, [1.0, size], &[]));
+        comparisons.push(Comparison::new(run_context, label, [1.0, size], &[]));
     }
     let looks = run_context.looks_at_most(looks::UNPRINTED_000, QUICK_RUNS);
     let claims = settle(looks, |look| {
-        arenas.iter_mut().try_for_each(|arena| arena.run(run_context, look))?;
-        Ok::<_, Stop>(claims(&arenas, look.level))
+        comparisons.iter_mut().try_for_each(|comparison| comparison.run(run_context, look))?;
+        Ok::<_, Stop>(claims(&comparisons, look.level))
     })?;
     let (tree_table, tree_claim) = trees::over_steps(run_context, looks.first())?;
-    let tables = vec![table(&arenas), tree_table];
+    let tables = vec![table(&comparisons), tree_table];
     Ok(Outcome { tables, claims: [claims, vec![tree_claim]].concat(), ..Outcome::default() })
 }
 
 /// In the order of [`BETTER`], [`FASTER`], [`BETTER_THAN_BSO`].
-fn claims(arenas: &[Arena], level: Level) -> Vec<Claim> {
-    let values = Values { count: arenas.len(), level };
+fn claims(comparisons: &[Comparison], level: Level) -> Vec<Claim> {
+    let values = Values { count: comparisons.len(), level };
     let bfoa = |which: usize| -> Vec<At> {
-        let at = |arena: &Arena| {
-            let label = arena.rows.first().map_or("", |(label, _)| label.as_str());
-            At::some(label, values, |level| arena.bfoa(level)[which..=which].to_vec())
+        let at = |comparison: &Comparison| {
+            let label = comparison.rows.first().map_or("", |(label, _)| label.as_str());
+            At::some(label, values, |level| comparison.bfoa(level)[which..=which].to_vec())
         };
-        arenas.iter().map(at).collect()
+        comparisons.iter().map(at).collect()
     };
-    let rows = || arenas.iter().flat_map(|arena| arena.rows.iter().map(move |row| (arena, row)));
+    let rows =
+        || comparisons.iter().flat_map(|comparison| comparison.rows.iter().map(move |row| (comparison, row)));
     let values = Values { count: rows().count(), level };
-    let bso = rows().map(|(arena, (label, bso))| {
-        At::some(label.as_str(), values, |level| vec![arena.at_the_end(*bso, level)])
+    let bso = rows().map(|(comparison, (label, bso))| {
+        At::some(label.as_str(), values, |level| vec![comparison.at_the_end(*bso, level)])
     });
     let rule = "in scenes that both leave without collision, the population's best at the end is less: above 0 (holds), below 2 % (does not \
                 hold), or neither";
@@ -169,7 +170,7 @@ fn claims(arenas: &[Arena], level: Level) -> Vec<Claim> {
     ]
 }
 
-fn table(arenas: &[Arena]) -> Table {
+fn table(comparisons: &[Comparison]) -> Table {
     let columns = [
         "",
         "scenes free of collision",
@@ -185,8 +186,8 @@ fn table(arenas: &[Arena]) -> Table {
         Bso::PULLS[1]
     );
     let mut table = Table::new("Numbers that the paper does not print", "cost J_c", &note, &columns);
-    for arena in arenas {
-        arena.rows.iter().for_each(|(label, bso)| table.row(label.clone(), arena.cells(*bso)));
+    for comparison in comparisons {
+        comparison.rows.iter().for_each(|(label, bso)| table.row(label.clone(), comparison.cells(*bso)));
     }
     table
 }

@@ -58,7 +58,10 @@ pub fn share(count: usize, of: usize, level: Level) -> Estimate {
     let (p, n, z) = (count as f64 / of as f64, of as f64, level.z());
     let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
     let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
-    Estimate { value: p, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] }
+    // Exact where none or all do.
+    let low = if count == 0 { 0.0 } else { (middle - half).max(0.0) };
+    let high = if count == of { 1.0 } else { (middle + half).min(1.0) };
+    Estimate { value: p, interval: [low, high] }
 }
 
 /// The median, between the order statistics that hold it.
