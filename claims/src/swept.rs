@@ -113,13 +113,13 @@ mod tests {
     /// Goal: six of eight coins on one side are no news among forty handfuls.
     #[test]
     fn one_of_many_values_needs_more_evidence_than_a_single_one() {
+        use Verdict::{DoesNotHold, Holds, Open};
         let effects = |count: usize| move |level| vec![Effect::majority("it bends", [count, 100], level)];
         let words = |count: usize, values: usize| {
             let values = Values::of(values);
             [At::some("a", values, effects(count)), At::every("a", values, effects(count))]
                 .map(|at| at.verdict)
         };
-        use Verdict::{DoesNotHold, Holds, Open};
         assert_eq!(words(61, 1), [Holds, Holds]);
         assert_eq!(words(61, 40), [Open, Holds], "one of forty holds by chance");
         assert_eq!(words(49, 1), [DoesNotHold, DoesNotHold]);
