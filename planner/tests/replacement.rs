@@ -171,6 +171,18 @@ fn optimum_s(
     solution.get_duration()
 }
 
+/// Limits of every joint like those of a UR5.
+fn even_limits() -> [JointLimits; MAX_JOINTS] {
+    let motion = LimitSet { velocity_rad_s: 3.1, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
+    [JointLimits { position_rad: [-1e3, 1e3], motion, stop: motion }; MAX_JOINTS]
+}
+
+/// Median and 95th percentile.
+fn spread(mut ratios: Vec<f64>) -> [f64; 2] {
+    ratios.sort_by(f64::total_cmp);
+    [50, 95].map(|percent| ratios[ratios.len() * percent / 100])
+}
+
 /// Goal: what the project promises of replacements: 1.15 times Ruckig's state-to-state optimum at the median of random cuts, 1.4
 /// at the 95th percentile, and none refused.
 #[test]
@@ -178,8 +190,7 @@ fn replacements_of_random_cuts_take_little_longer_than_the_optimum() {
     let mut ratios = Vec::new();
     for seed in 0..50 {
         let mut rng = SeededRng::new(seed, 3);
-        let motion = LimitSet { velocity_rad_s: 3.1, acceleration_rad_s2: 15.0, jerk_rad_s3: 150.0 };
-        let limits = [JointLimits { position_rad: [-1e3, 1e3], motion, stop: motion }; MAX_JOINTS];
+        let limits = even_limits();
         let mut running = straight(&mut rng, &limits);
         let mut from_s = 0.0;
         for _ in 0..2 {
@@ -189,9 +200,27 @@ fn replacements_of_random_cuts_take_little_longer_than_the_optimum() {
             (running, from_s) = (new, cut_s);
         }
     }
-    ratios.sort_by(f64::total_cmp);
-    let (median, high) = (ratios[ratios.len() / 2], ratios[ratios.len() * 95 / 100]);
+    let [median, high] = spread(ratios);
     assert!(median <= 1.15 && high <= 1.4, "median {median}, 95th percentile {high}");
+}
+
+/// Goal: the same soon after the start, to near goals: the strokes that are kept act on for a large part of the optimum, and only narrow
+/// new ones turn the motion before they end. Planted fault: with the places of the dropped strokes alone it is 1.32 and 1.99.
+#[test]
+fn replacements_of_a_motion_that_speeds_up_turn_soon_to_a_near_goal() {
+    let mut ratios = Vec::new();
+    for seed in 0..100 {
+        let mut rng = SeededRng::new(seed, 4);
+        let limits = even_limits();
+        let running = straight(&mut rng, &limits);
+        let cut_s = running.duration_s() * rng.within(0.05, 0.3);
+        let mut goal_rad = running.sample(cut_s).position_rad;
+        goal_rad.iter_mut().take(JOINTS).for_each(|goal| *goal += rng.within(-0.3, 0.3));
+        let new = replacement(&running, cut_s, &goal_rad, &limits).unwrap();
+        ratios.push((new.duration_s() - cut_s) / optimum_s(&running, cut_s, &goal_rad, &limits));
+    }
+    let [median, high] = spread(ratios);
+    assert!(median <= 1.25 && high <= 1.6, "median {median}, 95th percentile {high}");
 }
 
 /// Goal: the reason for all this. Pending strokes of a train cancel running ones, so that dropping them alone breaks the

@@ -30,7 +30,6 @@ const ROUNDS: u32 = 32;
 /// What all joints share.
 pub(super) struct System {
     pub instants: Instants,
-    pub checked: Instants,
     pub factor: Factor,
     /// Weights of squared velocities, accelerations and jerks.
     pub weights: [f64; 3],
@@ -40,22 +39,31 @@ pub(super) struct System {
 
 /// What differs from joint to joint.
 pub(super) struct Problem {
-    /// What the kept strokes do, at the fitted and at the checked instants.
-    pub kept: [Vec<Rates>; 2],
+    /// What the kept strokes do at the fitted instants.
+    pub kept: Vec<Rates>,
     /// What the sum should do at the fitted instants.
     pub reference: Vec<Rates>,
     /// What it may do at most at the fitted instants, less a margin.
     pub bounds: Vec<Rates>,
-    /// What it may do at most at the checked instants.
-    pub ceilings: Vec<Rates>,
     /// What all new strokes together must move; nothing when the end is free.
     pub sum_rad: Option<[f64; LANES]>,
+}
+
+/// What is looked at once a fit keeps its bounds: most fits that fail never do, and it costs as much as the fit.
+pub(super) struct Fine<'a> {
+    /// Closely spaced instants.
+    pub instants: &'a Instants,
+    /// What the kept strokes do there.
+    pub kept: Vec<Rates>,
+    /// What the sum may do there at most.
+    pub ceilings: Vec<Rates>,
 }
 
 /// A fit, compiled for each width of vectors.
 struct Rounds<'a> {
     system: &'a System,
     problem: &'a mut Problem,
+    fine: &'a dyn Fn() -> Fine<'a>,
 }
 
 impl WithSimd for Rounds<'_> {
@@ -63,18 +71,23 @@ impl WithSimd for Rounds<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        self.system.rounds(self.problem)
+        self.system.rounds(self.problem, self.fine)
     }
 }
 
 impl System {
     /// Weights of the strokes, or nothing when none were found inside the ceilings. Uses the widest vectors of the processor.
-    pub(super) fn solve(&self, problem: &mut Problem) -> Option<Vec<[f64; LANES]>> {
-        Arch::new().dispatch(Rounds { system: self, problem })
+    pub(super) fn solve<'a>(
+        &'a self,
+        problem: &'a mut Problem,
+        fine: &'a dyn Fn() -> Fine<'a>,
+    ) -> Option<Vec<[f64; LANES]>> {
+        Arch::new().dispatch(Rounds { system: self, problem, fine })
     }
 
     #[inline(always)]
-    fn rounds(&self, problem: &mut Problem) -> Option<Vec<[f64; LANES]>> {
+    fn rounds<'a>(&self, problem: &mut Problem, fine: &'a dyn Fn() -> Fine<'a>) -> Option<Vec<[f64; LANES]>> {
+        let mut looked: Option<Fine<'a>> = None;
         let mut along = vec![[1.0; LANES]; self.count];
         self.factor.solve(&mut along);
         let mut dual = vec![[[0.0; LANES]; 3]; problem.reference.len()];
@@ -82,7 +95,7 @@ impl System {
         for round in 0..ROUNDS {
             self.least_squares(problem, &along, &mut weights);
             let used = self.project(problem, &weights, &mut dual, round == 0);
-            if used <= EXCESS && self.tighten(problem, &weights) {
+            if used <= EXCESS && tighten(problem, looked.get_or_insert_with(fine), &weights) {
                 return Some(weights);
             }
             if HOPELESS.iter().any(|(rounds, most)| round + 1 == *rounds && used > *most) {
@@ -96,7 +109,7 @@ impl System {
     #[inline(always)]
     fn least_squares(&self, problem: &Problem, along: &[[f64; LANES]], weights: &mut [[f64; LANES]]) {
         weights.fill([0.0; LANES]);
-        for (instant, (target, kept)) in problem.reference.iter().zip(&problem.kept[0]).enumerate() {
+        for (instant, (target, kept)) in problem.reference.iter().zip(&problem.kept).enumerate() {
             let mut gap = *target;
             for ((gap, kept), weight) in gap.iter_mut().zip(kept).zip(self.weights) {
                 for (gap, kept) in gap.iter_mut().zip(kept) {
@@ -138,7 +151,7 @@ impl System {
         let mut used = [0.0; LANES];
         let relaxation = if first { 1.0 } else { RELAXATION };
         for (instant, dual) in dual.iter_mut().enumerate() {
-            let now = self.instants.sum(instant, weights, &problem.kept[0][instant]);
+            let now = self.instants.sum(instant, weights, &problem.kept[instant]);
             let (target, bounds) = (&mut problem.reference[instant], &problem.bounds[instant]);
             for quantity in 0..3 {
                 // Local copies, so that lanes become vectors.
@@ -158,42 +171,42 @@ impl System {
         }
         used.into_iter().fold(0.0, f64::max)
     }
+}
 
-    /// True when nothing is above its ceiling. Otherwise lowers the bounds next to what is.
-    #[inline(always)]
-    fn tighten(&self, problem: &mut Problem, weights: &[[f64; LANES]]) -> bool {
-        let mut holds = true;
-        let mut last: Option<[Rates; 2]> = None;
-        for instant in 0..self.checked.times_s.len() {
-            let now = self.checked.sum(instant, weights, &problem.kept[1][instant]);
-            // The ceiling of the instant before, at which a peak may be.
-            let middle = instant.saturating_sub(1);
-            let [before, at] = last.unwrap_or([now, now]);
-            for quantity in 0..3 {
-                let (values, ceilings) = (at[quantity], problem.ceilings[middle][quantity]);
-                let mut highest = 0.0;
-                for lane in 0..LANES {
-                    highest = larger(values[lane].abs() / ceilings[lane], highest);
-                }
-                if highest <= NEAR {
+/// True when nothing is above its ceiling. Otherwise lowers the bounds next to what is.
+#[inline(always)]
+fn tighten(problem: &mut Problem, fine: &Fine, weights: &[[f64; LANES]]) -> bool {
+    let mut holds = true;
+    let mut last: Option<[Rates; 2]> = None;
+    for instant in 0..fine.instants.times_s.len() {
+        let now = fine.instants.sum(instant, weights, &fine.kept[instant]);
+        // The ceiling of the instant before, at which a peak may be.
+        let middle = instant.saturating_sub(1);
+        let [before, at] = last.unwrap_or([now, now]);
+        for quantity in 0..3 {
+            let (values, ceilings) = (at[quantity], fine.ceilings[middle][quantity]);
+            let mut highest = 0.0;
+            for lane in 0..LANES {
+                highest = larger(values[lane].abs() / ceilings[lane], highest);
+            }
+            if highest <= NEAR {
+                continue;
+            }
+            for lane in 0..LANES {
+                let peak = peak([before, at, now].map(|rates| rates[quantity][lane]));
+                if peak <= ceilings[lane] {
                     continue;
                 }
-                for lane in 0..LANES {
-                    let peak = peak([before, at, now].map(|rates| rates[quantity][lane]));
-                    if peak <= ceilings[lane] {
-                        continue;
-                    }
-                    holds = false;
-                    let near = self.checked.nearest[middle];
-                    for bounds in problem.bounds.iter_mut().skip(near).take(2) {
-                        bounds[quantity][lane] *= TIGHTEN * ceilings[lane] / peak;
-                    }
+                holds = false;
+                let near = fine.instants.nearest[middle];
+                for bounds in problem.bounds.iter_mut().skip(near).take(2) {
+                    bounds[quantity][lane] *= TIGHTEN * ceilings[lane] / peak;
                 }
             }
-            last = Some([at, now]);
         }
-        holds
+        last = Some([at, now]);
     }
+    holds
 }
 
 /// One instruction, which [`f64::max`] is not. Where one is no number it is the second.

@@ -17,8 +17,9 @@ mod reference;
 use basis::{Instants, Slot, Widths, continued, slots};
 use cut::{AllRates, Cut};
 use factor::Factor;
-use fit::{Problem, Rates, System};
+use fit::{Fine, Problem, Rates, System};
 use reference::Optimum;
+use std::cell::OnceCell;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Stroke, Trajectory};
 
 /// Joints that are fitted together.
@@ -30,8 +31,8 @@ const CEILING: f64 = 0.9997;
 /// Durations that are tried, over the least one.
 const DURATIONS: [f64; 15] =
     [1.07, 1.1, 1.15, 1.22, 1.27, 1.32, 1.38, 1.44, 1.5, 1.6, 1.8, 2.05, 2.3, 3.2, 5.0];
-/// Width of the widest strokes over the duration.
-const MIDDLE: f64 = 0.18;
+/// Above this duration, over the least one, what is found is tried once more halfway to the duration that failed before.
+const HALVED: f64 = 1.25;
 /// Width of the first strokes over that of the kept ones ..
 const FIRST: f64 = 0.5;
 /// Width of the last strokes over the duration; the first ones are not narrower for that.
@@ -96,17 +97,46 @@ fn search(cut: &Cut, goal_rad: Option<&JointArray>, below_s: f64) -> Option<Traj
     let (slowest, least_s) = *joints.first()?;
     let joints: Vec<usize> = joints.into_iter().map(|(joint, _)| joint).collect();
     let least_s = least_s.max(DURATION_S_MIN);
+    let mut fit = |duration_s: f64| {
+        Pattern::ALL.iter().find_map(|pattern| {
+            let attempt = Attempt::new(cut, (duration_s, *pattern), slowest)?;
+            attempt.fit(&mut solver, &joints, goal_rad)
+        })
+    };
+    let mut failed_s = 0.0;
     for factor in DURATIONS {
         let duration_s = (factor * least_s).max(cut.kept_end_s);
         if duration_s >= below_s {
             break;
         }
-        let attempt = Attempt::new(cut, duration_s, slowest)?;
-        if let Some(found) = attempt.fit(&mut solver, &joints, goal_rad) {
-            return Some(found);
+        if let Some(found) = fit(duration_s) {
+            let halved_s = if factor > HALVED { 0.5 * (failed_s + duration_s) } else { duration_s };
+            return if halved_s < duration_s { fit(halved_s).or(Some(found)) } else { Some(found) };
         }
+        failed_s = duration_s;
     }
     None
+}
+
+/// Where new strokes begin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pattern {
+    /// Narrower ones from the cut on: they turn the motion soonest.
+    Fresh,
+    /// The places of dropped ones first: they complete what the kept ones are a part of.
+    Continued,
+}
+
+impl Pattern {
+    const ALL: [Self; 2] = [Self::Fresh, Self::Continued];
+
+    /// Width of the widest strokes over the duration.
+    const fn middle(self) -> f64 {
+        match self {
+            Self::Fresh => 0.25,
+            Self::Continued => 0.18,
+        }
+    }
 }
 
 /// One duration.
@@ -115,16 +145,27 @@ struct Attempt<'a> {
     widths: Widths,
     slots: Vec<Slot>,
     system: System,
-    /// What the kept strokes do at the fitted and the checked instants.
-    kept: [Vec<AllRates>; 2],
+    /// What the kept strokes do at the fitted instants.
+    kept: Vec<AllRates>,
+    /// The checked instants, and what the kept strokes do there.
+    checked: OnceCell<(Instants, Vec<AllRates>)>,
+    /// Until when they are closer to each other, after the cut.
+    fine_until_s: f64,
 }
 
 impl<'a> Attempt<'a> {
-    fn new(cut: &'a Cut<'a>, duration_s: f64, slowest: usize) -> Option<Self> {
-        let (middle_s, last_s) = (MIDDLE * duration_s, LAST * duration_s);
+    /// Nothing when there would be too many strokes, or when a pattern has nothing to continue.
+    fn new(cut: &'a Cut<'a>, (duration_s, pattern): (f64, Pattern), slowest: usize) -> Option<Self> {
+        let (middle_s, last_s) = (pattern.middle() * duration_s, LAST * duration_s);
         // Narrower than what they have to cancel, but not narrower each time that a replacement is replaced.
         let first_s = cut.kernel_s.min((FIRST * cut.kernel_s).max(last_s)).min(middle_s);
-        let continued = continued(cut.dropped, cut.at_s, duration_s);
+        let continued = match pattern {
+            Pattern::Fresh => Vec::new(),
+            Pattern::Continued => continued(cut.dropped, cut.at_s, duration_s),
+        };
+        if pattern == Pattern::Continued && continued.is_empty() {
+            return None;
+        }
         let first_s = continued.first().map_or(first_s, |slot| slot.width_s);
         let widths = Widths { duration_s, first_s, middle_s, last_s };
         // Strokes made elsewhere may end more steeply than ours.
@@ -132,14 +173,13 @@ impl<'a> Attempt<'a> {
             continued.last().map_or(0.0, |slot| slot.start_s + slot.width_s).max(cut.kept_end_s);
         let slots = slots(continued, &widths).filter(|slots| cut.kept.len() + slots.len() <= MAX_STROKES)?;
         let instants = Instants::fitted(&slots);
-        let checked = instants.checked(&slots, duration_s, fine_until_s);
         let motion = cut.limits[slowest].motion;
         let weights = [motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3]
             .map(|limit| 1.0 / (limit * limit));
         let factor = Factor::new(&instants, slots.len(), weights)?;
-        let kept = [cut.kept_rates(&instants.times_s), cut.kept_rates(&checked.times_s)];
-        let system = System { instants, checked, factor, weights, count: slots.len() };
-        Some(Self { cut, widths, slots, system, kept })
+        let kept = cut.kept_rates(&instants.times_s);
+        let system = System { instants, factor, weights, count: slots.len() };
+        Some(Self { cut, widths, slots, system, kept, checked: OnceCell::new(), fine_until_s })
     }
 
     fn fit(
@@ -158,7 +198,7 @@ impl<'a> Attempt<'a> {
         let new = self.cut.kept.len();
         for joints in joints.chunks(LANES) {
             let mut problem = self.problem(solver, joints, goal_rad)?;
-            let weights = self.system.solve(&mut problem)?;
+            let weights = self.system.solve(&mut problem, &|| self.fine(joints))?;
             for (stroke, weight) in strokes.iter_mut().skip(new).zip(&weights) {
                 for (joint, weight) in joints.iter().zip(weight) {
                     stroke.delta_rad[*joint] = *weight;
@@ -178,10 +218,7 @@ impl<'a> Attempt<'a> {
         joints: &[usize],
         goal_rad: Option<&JointArray>,
     ) -> Option<Problem> {
-        let (instants, checked) = (&self.system.instants.times_s, &self.system.checked.times_s);
-        let early_s = self.widths.first_s;
-        let bounds = self.cut.bounds(joints, instants, early_s, MARGIN);
-        let ceilings = self.cut.bounds(joints, checked, early_s, CEILING);
+        let times_s = &self.system.instants.times_s;
         let sum_rad = goal_rad.map(|goal_rad| {
             let mut sum_rad = [0.0; LANES];
             for (sum_rad, joint) in sum_rad.iter_mut().zip(joints) {
@@ -189,22 +226,24 @@ impl<'a> Attempt<'a> {
             }
             sum_rad
         });
-        let pick = |rates: &AllRates| {
-            let mut picked = [[0.0; LANES]; 3];
-            for (picked, rates) in picked.iter_mut().zip(rates) {
-                for (picked, joint) in picked.iter_mut().zip(joints) {
-                    *picked = rates[*joint];
-                }
-            }
-            picked
-        };
         Some(Problem {
-            kept: [0, 1].map(|which: usize| self.kept[which].iter().map(pick).collect()),
+            kept: picked(&self.kept, joints),
             reference: self.reference(solver, joints, goal_rad)?,
-            bounds,
-            ceilings,
+            bounds: self.cut.bounds(joints, times_s, self.widths.first_s, MARGIN),
             sum_rad,
         })
+    }
+
+    /// What is checked of some joints.
+    fn fine(&self, joints: &[usize]) -> Fine<'_> {
+        let (instants, kept) = self.checked.get_or_init(|| {
+            let instants = &self.system.instants;
+            let checked = instants.checked(&self.slots, self.widths.duration_s, self.fine_until_s);
+            let kept = self.cut.kept_rates(&checked.times_s);
+            (checked, kept)
+        });
+        let ceilings = self.cut.bounds(joints, &instants.times_s, self.widths.first_s, CEILING);
+        Fine { instants, kept: picked(kept, joints), ceilings }
     }
 
     /// The running motion for a moment, then a time-optimal one under lower limits, then rest.
@@ -241,6 +280,20 @@ impl<'a> Attempt<'a> {
         }
         Some(reference)
     }
+}
+
+/// The rates of some joints.
+fn picked(all: &[AllRates], joints: &[usize]) -> Vec<Rates> {
+    let pick = |rates: &AllRates| {
+        let mut picked = [[0.0; LANES]; 3];
+        for (picked, rates) in picked.iter_mut().zip(rates) {
+            for (picked, joint) in picked.iter_mut().zip(joints) {
+                *picked = rates[*joint];
+            }
+        }
+        picked
+    };
+    all.iter().map(pick).collect()
 }
 
 /// Moves the last rounding errors into one stroke, so that the sum in the order of the strokes ends at the goal.
