@@ -80,6 +80,24 @@ fn a_straight_move_takes_at_most_1_12_optima_with_64_strokes() {
     assert!(worst.0 <= 1.12, "seed {}: {} optima", worst.1, worst.0);
 }
 
+/// Goal: twice as many strokes as a move uses come nearer to the optimum, whatever the arm and the length. 1.08 would be bold.
+#[test]
+fn a_straight_move_of_128_strokes_would_take_at_most_1_09_optima() {
+    let mut ratios = Vec::new();
+    for seed in 0..400 {
+        let (to_rad, limits) = random_case(seed);
+        let line = LineLimits::between(&[0.0; MAX_JOINTS], &to_rad, (JOINTS, &limits)).expect("a line");
+        let train = Train::of_at_most(&line, 128).expect("a train");
+        if ruckig_s(&line) > 0.02 {
+            ratios.push(train.duration_s() / ruckig_s(&line));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    let (median, worst) = (ratios[ratios.len() / 2], ratios[ratios.len() - 1]);
+    println!("128 strokes: median {median:.4}, worst {worst:.4} of {} moves", ratios.len());
+    assert!(worst <= 1.09, "{worst} optima");
+}
+
 fn length(of: &JointArray) -> f64 {
     of.iter().fold(0.0, |most, x| most.max(x.abs()))
 }

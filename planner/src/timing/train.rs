@@ -17,6 +17,10 @@ const EXPONENT: u32 = 7;
 const AIM: f64 = 1.08;
 /// Rounds of a fit: later ones win less than half a percent.
 const ROUNDS: usize = 30;
+/// Both with more strokes than [`TRAIN_STROKES`].
+const OF_MANY: (f64, usize) = (1.065, 60);
+/// Widest kernel of up to so many strokes, in spacings.
+const OVERLAP_MAX: f64 = 16.0;
 /// Largest delta, in means: larger ones do not make a move shorter, and round badly.
 const DELTA_MAX: f64 = 4.0;
 
@@ -32,10 +36,16 @@ pub struct Train {
 }
 
 impl Train {
-    /// The train of at most so many strokes that takes least time.
+    /// The train of at most so many strokes, and at most [`TRAIN_STROKES`], that takes least time.
     #[must_use]
     pub fn new(limits: &LineLimits, strokes_max: usize) -> Option<Self> {
-        let mut strokes = strokes_max.min(TRAIN_STROKES);
+        Self::of_at_most(limits, strokes_max.min(TRAIN_STROKES))
+    }
+
+    /// The train of at most so many strokes that takes least time.
+    #[must_use]
+    pub fn of_at_most(limits: &LineLimits, strokes_max: usize) -> Option<Self> {
+        let mut strokes = strokes_max;
         let mut best: Option<Self> = None;
         // A stroke has a least duration: what is too short for many strokes is shorter with fewer.
         while strokes > 0 {
@@ -56,8 +66,9 @@ impl Train {
         let optimum = limits.optimum();
         let overlap = if strokes > 1 { overlap(&optimum, strokes) } else { 1 };
         let grid = Grid { strokes, overlap, n: EXPONENT };
-        let spacing_s = AIM * optimum.duration_s() / grid.spacings() as f64;
-        let shares = fitted(&grid, &optimum, spacing_s)?;
+        let (aim, rounds) = if strokes > TRAIN_STROKES { OF_MANY } else { (AIM, ROUNDS) };
+        let spacing_s = aim * optimum.duration_s() / grid.spacings() as f64;
+        let shares = fitted(&grid, &optimum, (spacing_s, rounds))?;
         let bounds = [limits.velocity, limits.acceleration, limits.jerk];
         let mut scale: f64 = 0.0;
         let mut unit = 1.0;
@@ -106,13 +117,14 @@ fn overlap(optimum: &Optimum, strokes: usize) -> usize {
     let jerky = 2.0 * optimum.jerk_s / optimum.ramp_s();
     let fewer = (strokes as f64 / TRAIN_STROKES as f64).powf(0.6);
     let overlap = fewer * (4.0 + 12.0 * ramps.powf(0.6) * jerky.max(0.02).powf(0.18));
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 2 to 16")]
-    let overlap = overlap.clamp(2.0, 16.0).round() as usize;
+    let most = OVERLAP_MAX * fewer.max(1.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 2 to some dozens")]
+    let overlap = overlap.clamp(2.0, most).round() as usize;
     overlap
 }
 
 /// Shares of the line, from the optimum on, fitted to its peaks.
-fn fitted(grid: &Grid, optimum: &Optimum, spacing_s: f64) -> Option<Vec<f64>> {
+fn fitted(grid: &Grid, optimum: &Optimum, (spacing_s, rounds): (f64, usize)) -> Option<Vec<f64>> {
     let strokes = grid.strokes as f64;
     let at = |i: usize| optimum.position(i as f64 / strokes * optimum.duration_s());
     let mut shares: Vec<f64> = (0..grid.strokes).map(|i| at(i + 1) - at(i)).collect();
@@ -128,7 +140,7 @@ fn fitted(grid: &Grid, optimum: &Optimum, spacing_s: f64) -> Option<Vec<f64>> {
             deltas,
         ];
         let weights = bounds.each_ref().map(|b| (b.order, b.weight));
-        Fitter::new(*grid, &weights)?.fit(&mut shares, &bounds, ROUNDS);
+        Fitter::new(*grid, &weights)?.fit(&mut shares, &bounds, rounds);
     }
     shares.iter_mut().for_each(|share| *share = share.max(0.0));
     let sum: f64 = shares.iter().sum();

@@ -7,6 +7,7 @@ use crate::args::TimingArgs;
 use crate::failure::Failure;
 use crate::output::{Form, write_whole};
 use paths::{PathRow, Sampled};
+use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::fmt;
 use straight::StraightRow;
@@ -32,6 +33,17 @@ impl Spread {
     }
 }
 
+/// What a call returns, and the processor time that it took, microseconds: others run beside it.
+fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
+    let processor_us = || {
+        let now = clock_gettime(ClockId::ThreadCPUTime);
+        now.tv_sec as f64 * 1e6 + now.tv_nsec as f64 * 1e-3
+    };
+    let begun_us = processor_us();
+    let result = call();
+    (result, processor_us() - begun_us)
+}
+
 /// Measures and prints.
 pub(super) fn run(form: Form, args: &TimingArgs) -> Result<(), Failure> {
     let arms = limit_sets(&args.robot)?;
@@ -54,19 +66,21 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "straight moves: duration / jerk-limited optimum along the line; at most 1.12 is promised"
+            "straight moves: duration / jerk-limited optimum along the line; at most 1.12 is promised. The last two columns are what 128 \
+             strokes would take (1.08 would be bold). us: processor time of a call, at most 300 is promised"
         )?;
         writeln!(
             f,
-            "{:<30} {:>9} {:>7} {:>7} {:>8} {:>6}",
-            "limits", "length", "median", "largest", "strokes", "us"
+            "{:<30} {:>9} {:>7} {:>7} {:>8} {:>6} {:>7} {:>7}",
+            "limits", "length", "median", "largest", "strokes", "us", "median", "largest"
         )?;
         for row in &self.straight {
             writeln!(f, "{row}")?;
         }
         writeln!(
             f,
-            "\npaths of five points, 0.3 to 12 rad: duration / sum of the optima that stop at every point"
+            "\npaths of five points, 0.3 to 12 rad: duration / sum of the optima that stop at every point. us: processor time of a call, \
+             at most 1000 is promised"
         )?;
         write!(
             f,

@@ -1,9 +1,8 @@
 //! Rounded paths of five random points against stops at every point.
-use super::{LimitedArm, Spread};
+use super::{LimitedArm, Spread, timed};
 use crate::args::TimingArgs;
 use serde::Serialize;
 use std::fmt;
-use std::time::Instant;
 use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::timing::Path;
@@ -25,7 +24,7 @@ pub(super) struct PathRow {
     /// Paths that were rounded; the others stop at every point.
     rounded: usize,
     ratio: Spread,
-    /// Median time to find a motion, microseconds.
+    /// Median processor time to find a motion, microseconds.
     timing_us: f64,
 }
 
@@ -85,9 +84,9 @@ fn row(arm: &LimitedArm, args: &TimingArgs, blend_rad: f64, motions: &mut Vec<Sa
         let mut rng = SeededRng::new(args.seed, u64::from(number));
         let corners_rad = random_path(&mut rng, arm.joints, length_rad);
         let path = Path { corners_rad: &corners_rad, joints: arm.joints, limits: &arm.limits };
-        let begun = Instant::now();
-        let found = path.rounded(&vec![blend_rad; corners_rad.len() - 2], f64::INFINITY);
-        times_us.push(begun.elapsed().as_secs_f64() * 1e6);
+        let blends_rad = vec![blend_rad; corners_rad.len() - 2];
+        let (found, took_us) = timed(|| path.rounded(&blends_rad, f64::INFINITY));
+        times_us.push(took_us);
         rounded += usize::from(found.is_some());
         let motion = found.or_else(|| path.stopping())?.trajectory;
         let stop_s = |pair: &[JointArray]| {
