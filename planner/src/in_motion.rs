@@ -306,7 +306,7 @@ impl Surroundings<'_> {
             return Ok(plan_until(&task, options, Some(self.cancel))?);
         }
         let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(points_rad).copied().collect();
-        Ok(plan_through_until((robot, scene), &all_rad, options, Some(self.cancel))?)
+        Ok(plan_through_until((robot, scene, StartMargin::AsItStands), &all_rad, options, Some(self.cancel))?)
     }
 
     fn world(&self) -> Result<World<'_>, NoReplacement> {

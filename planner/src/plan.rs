@@ -312,7 +312,7 @@ pub fn plan_through(
     poses_rad: &[JointArray],
     options: &PlanOptions,
 ) -> Result<Plan, PlanError> {
-    plan_through_until((robot, scene), poses_rad, options, None)
+    plan_through_until((robot, scene, StartMargin::Scene), poses_rad, options, None)
 }
 
 /// Like [`plan_through`], and given up as soon as `cancel` is set.
@@ -320,7 +320,7 @@ pub fn plan_through(
 /// # Errors
 /// What is wrong with a pose, or what was tried in vain.
 pub fn plan_through_until(
-    (robot, scene): (&Robot, &Scene),
+    (robot, scene, margin): (&Robot, &Scene, StartMargin),
     poses_rad: &[JointArray],
     options: &PlanOptions,
     cancel: Option<&AtomicBool>,
@@ -328,6 +328,22 @@ pub fn plan_through_until(
     let budget = Budget::until(options.clock(), cancel);
     let evaluator = Evaluator::new(options.objective, robot)?;
     let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
+    if let (StartMargin::AsItStands, Some((start_rad, onward_rad))) = (margin, poses_rad.split_first()) {
+        check_numbers(robot, PoseOf::Start, start_rad)?;
+        let entry = Entry::of(robot, start_rad);
+        let relaxed = Relaxed::around(&world, start_rad)?;
+        let onward_rad = clear_poses_from(1, &world, onward_rad)?;
+        if entry.is_some() || !is_clear(&world, start_rad) {
+            let onward = (*start_rad, onward_rad.as_slice());
+            return plan_out(
+                &world,
+                (Some(&relaxed), entry.as_ref()),
+                (&budget, &evaluator),
+                (onward, options),
+            );
+        }
+        return Pipeline::new(&world, &budget, options, &evaluator).run_onward(start_rad, &onward_rad);
+    }
     let inside_rad = clear_poses(&world, poses_rad)?;
     Pipeline::new(&world, &budget, options, &evaluator).run_through(&inside_rad)
 }
@@ -337,10 +353,19 @@ pub fn plan_through_until(
 /// # Errors
 /// Which pose is not, and why.
 pub(crate) fn clear_poses(world: &World, poses_rad: &[JointArray]) -> Result<Vec<JointArray>, PlanError> {
+    clear_poses_from(0, world, poses_rad)
+}
+
+/// The same of poses before which a motion has some others.
+fn clear_poses_from(
+    before: usize,
+    world: &World,
+    poses_rad: &[JointArray],
+) -> Result<Vec<JointArray>, PlanError> {
     let robot = world.robot();
-    let last = poses_rad.len().saturating_sub(1);
+    let last = (before + poses_rad.len()).saturating_sub(1);
     let mut inside_rad = Vec::with_capacity(poses_rad.len());
-    for (i, pose_rad) in poses_rad.iter().enumerate() {
+    for (i, pose_rad) in (before..).zip(poses_rad) {
         let which = match i {
             0 => PoseOf::Start,
             _ if i == last => PoseOf::Goal,
@@ -430,17 +455,18 @@ fn plan_inside(
     if entry.is_none() && is_clear(&world, start_rad) {
         return Pipeline::new(&world, budget, options, &evaluator).run(start_rad, goal_rad);
     }
-    plan_out(&world, (relaxed.as_ref(), entry), (budget, &evaluator), (task, options))
+    let onward = (*start_rad, std::slice::from_ref(goal_rad));
+    plan_out(&world, (relaxed.as_ref(), entry), (budget, &evaluator), (onward, options))
 }
 
-/// Plans from a start outside the limits, inside the margin or at its edge: out of there first.
+/// Plans from a start outside the limits, inside the margin or at its edge: out of there first, and on to one pose or through several.
 fn plan_out(
     world: &World,
     (relaxed, entry): (Option<&Relaxed>, Option<&Entry>),
     (budget, evaluator): (&Budget, &Evaluator),
-    (task, options): (&Task, &PlanOptions),
+    ((start_rad, onward_rad), options): ((JointArray, &[JointArray]), &PlanOptions),
 ) -> Result<Plan, PlanError> {
-    let (start_rad, goal_rad) = (task.start_rad, &task.goal_rad);
+    let towards_rad = onward_rad.first().unwrap_or(&start_rad);
     let inside_rad = entry.map_or(start_rad, |entry| entry.pose_rad);
     let led_in = |mut plan: Plan| {
         if let Some(entry) = entry {
@@ -455,13 +481,13 @@ fn plan_out(
             (Some(inside_rad), vec![start_rad])
         } else {
             let first_rad = if entry.is_some() { vec![start_rad, inside_rad] } else { vec![start_rad] };
-            (find_margin_exit([near, world], [&inside_rad, goal_rad], options.seed, budget), first_rad)
+            (find_margin_exit([near, world], [&inside_rad, towards_rad], options.seed, budget), first_rad)
         };
         if let Some(clear_rad) = clear_rad {
             let pipeline = Pipeline::new(world, budget, options, evaluator);
             return pipeline
                 .margin_exit(MarginExit { near, first_rad, note })
-                .run(&clear_rad, goal_rad)
+                .run_onward(&clear_rad, onward_rad)
                 .map(led_in);
         }
     }
@@ -471,7 +497,7 @@ fn plan_out(
     if entry.is_some() {
         pipeline = pipeline.margin_exit(MarginExit { near, first_rad: vec![start_rad], note: None });
     }
-    let mut plan = pipeline.run(&inside_rad, goal_rad)?;
+    let mut plan = pipeline.run_onward(&inside_rad, onward_rad)?;
     if let Some(relaxed) = relaxed {
         plan.how = format!("{}; {}", relaxed.note.words(None), plan.how);
     }

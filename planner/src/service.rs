@@ -314,7 +314,7 @@ impl<'a> Service<'a> {
                 return plan_until(&task, options, Some(cancel));
             }
             let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(points_rad).collect();
-            plan_through_until((robot, scene), &all_rad, options, Some(cancel))
+            plan_through_until((robot, scene, StartMargin::AsItStands), &all_rad, options, Some(cancel))
         })?;
         let plan = planned.map_err(|e: PlanError| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;

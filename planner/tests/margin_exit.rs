@@ -7,10 +7,10 @@ use std::time::Duration;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::{JointArray, Trajectory};
 use taustream_planner::budget::Budget;
-use taustream_planner::plan::{StartMargin, Task, plan_until};
+use taustream_planner::plan::{StartMargin, Task, plan_through_until, plan_until};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
-use taustream_planner::{Plan, PlanError, PlanOptions, PlannerKind, PoseOf, Violation, plan, verify};
+use taustream_planner::{Blend, Plan, PlanError, PlanOptions, PlannerKind, PoseOf, Violation, plan, verify};
 
 const START: [f64; 6] = [-0.5, -0.7, 0.7, -1.57, -1.57, 0.0];
 const GOAL: [f64; 6] = [0.5, -0.7, 0.7, -1.57, -1.57, 0.0];
@@ -84,6 +84,44 @@ fn replan_start_inside_the_margin_leaves_it_soon_and_says_so() {
             assert!(error.to_string().starts_with(words), "{error}");
             assert!(error.to_string().contains("less than the 0.0200 m required"), "{error}");
         }
+    }
+}
+
+/// Goal: a motion through way points begins where the arm stands, inside the margin too, and keeps its corners; who is strict refuses it.
+#[test]
+fn replan_through_points_from_inside_the_margin_leaves_it_soon_and_says_so() {
+    let (robot, scene) = (ur5(), scene("pillars"));
+    let via = pose([-0.6, -0.9, 0.9, -1.4, -1.57, 0.3]);
+    for gap_m in [0.0185, 0.004, 0.0015] {
+        let start = near_pillar(&robot, &scene, gap_m);
+        let points = [start, via, pose(START)];
+        let near = PlanOptions { blend: Blend::Radians(0.05), ..options(1, PlannerKind::Auto) };
+        let through = |margin| plan_through_until((&robot, &scene, margin), &points, &near, None);
+        let strict = through(StartMargin::Scene);
+        assert!(
+            matches!(strict, Err(PlanError::InsideMargin { which: PoseOf::Start, .. })),
+            "{gap_m} m: {strict:?}"
+        );
+        let plan = through(StartMargin::AsItStands).unwrap_or_else(|e| panic!("{gap_m} m: {e}"));
+        let margin = format!("margin {:.4} m for the first ", gap_m - 5e-4);
+        assert!(plan.how.starts_with(&margin), "{}", plan.how);
+        let (left_s, least_m) = leaves(&robot, &scene, &plan.trajectory);
+        assert!(
+            left_s < 0.5 * plan.trajectory.duration_s() && least_m > gap_m - 5e-4,
+            "{gap_m} m: {least_m} m"
+        );
+        assert_eq!(plan.trajectory.base_rad().map(f64::to_bits), start.map(f64::to_bits));
+        let end = plan.trajectory.end_rad();
+        assert!(end.iter().zip(&points[2]).all(|(e, g)| (e - g).abs() < 1e-9), "ends at {end:?}");
+        let passes = (0..=2_000).map(|i| {
+            let t_s = plan.trajectory.duration_s() * f64::from(i) / 2_000.0;
+            let at_rad = plan.trajectory.sample(t_s).position_rad;
+            at_rad.iter().zip(&via).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+        });
+        assert!(
+            passes.fold(f64::INFINITY, f64::min) < 0.4,
+            "{gap_m} m: the way point is passed too far away"
+        );
     }
 }
 

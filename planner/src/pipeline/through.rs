@@ -7,6 +7,18 @@ use crate::shortcut::shorten;
 use taustream_motion::JointArray;
 
 impl Pipeline<'_> {
+    /// A motion from a pose to another one, or through several.
+    ///
+    /// # Errors
+    /// What was tried in vain.
+    pub fn run_onward(self, start_rad: &JointArray, onward_rad: &[JointArray]) -> Result<Plan, PlanError> {
+        if let [goal_rad] = onward_rad {
+            return self.run(start_rad, goal_rad);
+        }
+        let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(onward_rad).copied().collect();
+        self.run_through(&all_rad)
+    }
+
     /// A motion that passes poses in their order.
     ///
     /// # Errors
