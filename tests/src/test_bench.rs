@@ -17,7 +17,9 @@ use taustream_messages::{FaultReason, Phase, Report};
 /// How long anything may take before a scenario is called stuck. Generous: it bounds a hang, it checks no speed.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
 /// The recorder's file in the folder of a scenario.
-const RECORDING: &str = "bus.log";
+pub const RECORDING: &str = "bus.log";
+/// The streamer's log of its cycles there.
+pub const CYCLE_LOG: &str = "cycles.jsonl";
 /// Pause between two looks.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -206,7 +208,7 @@ impl TestBench {
         let mut simulator =
             Process::start(&program("taustream-servosim"), &simulator_args, &dir, "servosim")?;
         simulator.await_words("taustream-servosim ready")?;
-        let log = dir.join("cycles.jsonl");
+        let log = dir.join(CYCLE_LOG);
         let log_arg = log.to_str().context("the log's path is not UTF-8")?;
         let state = dir.join("state");
         let state_arg = state.to_str().context("the state directory's path is not UTF-8")?;
@@ -567,6 +569,6 @@ impl TestBench {
         self.recorder.signal(Signal::TERM)?;
         let status = self.recorder.await_end()?;
         ensure!(status.success(), "the recorder ended with {status}: {}", self.recorder.said());
-        Ok((fs::read_to_string(self.dir.join(RECORDING))?, self.dir.join("cycles.jsonl")))
+        Ok((fs::read_to_string(self.dir.join(RECORDING))?, self.dir.join(CYCLE_LOG)))
     }
 }

@@ -8,7 +8,7 @@ use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::retry::{Failed, passes};
 use taustream_tests::scenarios::{self, CheckMode, Goals, Scenario};
 use taustream_tests::setpoints::{BusFrame, CheckResult, Encoding, Losses, check_setpoints_with};
-use taustream_tests::test_bench::{Place, TestBench};
+use taustream_tests::test_bench::{CYCLE_LOG, Place, RECORDING, TestBench};
 use taustream_tests::traffic::as_plain;
 use taustream_tests::{
     bus_scenarios, candump, cut_scenarios, cycle_log, disturbed_scenarios, restart_scenarios,
@@ -33,6 +33,10 @@ struct Arguments {
     /// Only scenarios whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
+    /// Folder of a scenario that has run: checks its recording again, and runs none. Needs no bus, and takes as much memory as
+    /// a long recording asks for, which a test machine may not have.
+    #[arg(long, value_name = "DIR")]
+    recorded: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -49,6 +53,11 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read_demo(arguments)?;
     let settings = Settings::load(&place.settings)?;
+    if let Some(folder) = &arguments.recorded {
+        let recording = std::fs::read_to_string(folder.join(RECORDING))?;
+        println!("{}", check_all(&settings, &recording, &folder.join(CYCLE_LOG), Losses::None)?);
+        return Ok(0);
+    }
     for bus in &settings.buses {
         let interface = PathBuf::from("/sys/class/net").join(&bus.interface);
         ensure!(interface.exists(), "{} does not exist: run this inside the test machine", bus.interface);
