@@ -72,7 +72,9 @@ fn is_reached(command: Command, arm: Arm) -> bool {
         Command::Stop => de_energised || matches!(phase, Phase::Holding | Phase::Locked | Phase::Fault),
         Command::FastStop => de_energised || phase == Phase::Fault,
         Command::ClearFault => matches!(phase, Phase::Locked | Phase::Disabled),
-        Command::Resume | Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. } => true,
+        // Whoever looks at the arm after the answer sees it no longer paused.
+        Command::Resume => !matches!(phase, Phase::Pausing | Phase::Paused),
+        Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. } => true,
     }
 }
 
@@ -404,6 +406,14 @@ mod tests {
                 assert!(at_once || !both, "{command:?} {phase:?}");
             }
         }
+    }
+
+    /// Goal: `resume && status` never shows the pause that was just ended.
+    #[test]
+    fn resume_waits_until_the_arm_is_not_paused_any_more() {
+        let reached = |phase| is_reached(Command::Resume, Arm { phase, energised: true });
+        assert!(!reached(Phase::Paused) && !reached(Phase::Pausing));
+        assert!(reached(Phase::Moving) && reached(Phase::Holding) && reached(Phase::Fault));
     }
 
     /// Goal: `disable && clear-fault` works: the first returns only when no drive carries torque any more.
