@@ -172,7 +172,7 @@ impl Stroke {
     }
 
     #[inline]
-    fn running_phi(&self, t_s: f64, rate: f64) -> Phi {
+    pub(crate) fn running_phi(&self, t_s: f64, rate: f64) -> Phi {
         let s = (t_s - self.start_s) * rate;
         // Rounding may lift it just above 1; written so that a NaN is handed on, which `min` would not do.
         Phi::at(self.n, if s > 1.0 { 1.0 } else { s })

@@ -128,9 +128,15 @@ impl Trajectory {
     /// position between the two instants is within it of both ends. Grown by what rounding can take away.
     #[must_use]
     pub fn travel_bound_rad(&self, t1_s: f64, t2_s: f64) -> JointArray {
+        self.travel_bound_after(0, t1_s, t2_s)
+    }
+
+    /// The same for whoever knows that the strokes in front of `first` have ended before both instants.
+    #[must_use]
+    pub fn travel_bound_after(&self, first: usize, t1_s: f64, t2_s: f64) -> JointArray {
         let (from_s, to_s) = if t1_s <= t2_s { (t1_s, t2_s) } else { (t2_s, t1_s) };
         let mut bound_rad = [0.0; MAX_JOINTS];
-        for stroke in self.strokes() {
+        for stroke in self.strokes().get(first..).unwrap_or(&[]) {
             if stroke.start_s >= to_s {
                 break;
             }
@@ -144,6 +150,24 @@ impl Trajectory {
             }
         }
         bound_rad
+    }
+
+    /// The position of [`Self::sample`], with the same bits, for whoever knows that the strokes in front of `first` have ended and have
+    /// led to `reached_rad`.
+    #[must_use]
+    pub fn position_after(&self, first: usize, reached_rad: &JointArray, t_s: f64) -> JointArray {
+        let mut position_rad = *reached_rad;
+        for stroke in self.strokes().get(first..).unwrap_or(&[]) {
+            let share = if stroke.has_ended(t_s) {
+                1.0
+            } else if t_s <= stroke.start_s {
+                break; // Sorted by start: nothing behind it has begun.
+            } else {
+                stroke.running_phi(t_s, 1.0 / stroke.duration_s).value
+            };
+            add_scaled(&mut position_rad, &stroke.delta_rad, share);
+        }
+        position_rad
     }
 
     /// The one sampling loop: `reached_rad` is the pose after the strokes in front of `first`, which have ended.

@@ -5,6 +5,7 @@
 //! an action.
 use taustream_arm::{NoMasses, Robot};
 use taustream_motion::dynamics::Dynamics;
+use taustream_motion::trajectory::Cursor;
 use taustream_motion::{JointArray, Trajectory};
 use taustream_optimizers::papers::quadrature::gauss;
 
@@ -37,13 +38,14 @@ impl Energy {
     pub fn spent_j(&self, motion: &Trajectory) -> f64 {
         let pieces = (motion.duration_s() / PIECE_S).ceil().clamp(1.0, PIECES_MAX);
         let piece_s = motion.duration_s() / pieces;
-        let power_w = |t_s: f64| {
-            let at = motion.sample(t_s);
+        let mut cursor = Cursor::at_start(motion);
+        let mut power_w = |t_s: f64| {
+            let at = cursor.sample(motion, t_s);
             self.power_w(&at.position_rad, &at.velocity_rad_s, &at.acceleration_rad_s2)
         };
         let (mut piece, mut spent_j) = (0.0, 0.0);
         while piece < pieces {
-            spent_j += gauss(piece * piece_s, (piece + 1.0) * piece_s, power_w);
+            spent_j += gauss(piece * piece_s, (piece + 1.0) * piece_s, &mut power_w);
             piece += 1.0;
         }
         spent_j

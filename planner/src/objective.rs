@@ -1,4 +1,5 @@
 //! What makes one verified motion better than another, by the names that users write.
+use crate::collide::{Course, Motion};
 use crate::energy::Energy;
 use crate::verify::Proof;
 use taustream_arm::{NoMasses, Robot};
@@ -97,7 +98,8 @@ impl<'a> Evaluator<'a> {
     /// The paper's cost of a path without contact: its weighted length in space and in joints.
     fn distance_cost(&self, motion: &Trajectory) -> f64 {
         let [length, travel, _] = CostModel::default().weights;
-        let at = |i: u32| motion.sample(motion.duration_s() * f64::from(i) / f64::from(SAMPLES)).position_rad;
+        let (course, duration_s) = (Course::new(motion), motion.duration_s());
+        let at = |i: u32| course.at(duration_s * f64::from(i) / f64::from(SAMPLES));
         let tip = |q: &JointArray| {
             let [.., tip] = self.robot.chain.frames(q);
             tip.translation.vector

@@ -1,6 +1,6 @@
 //! From two poses to a verified motion.
 use crate::budget::Budget;
-use crate::collide::SweepRules;
+use crate::collide::{Course, Motion, SweepRules};
 use crate::enter::Entry;
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
@@ -102,10 +102,8 @@ impl Plan {
     #[must_use]
     pub fn path_length_rad(&self) -> f64 {
         const SAMPLES: u32 = 2_000;
-        let at = |i: u32| {
-            let t_s = self.trajectory.duration_s() * f64::from(i) / f64::from(SAMPLES);
-            self.trajectory.sample(t_s).position_rad
-        };
+        let (course, duration_s) = (Course::new(&self.trajectory), self.trajectory.duration_s());
+        let at = |i: u32| course.at(duration_s * f64::from(i) / f64::from(SAMPLES));
         let mut before_rad = at(0);
         let mut length_rad = 0.0;
         for i in 1..=SAMPLES {

@@ -4,6 +4,7 @@
 //! and may be right ([`Robot::mass_doubt`]); they are rigid-body torques, without friction and the motors' own inertia.
 use taustream_arm::Robot;
 use taustream_motion::dynamics::Dynamics;
+use taustream_motion::trajectory::Cursor;
 use taustream_motion::{JointArray, Trajectory};
 
 /// Instants a second of a proof, and of a plan, which keeps [`PLANNED_SHARE`] for what lies between them.
@@ -137,10 +138,11 @@ impl<'a> TorqueLimits<'a> {
         let (instants, duration_s) =
             ((motion.duration_s() * hz).ceil().clamp(least, most), motion.duration_s());
         let (mut slowest, mut worst, mut i) = (0.0_f64, None::<Overload>, 0.0);
+        let mut cursor = Cursor::at_start(motion);
         while i <= instants {
             let at_s = duration_s * i / instants;
             i += 1.0;
-            let at = motion.sample(at_s);
+            let at = cursor.sample(motion, at_s);
             let torques =
                 self.dynamics.torques_nm(&at.position_rad, &at.velocity_rad_s, &at.acceleration_rad_s2);
             look(at_s, &torques);

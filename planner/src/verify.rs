@@ -3,7 +3,7 @@
 //! Limits are proven by the motion crate from closed-form peaks; distances by bisection with a proven step
 //! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
 use crate::budget::Budget;
-use crate::collide::{Blocked, SweepRules, sweep};
+use crate::collide::{Blocked, Clearance, Course, Motion, SweepRules, sweep, sweep_knowing};
 use crate::torque::{Overload, TorqueLimits};
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
@@ -17,7 +17,7 @@ pub struct Proof {
     /// How long it takes at full speed.
     pub duration_s: f64,
     /// Least distance to any obstacle, or between links that may not touch: a proven lower bound, at most 1 mm
-    /// below the truth. Infinite when nothing can collide.
+    /// below the truth unless a deadline, or the work that is granted, ended the search for it. Infinite when nothing can collide.
     pub clearance_m: f64,
     /// Where along the motion the arm is closest, to the resolution of the proof.
     pub clearance_at_s: f64,
@@ -174,10 +174,12 @@ pub fn verify_stretches(
     trajectory: &Trajectory,
     budget: &Budget,
 ) -> Result<Proof, Violation> {
-    prove_stretches(stretches, trajectory, (budget, DEEPEST_SAMPLES))
+    let proof = prove_stretches(stretches, trajectory, (budget, DEEPEST_SAMPLES))?;
+    Ok(measured(stretches, trajectory, &proof, budget))
 }
 
-/// Like [`verify_stretches`], for candidates: a contact is stated as it is met.
+/// Like [`verify_stretches`], for candidates: a contact is stated as it is met, and the least distance is a lower bound of any quality
+/// until [`measured`].
 ///
 /// # Errors
 /// The first violation; `Unresolved` when the clock cut in, or when there is no stretch.
@@ -187,6 +189,52 @@ pub(crate) fn prove_candidate(
     budget: &Budget,
 ) -> Result<Proof, Violation> {
     prove_stretches(stretches, trajectory, (budget, 0))
+}
+
+/// The proof of a candidate with its least distance, or as it was where the clock cut in.
+pub(crate) fn measured(
+    stretches: &[Stretch],
+    trajectory: &Trajectory,
+    proof: &Proof,
+    budget: &Budget,
+) -> Proof {
+    let mut measured = proof.clone();
+    match measure(&mut measured, stretches, trajectory, (&SweepRules::LEAST_DISTANCE, budget)) {
+        Ok(()) => measured,
+        Err(_) => proof.clone(),
+    }
+}
+
+/// The least distance at one instant of a stretch, whatever that is worth.
+fn met_at(stretch: &Stretch, course: &Course, near_s: f64) -> Clearance {
+    let at = near_s.clamp(stretch.span_s[0], stretch.span_s[1]);
+    let closest = stretch.world.closest(&course.at(at));
+    let (pair, sampled_m) =
+        closest.map_or((None, f64::INFINITY), |(pair, distance_m)| (Some(pair), distance_m));
+    Clearance { proven_m: f64::INFINITY, sampled_m, at, pair, checks: 0 }
+}
+
+/// Proves the distances of all stretches and takes down the least of them.
+fn measure<'s>(
+    proof: &mut Proof,
+    stretches: &'s [Stretch<'s>],
+    trajectory: &Trajectory,
+    (rules, budget): (&SweepRules, &Budget),
+) -> Result<(), (&'s Stretch<'s>, Blocked)> {
+    let (course, near_s) = (Course::new(trajectory), proof.clearance_at_s);
+    proof.clearance_m = f64::INFINITY;
+    for stretch in stretches {
+        let met = met_at(stretch, &course, near_s);
+        let clearance = sweep_knowing(met, (stretch.world, &course), stretch.span_s, rules, budget)
+            .map_err(|blocked| (stretch, blocked))?;
+        if clearance.proven_m < proof.clearance_m {
+            let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
+            proof.clearance_required_m = clearance.pair.map_or(0.0, |pair| pair.required_m);
+            proof.clearance_m = clearance.proven_m;
+            (proof.clearance_at_s, proof.clearance_between) = (clearance.at, between);
+        }
+    }
+    Ok(())
 }
 
 /// Samples at which the deepest contact is looked for, to be stated.
@@ -213,16 +261,8 @@ fn prove_stretches(
         clearance_required_m: 0.0,
         peaks,
     };
-    for stretch in stretches {
-        let clearance = sweep(stretch.world, trajectory, stretch.span_s, &SweepRules::PROOF, budget)
-            .map_err(|blocked| explain(stretch, trajectory, &blocked, (budget, samples)))?;
-        if clearance.proven_m < proof.clearance_m {
-            let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();
-            proof.clearance_required_m = clearance.pair.map_or(0.0, |pair| pair.required_m);
-            proof.clearance_m = clearance.proven_m;
-            (proof.clearance_at_s, proof.clearance_between) = (clearance.at, between);
-        }
-    }
+    measure(&mut proof, stretches, trajectory, (&SweepRules::PROOF, budget))
+        .map_err(|(stretch, blocked)| explain(stretch, trajectory, &blocked, (budget, samples)))?;
     Ok(proof)
 }
 
@@ -257,7 +297,7 @@ fn met(
     if let Some(contact) = world.contact(&trajectory.sample(begin_s).position_rad) {
         return Some((begin_s, Violation::Collision { from_s: begin_s, at_s: begin_s, contact }));
     }
-    let blocked = sweep(world, trajectory, stretch.span_s, rules, budget).err()?;
+    let blocked = sweep(world, &Course::new(trajectory), stretch.span_s, rules, budget).err()?;
     let (checks, at_s) = (blocked.checks, blocked.at);
     let violation = match blocked.pair {
         None => Violation::Unresolved { checks, at_s },

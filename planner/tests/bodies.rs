@@ -249,7 +249,7 @@ fn clearance_between_links_that_a_sweep_proves_holds_at_every_pose_between() {
         let scene = empty();
         let world = World::new(&robot, &scene).expect("builds");
         let edge = StraightEdge { from_rad: &ends[0], to_rad: &ends[1] };
-        let swept = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Budget::unbounded());
+        let swept = sweep(&world, &edge, [0.0, 1.0], &SweepRules::LEAST_DISTANCE, &Budget::unbounded());
         let Ok(clearance) = swept else {
             refused += 1;
             continue;
@@ -270,19 +270,19 @@ fn clearance_between_links_that_a_sweep_proves_holds_at_every_pose_between() {
 fn assert_rules_are_kept((world, edge): (&World, &StraightEdge), clearance: &Clearance, seed: u64) {
     let sweep = |rules: &SweepRules, budget: &Budget| sweep(world, edge, [0.0, 1.0], rules, budget);
     let Some(pair) = clearance.pair else { return };
-    let extra = |extra_m: f64| SweepRules { extra_m, ..SweepRules::PROOF };
+    let extra = |extra_m: f64| SweepRules { extra_m, ..SweepRules::LEAST_DISTANCE };
     let beyond_m = clearance.sampled_m - pair.required_m;
     let blocked = sweep(&extra(beyond_m + 1e-4), &Budget::unbounded()).expect_err("asked for too much");
     let (_, distance_m) = blocked.pair.expect("what is too close");
-    let most_m = clearance.sampled_m + 1e-4 + SweepRules::PROOF.resolution_m;
+    let most_m = clearance.sampled_m + 1e-4 + SweepRules::LEAST_DISTANCE.resolution_m;
     assert!(distance_m <= most_m, "seed {seed}: {distance_m} is not too close, {most_m} is");
     let less_m = clearance.proven_m - pair.required_m - 1e-4;
     assert!(sweep(&extra(less_m), &Budget::unbounded()).is_ok(), "seed {seed}: {clearance:?}");
 
-    let hurried = SweepRules { checks_max: clearance.checks - 1, ..SweepRules::PROOF };
+    let hurried = SweepRules { checks_max: clearance.checks - 1, ..SweepRules::LEAST_DISTANCE };
     let cut = sweep(&hurried, &Budget::unbounded()).expect_err("one pose less than it takes");
     assert!(cut.pair.is_none() && cut.checks == hurried.checks_max, "seed {seed}: {cut:?}");
-    let late = sweep(&SweepRules::PROOF, &Budget::until(Duration::ZERO, None)).expect_err("no time");
+    let late = sweep(&SweepRules::LEAST_DISTANCE, &Budget::until(Duration::ZERO, None)).expect_err("no time");
     assert!(late.pair.is_none(), "seed {seed}: {late:?}");
 }
 
@@ -310,7 +310,9 @@ fn clearance_that_a_sweep_proves_holds_at_every_pose_between() {
             (0..robot.joints.len()).for_each(|j| end[j] = rng.within(-1.0, 1.0));
         }
         let edge = StraightEdge { from_rad: &ends[0], to_rad: &ends[1] };
-        let Ok(clearance) = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &Budget::unbounded()) else {
+        let Ok(clearance) =
+            sweep(&world, &edge, [0.0, 1.0], &SweepRules::LEAST_DISTANCE, &Budget::unbounded())
+        else {
             continue;
         };
         proven += 1;

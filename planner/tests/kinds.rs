@@ -62,7 +62,7 @@ fn improvements_never_lengthen_a_motion_and_repeat_without_the_clock() {
     assert!(matches!(Improvement::default(), Improvement::Method(_)), "the default improves by a method");
     assert_eq!(Improvement::from_name("teleport"), None);
     let mut shortened = 0;
-    for seed in 0..3 {
+    for seed in 0..8 {
         let plain = found(read("none"), seed);
         for name in ["searches", "ibfoa", "greedy-bfoa", "iwo"] {
             let better = found(read(name), seed);

@@ -4,8 +4,10 @@
 //! between cores and the radii subtracted, so that overlapping capsules still tell how deep they overlap. Cores of
 //! links are almost always segments: their distances to segments and boxes have closed forms (`closed_form`),
 //! everything else is asked of parry3d. The shapes themselves are [`taustream_arm::body`]'s.
+mod course;
 pub mod sweep;
 
 pub use taustream_arm::body::{Body, Posed};
 
-pub use sweep::{Blocked, Clearance, Motion, StraightEdge, SweepRules, sweep};
+pub use course::Course;
+pub use sweep::{Blocked, Clearance, Motion, StraightEdge, SweepRules, sweep, sweep_knowing};

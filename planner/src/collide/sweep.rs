@@ -5,7 +5,7 @@
 //! others are handed to the two halves. Nothing that happens between samples can be missed.
 use crate::budget::Budget;
 use crate::world::{Concerned, Pair, Snapshot, World};
-use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// A motion over a parameter.
 pub trait Motion {
@@ -13,15 +13,6 @@ pub trait Motion {
     fn at(&self, t: f64) -> JointArray;
     /// Upper bound of every joint's travel from one parameter to a later one (rad).
     fn travel_rad(&self, from: f64, to: f64) -> JointArray;
-}
-
-impl Motion for Trajectory {
-    fn at(&self, t: f64) -> JointArray {
-        self.sample(t).position_rad
-    }
-    fn travel_rad(&self, from: f64, to: f64) -> JointArray {
-        self.travel_bound_rad(from, to)
-    }
 }
 
 /// A straight joint-space line over [0, 1].
@@ -68,9 +59,16 @@ impl SweepRules {
     };
     /// What the pose at an end of an edge must keep beyond every pair, so that an edge to it can be proven.
     pub const EDGE_END_M: f64 = Self::EDGE.extra_m + Self::EDGE.resolution_m;
-    /// For the final proof.
-    pub const PROOF: Self =
-        Self { extra_m: 0.0, resolution_m: 1e-6, checks_max: 400_000, bracket_m: 1e-3, first_contact: true };
+    /// For the proof of a motion.
+    pub const PROOF: Self = Self {
+        extra_m: 0.0,
+        resolution_m: 1e-6,
+        checks_max: 400_000,
+        bracket_m: f64::INFINITY,
+        first_contact: true,
+    };
+    /// For its least distance.
+    pub const LEAST_DISTANCE: Self = Self { bracket_m: 1e-3, ..Self::PROOF };
     /// For the exit path from the margin, which begins at its edge: as fine as the proof.
     pub const MARGIN_EXIT: Self = Self {
         extra_m: 0.0,
@@ -128,6 +126,22 @@ pub fn sweep(
     rules: &SweepRules,
     budget: &Budget,
 ) -> Result<Clearance, Blocked> {
+    let met =
+        Clearance { proven_m: f64::INFINITY, sampled_m: f64::INFINITY, at: from, pair: None, checks: 0 };
+    sweep_knowing(met, (world, motion), [from, to], rules, budget)
+}
+
+/// The same, knowing a distance that is met somewhere: what is farther off than that need not be bracketed.
+///
+/// # Errors
+/// As for [`sweep`].
+pub fn sweep_knowing(
+    met: Clearance,
+    (world, motion): (&World, &dyn Motion),
+    [from, to]: [f64; 2],
+    rules: &SweepRules,
+    budget: &Budget,
+) -> Result<Clearance, Blocked> {
     let mut state = State {
         world,
         motion,
@@ -137,13 +151,7 @@ pub fn sweep(
         concerned: Concerned::default(),
         moves_m: Vec::new(),
         active: (0..world.pairs().len()).collect(),
-        found: Clearance {
-            proven_m: f64::INFINITY,
-            sampled_m: f64::INFINITY,
-            at: from,
-            pair: None,
-            checks: 0,
-        },
+        found: met,
     };
     let all = 0..state.active.len();
     state.visit([from, to], all, 0)?;

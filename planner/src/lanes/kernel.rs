@@ -2,7 +2,7 @@
 use super::Scratch;
 use super::arithmetic::{Ops, Vector, Vector3};
 use super::grid::Bounds;
-use super::model::{Form, Group, Model, Obstacle};
+use super::model::{Form, Group, GroupPair, Model, Obstacle};
 use pulp::{Simd, WithSimd};
 use std::f64::consts::PI;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -142,9 +142,8 @@ impl<'a, S: Simd> Chunk<'a, S> {
             // Most groups are clear of everything: one look at the least of all is enough then.
             let mut slack = self.ops.all(f32::MAX);
             for obstacle in &model.obstacles {
-                let keep = self.ops.all(self.group_keep(group, obstacle));
-                let apart = distance(self.ops, obstacle, middle);
-                slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, keep));
+                let apart2 = distance2(self.ops, obstacle, middle);
+                slack = self.less_slack(slack, apart2, self.group_keep(group, obstacle));
             }
             if self.ops.0.reduce_min_f32s(slack) > 0.0 {
                 return false;
@@ -187,7 +186,13 @@ impl<'a, S: Simd> Chunk<'a, S> {
     #[inline(always)]
     fn is_near(&self, group: &Group, middle: Vector3<S>, obstacle: &Obstacle) -> bool {
         let keep = self.group_keep(group, obstacle);
-        self.ops.0.reduce_min_f32s(distance(self.ops, obstacle, middle)) <= keep
+        self.ops.0.reduce_min_f32s(distance2(self.ops, obstacle, middle)) <= keep * keep
+    }
+
+    /// The least of a slack and of what some squared distances have beyond the square of what they must keep.
+    #[inline(always)]
+    fn less_slack(&self, slack: Vector<S>, apart2: Vector<S>, keep: f32) -> Vector<S> {
+        self.ops.min(slack, self.ops.0.sub_f32s(apart2, self.ops.all(keep * keep)))
     }
 
     /// What the middle of a group keeps from an obstacle's core at least where nothing of it is near.
@@ -231,9 +236,8 @@ impl<'a, S: Simd> Chunk<'a, S> {
         let keep = obstacle.radius + model.margin + self.extra + obstacle.tolerance;
         let mut slack = self.ops.all(f32::MAX);
         for sphere in group.spheres.clone() {
-            let apart = distance(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
-            let kept = self.ops.all(keep + model.spheres[sphere].outer);
-            slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, kept));
+            let apart2 = distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
+            slack = self.less_slack(slack, apart2, keep + model.spheres[sphere].outer);
         }
         if self.ops.0.reduce_min_f32s(slack) > 0.0 {
             return false;
@@ -241,8 +245,8 @@ impl<'a, S: Simd> Chunk<'a, S> {
         for cover in &model.covers[group.bodies.clone()] {
             let mut open = 0_u32;
             for sphere in cover.spheres.clone() {
-                let distance = distance(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
-                let Some(least) = self.below(distance, keep + model.spheres[sphere].outer, &mut open) else {
+                let apart2 = distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
+                let Some(least2) = self.below(apart2, keep + model.spheres[sphere].outer, &mut open) else {
                     continue;
                 };
                 if obstacle.is_coarse {
@@ -251,7 +255,7 @@ impl<'a, S: Simd> Chunk<'a, S> {
                 let required = model.least_margin((cover.link, o));
                 let sure = model.spheres[sphere].inner + obstacle.radius + required + self.extra
                     - obstacle.tolerance;
-                if least < sure {
+                if is_below(least2, sure) {
                     return true;
                 }
             }
@@ -260,20 +264,21 @@ impl<'a, S: Simd> Chunk<'a, S> {
         false
     }
 
-    /// The least of some distances when it is not above a limit; marks the lanes that are not.
+    /// The least of some squared distances when it is not above the square of a limit; marks the lanes that are not.
     #[inline(always)]
-    fn below(&self, distances: Vector<S>, limit: f32, open: &mut u32) -> Option<f32> {
-        let least = self.ops.0.reduce_min_f32s(distances);
-        if least > limit {
+    fn below(&self, apart2: Vector<S>, limit: f32, open: &mut u32) -> Option<f32> {
+        let limit2 = limit * limit;
+        let least2 = self.ops.0.reduce_min_f32s(apart2);
+        if least2 > limit2 {
             return None;
         }
         let mut values = [f32::INFINITY; LANES_MAX];
         let (slots, _) = S::as_mut_simd_f32s(&mut values);
-        slots[0] = distances;
+        slots[0] = apart2;
         for (lane, value) in values.iter().enumerate().take(S::F32_LANES) {
-            *open |= u32::from(*value <= limit) << lane;
+            *open |= u32::from(*value <= limit2) << lane;
         }
-        Some(least)
+        Some(least2)
     }
 
     #[inline(always)]
@@ -296,18 +301,13 @@ impl<'a, S: Simd> Chunk<'a, S> {
         for pair in &model.group_pairs {
             let [a, b] = pair.groups;
             let (of_a, of_b) = (&model.groups[a], &model.groups[b]);
-            let apart = self.ops.length(self.ops.sub3(middles[a], middles[b]));
-            let more = self.extra + model.tolerance;
-            if self.ops.0.reduce_min_f32s(apart) > of_a.radius + of_b.radius + pair.required + more {
+            let keep = of_a.radius + of_b.radius + pair.required + self.extra + model.tolerance;
+            if self.ops.0.reduce_min_f32s(self.apart2(middles[a], middles[b])) > keep * keep {
                 continue;
             }
             self.place((a, of_a), &mut scratch.centres);
             self.place((b, of_b), &mut scratch.centres);
-            let mut slack = self.ops.all(f32::MAX);
-            for bodies in &pair.bodies {
-                slack = self.ops.min(slack, self.body_slack(bodies, &scratch.centres));
-            }
-            if self.ops.0.reduce_min_f32s(slack) > 0.0 {
+            if self.are_spheres_apart(pair, middles[b], &scratch.centres) {
                 continue;
             }
             for bodies in &pair.bodies {
@@ -319,22 +319,35 @@ impl<'a, S: Simd> Chunk<'a, S> {
         false
     }
 
-    /// How much more than they must the larger spheres of two bodies keep.
+    /// Squared distance of two points.
     #[inline(always)]
-    fn body_slack(&self, bodies: &super::model::BodyPair, centres: &[f32]) -> Vector<S> {
+    fn apart2(&self, a: Vector3<S>, b: Vector3<S>) -> Vector<S> {
+        let between = self.ops.sub3(a, b);
+        self.ops.dot(between, between)
+    }
+
+    /// True when the larger spheres of two groups keep what they must in every pose.
+    #[inline(always)]
+    fn are_spheres_apart(&self, pair: &GroupPair, middle: Vector3<S>, centres: &[f32]) -> bool {
         let model = self.model;
-        let [a, b] = bodies.covers.map(|cover| model.covers[cover].spheres.clone());
-        let more = bodies.required + self.extra + model.tolerance;
-        let mut slack = self.ops.all(f32::MAX);
-        for i in a {
-            let at = Self::centre(centres, i);
-            for j in b.clone() {
-                let apart = self.ops.length(self.ops.sub3(at, Self::centre(centres, j)));
-                let kept = self.ops.all(model.spheres[i].outer + model.spheres[j].outer + more);
-                slack = self.ops.min(slack, self.ops.0.sub_f32s(apart, kept));
+        let of_b = &model.groups[pair.groups[1]];
+        let more = self.extra + model.tolerance;
+        for (sphere, others) in &pair.spheres {
+            let at = Self::centre(centres, *sphere);
+            let keep = model.spheres[*sphere].outer + of_b.radius + pair.required + more;
+            if self.ops.0.reduce_min_f32s(self.apart2(at, middle)) > keep * keep {
+                continue;
+            }
+            let mut slack = self.ops.all(f32::MAX);
+            for (other, keep) in others {
+                let apart2 = self.apart2(at, Self::centre(centres, *other));
+                slack = self.less_slack(slack, apart2, keep + more);
+            }
+            if self.ops.0.reduce_min_f32s(slack) <= 0.0 {
+                return false;
             }
         }
-        slack
+        true
     }
 
     #[inline(always)]
@@ -347,12 +360,12 @@ impl<'a, S: Simd> Chunk<'a, S> {
             let (at, one) = (Self::centre(&scratch.centres, i), &model.spheres[i]);
             for j in b.clone() {
                 let other = &model.spheres[j];
-                let apart = self.ops.length(self.ops.sub3(at, Self::centre(&scratch.centres, j)));
+                let apart2 = self.apart2(at, Self::centre(&scratch.centres, j));
                 let keep = one.outer + other.outer + more + model.tolerance;
-                let Some(least) = self.below(apart, keep, &mut open) else { continue };
+                let Some(least2) = self.below(apart2, keep, &mut open) else { continue };
                 if one.inner > 0.0
                     && other.inner > 0.0
-                    && least < one.inner + other.inner + more - model.tolerance
+                    && is_below(least2, one.inner + other.inner + more - model.tolerance)
                 {
                     return true;
                 }
@@ -363,9 +376,15 @@ impl<'a, S: Simd> Chunk<'a, S> {
     }
 }
 
-/// Distance of points from an obstacle's core.
+/// True when the root of a square is less than a limit.
 #[inline(always)]
-fn distance<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vector<S> {
+fn is_below(square: f32, limit: f32) -> bool {
+    limit > 0.0 && square < limit * limit
+}
+
+/// Squared distance of points from an obstacle's core: a root costs as much as all the rest.
+#[inline(always)]
+fn distance2<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vector<S> {
     let from = ops.sub3(point, ops.all3(obstacle.centre));
     match &obstacle.form {
         Form::AlignedBox(half) => outside(ops, from, *half),
@@ -385,7 +404,7 @@ fn distance<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vec
             let zero = ops.all(0.0);
             let beside = ops.max(ops.0.sub_f32s(ops.length(across), ops.all(*radius)), zero);
             let above = ops.max(ops.0.sub_f32s(ops.abs(height), ops.all(*half)), zero);
-            ops.0.sqrt_f32s(ops.mul_add(beside, beside, ops.0.mul_f32s(above, above)))
+            ops.mul_add(beside, beside, ops.0.mul_f32s(above, above))
         }
         Form::Segment(half, per_length2) => {
             let half = ops.all3(*half);
@@ -396,7 +415,7 @@ fn distance<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vec
                 ops.sub_mul(half[1], share, from[1]),
                 ops.sub_mul(half[2], share, from[2]),
             ];
-            ops.length(across)
+            ops.dot(across, across)
         }
     }
 }
@@ -406,12 +425,12 @@ fn along<S: Simd>(ops: Ops<S>, from: Vector3<S>, row: [f32; 3]) -> Vector<S> {
     ops.dot(from, ops.all3(row))
 }
 
-/// Distance from a box around the origin.
+/// Squared distance from a box around the origin.
 #[inline(always)]
 fn outside<S: Simd>(ops: Ops<S>, at: Vector3<S>, half: [f32; 3]) -> Vector<S> {
     let zero = ops.all(0.0);
     let x = ops.max(ops.0.sub_f32s(ops.abs(at[0]), ops.all(half[0])), zero);
     let y = ops.max(ops.0.sub_f32s(ops.abs(at[1]), ops.all(half[1])), zero);
     let z = ops.max(ops.0.sub_f32s(ops.abs(at[2]), ops.all(half[2])), zero);
-    ops.length([x, y, z])
+    ops.dot([x, y, z], [x, y, z])
 }

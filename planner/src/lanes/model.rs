@@ -5,7 +5,7 @@ use super::rounding::{down, tolerance_m, up};
 use crate::world::{Other, World};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Vector};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 use std::ops::Range;
 use taustream_arm::body::{Body, Core, Posed};
@@ -86,6 +86,8 @@ pub(super) struct GroupPair {
     pub(super) groups: [usize; 2],
     pub(super) required: f32,
     pub(super) bodies: Vec<BodyPair>,
+    /// Each sphere of the first group, with those of the second that it must keep apart from, and how far their centres.
+    pub(super) spheres: Vec<(usize, Vec<(usize, f32)>)>,
 }
 
 /// The world.
@@ -208,11 +210,27 @@ impl Model {
             .into_iter()
             .map(|(groups, bodies)| {
                 let required = bodies.iter().map(|b| b.required).fold(0.0, f32::max);
-                GroupPair { groups, required, bodies }
+                let spheres = self.sphere_pairs(&bodies);
+                GroupPair { groups, required, bodies, spheres }
             })
             .collect();
         pairs.sort_unstable_by_key(|pair| pair.groups);
         self.group_pairs = pairs;
+    }
+
+    fn sphere_pairs(&self, bodies: &[BodyPair]) -> Vec<(usize, Vec<(usize, f32)>)> {
+        let mut by_sphere: BTreeMap<usize, Vec<(usize, f32)>> = BTreeMap::new();
+        for pair in bodies {
+            let [a, b] = pair.covers.map(|cover| self.covers[cover].spheres.clone());
+            for i in a {
+                let keep = |j: usize| {
+                    let radii = f64::from(self.spheres[i].outer) + f64::from(self.spheres[j].outer);
+                    up(radii + f64::from(pair.required))
+                };
+                by_sphere.entry(i).or_default().extend(b.clone().map(|j| (j, keep(j))));
+            }
+        }
+        by_sphere.into_iter().collect()
     }
 }
 

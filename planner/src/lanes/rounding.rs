@@ -5,7 +5,7 @@
 //! 2 u) and by its own, in Frobenius' norm of at most 40 u more. So it turns what lies beyond it wrongly by less than 64 u, and the sums of
 //! positions round 4 times a joint. Every point is wrong by at most e = rho (64 n + 6 (n + 1)) u, with rho the arm's
 //! reach. Seen from an obstacle, coordinates grow by its distance, which rounds 8 times more; the distance of two points
-//! rounds 8 times. Both spheres of a pair of links may be wrong.
+//! rounds 8 times, as does its square, which is compared with the square of what is to be kept. Both spheres of a pair of links may be wrong.
 const U: f64 = 1.0 / 16_777_216.0;
 /// What counts beside: constants that are rounded on their own, and the exact model's own rounding (m).
 const REST_M: f64 = 1e-8;

@@ -1,5 +1,6 @@
 //! Rounding the corners of a path, as far as that is free.
 use super::Pipeline;
+use crate::collide::{Course, Motion};
 use crate::lanes::Lanes;
 use crate::objective::Objective;
 use crate::timing::{Timed, distance};
@@ -125,10 +126,10 @@ impl Pipeline<'_> {
         }
         let duration_s = motion.duration_s();
         let instants = (duration_s * INSTANTS_A_SECOND).ceil().clamp(1.0, INSTANTS_MAX);
-        let mut poses_rad = Vec::new();
+        let (course, mut poses_rad) = (Course::new(motion), Vec::new());
         let mut i = 1.0;
         while i < instants {
-            poses_rad.push(motion.sample(duration_s * i / instants).position_rad);
+            poses_rad.push(course.at(duration_s * i / instants));
             i += 1.0;
         }
         self.space.note_checks(poses_rad.len());

@@ -11,7 +11,7 @@ mod through;
 pub(crate) use corners::blends_rad;
 
 use crate::budget::Budget;
-use crate::collide::{StraightEdge, SweepRules, sweep};
+use crate::collide::{Course, StraightEdge, SweepRules, sweep};
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
@@ -24,7 +24,7 @@ use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
 use crate::torque::TorqueLimits;
 use crate::tree::Space;
-use crate::verify::{Proof, Stretch, Violation, prove_candidate, verify_in};
+use crate::verify::{Proof, Stretch, Violation, measured, prove_candidate};
 use crate::world::World;
 use rustix::time::{ClockId, clock_gettime};
 use std::ops::Range;
@@ -333,7 +333,8 @@ impl<'a> Pipeline<'a> {
 
     fn stay(&mut self, pose_rad: &JointArray) {
         let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
-        match verify_in(self.space.world, &trajectory, self.space.budget) {
+        let whole = Stretch { world: self.space.world, span_s: [0.0, trajectory.duration_s()] };
+        match prove_candidate(&[whole], &trajectory, self.space.budget) {
             Ok(proof) => self.keep(trajectory, proof, "already there".to_owned()),
             Err(violation) => self.blame(violation),
         }
@@ -361,9 +362,10 @@ impl<'a> Pipeline<'a> {
     fn keeps_apart(&self, motion: &Trajectory) -> bool {
         let begins = if self.margin_exit.is_some() { SweepRules::MARGIN_EXIT } else { SweepRules::CANDIDATE };
         let rules = [begins, SweepRules::CANDIDATE];
+        let course = Course::new(motion);
         self.stretches(motion).is_some_and(|stretches| {
             let mut parts = stretches.iter().zip(&rules);
-            parts.all(|(s, rules)| sweep(s.world, motion, s.span_s, rules, self.space.budget).is_ok())
+            parts.all(|(s, rules)| sweep(s.world, &course, s.span_s, rules, self.space.budget).is_ok())
         })
     }
 
@@ -549,8 +551,18 @@ impl<'a> Pipeline<'a> {
         false
     }
 
+    /// Finds the least distance of the motion that is the answer.
+    fn measure_best(&mut self) {
+        let Some(mut best) = self.best.take() else { return };
+        if let Some(stretches) = self.stretches(&best.trajectory) {
+            best.proof = measured(&stretches, &best.trajectory, &best.proof, self.space.budget);
+        }
+        self.best = Some(best);
+    }
+
     fn finish(mut self) -> Result<Plan, PlanError> {
         self.note_time("timing, corners and proof".to_owned());
+        self.measure_best();
         let stages = self.stages;
         let budget = self.space.budget;
         let cut = budget.was_cut();

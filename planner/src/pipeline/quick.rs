@@ -17,16 +17,16 @@ const SEARCHES: usize = 3;
 /// How edges are sampled, the quickest first. A corner of 3 cm radius can pass between two samples nearer by the square of the spacing
 /// over 8 times 3 cm: about what is kept beyond the margin. The last is what the exact edges keep.
 const SAMPLINGS: [Sampling; 4] = [
-    Sampling { step_m: 1.0, spacing_m: 0.03, extra_m: 2e-3 },
-    Sampling { step_m: 0.7, spacing_m: 0.02, extra_m: 1e-3 },
-    Sampling { step_m: 0.5, spacing_m: 0.012, extra_m: 5e-4 },
+    Sampling { step_m: 0.5, spacing_m: 0.03, extra_m: 2e-3 },
+    Sampling { step_m: 0.35, spacing_m: 0.02, extra_m: 1e-3 },
+    Sampling { step_m: 0.35, spacing_m: 0.012, extra_m: 5e-4 },
     Sampling { step_m: 0.35, spacing_m: 0.007, extra_m: SweepRules::EDGE.extra_m },
 ];
 /// Share of the spacing after a proof has failed, and the nearest samples (m).
 const NEARER: f64 = 0.5;
 const SPACING_M_MIN: f64 = 4e-4;
 /// Poses of the first search, after which another one begins with twice as many.
-const FIRST_CHECKS: usize = 50_000;
+const FIRST_CHECKS: usize = 100_000;
 /// Shortcuts of a path.
 const SHORTCUTS: Effort = Effort { tries: 60, stalled: 12 };
 

@@ -4,9 +4,10 @@
 //! third part is added around the corner, which moves nothing in all: strokes of one kernel, fitted ([`super::fit`]) so that
 //! the sum keeps the limits and stays in a tube around both paths. The earliest start of the second motion is taken for which
 //! such a fit is found. The strokes of both motions stay as they are, so the first one may be under way.
-use super::fit::{Bounds, Fit, Fitter, Grid};
+use super::fit::{Bounds, Fit, Fitter, Grid, Lane, PerJoint, Vectorized, vectorized};
 use super::tube::Tube;
 use super::{Timed, distance};
+use pulp::{Scalar, Simd};
 use taustream_motion::stroke::DURATION_S_MIN;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint, Stroke, Trajectory};
 
@@ -212,8 +213,8 @@ impl<'a> Corner<'a> {
         even.chain(kinks.filter(|at| (0.0..spacings as f64).contains(at))).collect()
     }
 
-    fn tube(&self) -> Tube<'_> {
-        Tube { corners_rad: &self.path_rad, radii_rad: vec![self.radius_rad; self.path_rad.len()] }
+    fn tube(&self) -> Tube {
+        Tube::new(&self.path_rad, &vec![self.radius_rad; self.path_rad.len()])
     }
 
     /// A joint's limits in spacings, from velocity to jerk.
@@ -229,49 +230,53 @@ impl<'a> Corner<'a> {
         [v * h, a * h * h, j * h * h * h]
     }
 
-    /// What is left for the added strokes of a joint.
-    fn bounds(&self, joint: usize) -> [Bounds; 3] {
-        let limits = self.limits(joint);
+    /// What is left for the added strokes, from velocity to jerk. Lanes beyond the last joint stand still.
+    fn bounds(&self) -> [Bounds<PerJoint>; 3] {
         std::array::from_fn(|order| {
-            let mut bounds = Bounds::even(&self.grid, order + 1, MARGIN * limits[order]);
-            let both = bounds.low.iter_mut().zip(&mut bounds.high);
-            for (sample, ((low, high), at)) in both.zip(&self.sum).enumerate() {
-                let (taken, mut most) = (self.taken(at, joint)[order], MARGIN * limits[order]);
-                let t_s = self.from_s + self.spacing_s * self.grid.sample_at(sample);
-                if t_s < self.then_s || t_s > self.onward.first.duration_s() {
-                    // One of the motions alone may use what it uses.
-                    most = most.max(taken.abs().min(limits[order]));
-                }
-                (*low, *high) = (-most - taken, most - taken);
+            let mut most = PerJoint::all(1.0);
+            for joint in 0..self.onward.first.joints() {
+                most.0[joint] = MARGIN * self.limits(joint)[order];
+            }
+            let mut bounds = Bounds::even(&self.grid, order + 1, most);
+            for joint in 0..self.onward.first.joints() {
+                self.leave(&mut bounds, joint);
             }
             bounds
         })
     }
 
-    fn fit(&self) -> Option<Timed> {
-        let joints = self.onward.first.joints();
-        let (tube, mut bounds) = (self.tube(), (0..joints).map(|j| self.bounds(j)).collect::<Vec<_>>());
-        let fitter = |bounds: &[Bounds; 3]| {
-            let [v, a, j] = bounds.each_ref().map(|b| (b.order, b.weight));
-            Fitter::new(self.grid, &[v, a, j, (0, TUBE_WEIGHT / self.radius_rad)])
-        };
-        let fitters: Vec<Fitter> = bounds.iter().map(fitter).collect::<Option<_>>()?;
-        let mut deltas = vec![vec![0.0; self.grid.strokes]; joints];
-        let mut fits: Vec<Fit> = fitters.iter().zip(&deltas).map(|(f, d)| Fit::new(f, d)).collect();
-        for round in 0..=ROUNDS {
-            let mut used: f64 = 0.0;
-            for (fit, bounds) in fits.iter_mut().zip(&bounds) {
-                if round > 0 {
-                    fit.advance();
-                }
-                for (part, bounds) in fit.parts.iter_mut().zip(bounds) {
-                    used = used.max(part.beyond(bounds) * MARGIN + MARGIN);
-                    part.clamp(bounds);
-                }
+    /// Takes what both motions use of a joint from its bounds.
+    fn leave(&self, bounds: &mut Bounds<PerJoint>, joint: usize) {
+        let (order, limit) = (bounds.order - 1, self.limits(joint)[bounds.order - 1]);
+        let both = bounds.low.iter_mut().zip(&mut bounds.high);
+        for (sample, ((low, high), at)) in both.zip(&self.sum).enumerate() {
+            let (taken, mut most) = (self.taken(at, joint)[order], MARGIN * limit);
+            let t_s = self.from_s + self.spacing_s * self.grid.sample_at(sample);
+            if t_s < self.then_s || t_s > self.onward.first.duration_s() {
+                // One of the motions alone may use what it uses.
+                most = most.max(taken.abs().min(limit));
             }
-            self.keep_in(&tube, &mut fits);
+            (low.0[joint], high.0[joint]) = (-most - taken, most - taken);
+        }
+    }
+
+    fn fit(&self) -> Option<Timed> {
+        let (tube, mut bounds) = (self.tube(), self.bounds());
+        let narrower = tube.narrower(NARROWER);
+        let [v, a, j] = bounds.each_ref().map(|b| (b.order, b.weight));
+        let fitter = Fitter::new(self.grid, &[v, a, j, (0, PerJoint::all(TUBE_WEIGHT / self.radius_rad))])?;
+        let mut deltas = vec![PerJoint::ZERO; self.grid.strokes];
+        let mut fit = Fit::new(&fitter, &deltas);
+        for round in 0..=ROUNDS {
+            let used = vectorized(Round {
+                of: self,
+                advances: round > 0,
+                fit: &mut fit,
+                bounds: &bounds,
+                tube: &narrower,
+            });
             if used <= NEAR && round % CHECK_EVERY == 0 {
-                fits.iter().zip(&mut deltas).for_each(|(fit, deltas)| fit.write(deltas));
+                fit.write(&mut deltas);
                 if let Some(timed) = self.checked(&tube, &deltas, &mut bounds) {
                     return Some(timed);
                 }
@@ -283,27 +288,24 @@ impl<'a> Corner<'a> {
         None
     }
 
-    /// Projects all samples of all joints into the tube: the last part of each fit is its position.
-    fn keep_in(&self, tube: &Tube, fits: &mut [Fit]) {
-        for (sample, (at, segment)) in self.sum.iter().zip(&self.segments).enumerate() {
-            let mut pose_rad = at.position_rad;
-            for (pose, fit) in pose_rad.iter_mut().zip(fits.iter()) {
-                *pose += fit.parts[3].excess[sample];
-            }
-            let inside_rad = tube.project(*segment, &pose_rad, NARROWER);
-            for (j, fit) in fits.iter_mut().enumerate() {
-                let part = &mut fit.parts[3];
-                part.target[sample] = inside_rad[j] - at.position_rad[j];
-                part.excess[sample] = pose_rad[j] - inside_rad[j];
-            }
+    /// Projects all samples into the tube: the last part of the fit is the position.
+    #[inline(always)]
+    fn keep_in<S: Simd>(&self, simd: S, tube: &Tube, fit: &mut Fit<PerJoint>) {
+        let Some(part) = fit.parts.last_mut() else { return };
+        let samples = part.target.iter_mut().zip(&mut part.excess);
+        for ((target, excess), (at, segment)) in samples.zip(self.sum.iter().zip(&self.segments)) {
+            let at_rad = PerJoint(at.position_rad);
+            let pose_rad = at_rad.plus(simd, *excess);
+            let inside_rad = tube.project(simd, *segment, &pose_rad);
+            (*target, *excess) = (inside_rad.minus(simd, at_rad), pose_rad.minus(simd, inside_rad));
         }
     }
 
     /// The whole motion, if it keeps the limits and the tube at closely spaced instants. Otherwise bounds are lowered next to what does not.
-    fn checked(&self, tube: &Tube, deltas: &[Vec<f64>], bounds: &mut [[Bounds; 3]]) -> Option<Timed> {
+    fn checked(&self, tube: &Tube, deltas: &[PerJoint], bounds: &mut [Bounds<PerJoint>; 3]) -> Option<Timed> {
         let trajectory = self.trajectory(deltas)?;
         // Share of its ceiling that each joint uses most in each spacing, from velocity to jerk.
-        let mut used = vec![vec![[0.0; 3]; self.grid.spacings()]; deltas.len()];
+        let mut used = vec![vec![[0.0; 3]; self.grid.spacings()]; trajectory.joints()];
         let (mut deviation_rad, mut of_tube): (f64, f64) = (0.0, 0.0);
         for spacings in &self.instants {
             let at = trajectory.sample(self.from_s + spacings * self.spacing_s);
@@ -316,11 +318,12 @@ impl<'a> Corner<'a> {
                     *most = f64::max(*most, taken.abs() / (CEILING * limit));
                 }
             }
-            let [off_rad, share] = tube.off(tube.nearest_segment(&at.position_rad), &at.position_rad);
+            let segment = tube.nearest_segment(&at.position_rad);
+            let [off_rad, share] = tube.off(Scalar::new(), segment, &PerJoint(at.position_rad));
             (deviation_rad, of_tube) = (deviation_rad.max(off_rad), of_tube.max(share));
         }
         let mut holds = of_tube <= CEILING;
-        for (joint, (used, bounds)) in used.iter().zip(bounds).enumerate() {
+        for (joint, used) in used.iter().enumerate() {
             for (spacing, used) in used.iter().enumerate() {
                 for (order, used) in used.iter().enumerate().filter(|(_, used)| **used > 1.0) {
                     holds = false;
@@ -332,23 +335,23 @@ impl<'a> Corner<'a> {
     }
 
     /// Lowers what a joint may do in a spacing to a share of it.
-    fn lower(&self, bounds: &mut Bounds, (joint, spacing): (usize, usize), share: f64) {
+    fn lower(&self, bounds: &mut Bounds<PerJoint>, (joint, spacing): (usize, usize), share: f64) {
         for sample in (spacing..self.sum.len()).step_by(self.grid.spacings()) {
             let taken = self.taken(&self.sum[sample], joint)[bounds.order - 1];
-            for bound in [&mut bounds.low[sample], &mut bounds.high[sample]] {
+            for bound in [&mut bounds.low[sample].0[joint], &mut bounds.high[sample].0[joint]] {
                 *bound = (*bound + taken) * share - taken;
             }
         }
     }
 
-    fn trajectory(&self, deltas: &[Vec<f64>]) -> Option<Trajectory> {
+    fn trajectory(&self, deltas: &[PerJoint]) -> Option<Trajectory> {
         let (first, then) = (self.onward.first, self.onward.then);
         let duration_s = (self.spacing_s * OVERLAP as f64).max(DURATION_S_MIN);
-        let added = (0..self.grid.strokes).map(|i| Stroke {
+        let added = deltas.iter().enumerate().map(|(i, delta_rad)| Stroke {
             start_s: self.from_s + self.spacing_s * i as f64,
             duration_s,
             n: EXPONENT,
-            delta_rad: std::array::from_fn(|j| deltas.get(j).map_or(0.0, |deltas| deltas[i])),
+            delta_rad: delta_rad.0,
         });
         let later = then.strokes().iter().map(|s| Stroke { start_s: s.start_s + self.then_s, ..*s });
         let mut strokes: Vec<Stroke> = first.strokes().iter().copied().chain(later).chain(added).collect();
@@ -360,6 +363,33 @@ impl<'a> Corner<'a> {
     }
 }
 
+/// One round of a fit; which share of the limits it uses most.
+struct Round<'r, 'a, 'f> {
+    of: &'r Corner<'a>,
+    advances: bool,
+    fit: &'r mut Fit<'f, PerJoint>,
+    bounds: &'r [Bounds<PerJoint>; 3],
+    tube: &'r Tube,
+}
+
+impl Vectorized for Round<'_, '_, '_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> f64 {
+        if self.advances {
+            self.fit.advance(simd);
+        }
+        let mut used: f64 = 0.0;
+        for (part, bounds) in self.fit.parts.iter_mut().zip(self.bounds) {
+            used = used.max(part.beyond(simd, bounds) * MARGIN + MARGIN);
+            part.clamp(simd, bounds);
+        }
+        self.of.keep_in(simd, self.tube, self.fit);
+        used
+    }
+}
+
 /// Points of a path that leave none of the others farther off than a distance (Douglas and Peucker).
 fn simplified(path_rad: &[JointArray], most_rad: f64) -> Vec<JointArray> {
     let mut keeps = vec![false; path_rad.len()];
@@ -368,8 +398,8 @@ fn simplified(path_rad: &[JointArray], most_rad: f64) -> Vec<JointArray> {
         keeps[from] = true;
         keeps[to] = true;
         let chord = [path_rad[from], path_rad[to]];
-        let tube = Tube { corners_rad: &chord, radii_rad: vec![1.0; 2] };
-        let off = |i: &usize| tube.off(0, &path_rad[*i])[0];
+        let tube = Tube::new(&chord, &[1.0; 2]);
+        let off = |i: &usize| tube.off(Scalar::new(), 0, &PerJoint(path_rad[*i]))[0];
         let farthest = (from + 1..to).max_by(|a, b| off(a).total_cmp(&off(b)));
         if let Some(farthest) = farthest.filter(|i| off(i) > most_rad) {
             spans.extend([(from, farthest), (farthest, to)]);

@@ -5,9 +5,10 @@
 //! accelerations and the shape of the corners come from the fit; [`Law`] only says where it begins and how long the motion
 //! shall take. The tube is a little narrower than what is allowed, as a fit ends near its bounds; what comes out is measured,
 //! and made slower until it keeps to the path.
-use super::fit::{Bounds, Fit, Fitter, Grid};
+use super::fit::{Bounds, Fit, Fitter, Grid, Lane, PerJoint, Vectorized, vectorized};
 use super::law::Law;
-use super::{Path, SLACK, distance};
+use super::{Path, SLACK};
+use pulp::{Scalar, Simd};
 use taustream_motion::stroke::DURATION_S_MIN;
 use taustream_motion::{JointArray, MAX_STROKES, Stroke};
 
@@ -44,7 +45,7 @@ pub(super) fn through(path: &Path, deviations_rad: &[f64], most_s: f64) -> Optio
     let segments = path.corners_rad.len().checked_sub(1)?;
     let strokes = (STROKES[0] + STROKES[1] * segments).min(MAX_STROKES);
     let grid = Grid { strokes, overlap: OVERLAP, n: EXPONENT };
-    let tube = Tube::new(path, deviations_rad);
+    let tube = Tube::around(path, deviations_rad);
     AIMS.iter().filter(|aim| **aim * law.duration_s() < most_s).find_map(|aim| {
         let rounded = Fitted::new(path, &law, grid, *aim)?.run(&tube)?;
         (rounded.used <= USED_MAX).then_some(rounded)
@@ -52,65 +53,109 @@ pub(super) fn through(path: &Path, deviations_rad: &[f64], most_s: f64) -> Optio
 }
 
 /// What is allowed around a path.
-pub(super) struct Tube<'a> {
-    pub(super) corners_rad: &'a [JointArray],
-    /// At each corner, the ends included; in between it changes evenly.
-    pub(super) radii_rad: Vec<f64>,
+pub(super) struct Tube {
+    sections: Vec<Section>,
 }
 
-impl<'a> Tube<'a> {
-    fn new(path: &Path<'a>, deviations_rad: &[f64]) -> Self {
-        let (first, last) = (deviations_rad.first(), deviations_rad.last());
-        let radii_rad = first.into_iter().chain(deviations_rad).chain(last).copied().collect();
-        Self { corners_rad: path.corners_rad, radii_rad }
+/// The tube round one segment; its radius changes evenly.
+#[derive(Clone, Copy)]
+struct Section {
+    from_rad: PerJoint,
+    change_rad: PerJoint,
+    /// 1 over the square of the segment's length, or 0.
+    per_square: f64,
+    /// At both ends.
+    radii_rad: [f64; 2],
+}
+
+impl Section {
+    /// The nearest point of the segment, its distance, and the tube's radius there.
+    #[inline(always)]
+    fn nearest<S: Simd>(&self, simd: S, pose_rad: &PerJoint) -> (PerJoint, f64, f64) {
+        let along = self.change_rad.by(simd, pose_rad.minus(simd, self.from_rad)).sum();
+        let share = (along * self.per_square).clamp(0.0, 1.0);
+        let point = self.from_rad.plus(simd, self.change_rad.times(simd, share));
+        let off_rad = pose_rad.minus(simd, point);
+        let [from, to] = self.radii_rad;
+        (point, off_rad.by(simd, off_rad).sum().sqrt(), (1.0 - share) * from + share * to)
+    }
+}
+
+impl Tube {
+    /// Around the segments between corners, with a radius at each corner.
+    pub(super) fn new(corners_rad: &[JointArray], radii_rad: &[f64]) -> Self {
+        let section = |(pair, radii): (&[JointArray], &[f64])| {
+            let ([from, to], [radius, next]) = (pair, radii) else { return None };
+            let (from_rad, to_rad) = (PerJoint(*from), PerJoint(*to));
+            let change_rad = to_rad.minus(Scalar::new(), from_rad);
+            let square = change_rad.by(Scalar::new(), change_rad).sum();
+            let per_square = if square > 0.0 { 1.0 / square } else { 0.0 };
+            Some(Section { from_rad, change_rad, per_square, radii_rad: [*radius, *next] })
+        };
+        Self { sections: corners_rad.windows(2).zip(radii_rad.windows(2)).filter_map(section).collect() }
     }
 
-    /// The nearest point of a segment, and the tube's radius there.
-    fn nearest(&self, segment: usize, pose_rad: &JointArray) -> (JointArray, f64) {
-        let (from, to) = (&self.corners_rad[segment], &self.corners_rad[segment + 1]);
-        let (mut along, mut square) = (0.0, 0.0);
-        for ((from, to), pose) in from.iter().zip(to).zip(pose_rad) {
-            along += (to - from) * (pose - from);
-            square += (to - from) * (to - from);
-        }
-        let share = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
-        let point = std::array::from_fn(|j| from[j] + share * (to[j] - from[j]));
-        let radius_rad = (1.0 - share) * self.radii_rad[segment] + share * self.radii_rad[segment + 1];
-        (point, radius_rad)
+    /// Around a path whose inner corners may be cut by so much.
+    fn around(path: &Path, deviations_rad: &[f64]) -> Self {
+        let (first, last) = (deviations_rad.first(), deviations_rad.last());
+        let radii_rad: Vec<f64> = first.into_iter().chain(deviations_rad).chain(last).copied().collect();
+        Self::new(path.corners_rad, &radii_rad)
+    }
+
+    /// The same tube, narrower by a factor.
+    pub(super) fn narrower(&self, factor: f64) -> Self {
+        let narrower = |section: &Section| Section {
+            radii_rad: section.radii_rad.map(|radius| radius * factor),
+            ..*section
+        };
+        Self { sections: self.sections.iter().map(narrower).collect() }
+    }
+
+    /// The least radius.
+    fn narrowest_rad(&self) -> f64 {
+        self.sections.iter().flat_map(|section| section.radii_rad).fold(f64::INFINITY, f64::min)
     }
 
     /// The segment that is nearest to a pose.
     pub(super) fn nearest_segment(&self, pose_rad: &JointArray) -> usize {
-        let off_rad = |segment: &usize| distance(&self.nearest(*segment, pose_rad).0, pose_rad);
-        let segments = 0..self.corners_rad.len().saturating_sub(1);
-        segments.min_by(|a, b| off_rad(a).total_cmp(&off_rad(b))).unwrap_or(0)
+        let off_rad =
+            |segment: &usize| self.sections[*segment].nearest(Scalar::new(), &PerJoint(*pose_rad)).1;
+        (0..self.sections.len()).min_by(|a, b| off_rad(a).total_cmp(&off_rad(b))).unwrap_or(0)
     }
 
-    /// The pose in the tube, narrower by a factor, that is nearest to a pose, near a segment.
-    pub(super) fn project(&self, segment: usize, pose_rad: &JointArray, factor: f64) -> JointArray {
-        let near = segment.saturating_sub(1)..(segment + 2).min(self.corners_rad.len() - 1);
-        let each = near.map(|k| {
-            let (point, radius_rad) = self.nearest(k, pose_rad);
-            (distance(&point, pose_rad), point, radius_rad * factor)
-        });
-        let nearest = each.min_by(|a, b| (a.0 - a.2).total_cmp(&(b.0 - b.2)));
-        match nearest {
-            Some((off_rad, point, radius_rad)) if off_rad > radius_rad => {
-                let share = radius_rad / off_rad;
-                std::array::from_fn(|j| point[j] + share * (pose_rad[j] - point[j]))
+    /// The sections of a segment and of its neighbours.
+    #[inline(always)]
+    fn near(&self, segment: usize) -> &[Section] {
+        &self.sections[segment.saturating_sub(1)..(segment + 2).min(self.sections.len())]
+    }
+
+    /// The pose in the tube that is nearest to a pose, near a segment.
+    #[inline(always)]
+    pub(super) fn project<S: Simd>(&self, simd: S, segment: usize, pose_rad: &PerJoint) -> PerJoint {
+        let (mut inside_rad, mut least_rad) = (*pose_rad, f64::INFINITY);
+        for section in self.near(segment) {
+            let (point, off_rad, radius_rad) = section.nearest(simd, pose_rad);
+            if off_rad <= radius_rad {
+                return *pose_rad;
             }
-            Some(_) | None => *pose_rad,
+            if off_rad - radius_rad < least_rad {
+                least_rad = off_rad - radius_rad;
+                let off = pose_rad.minus(simd, point).times(simd, radius_rad / off_rad);
+                inside_rad = point.plus(simd, off);
+            }
         }
+        inside_rad
     }
 
     /// How far a pose is from the path near a segment, and which share of the tube's radius that is.
-    pub(super) fn off(&self, segment: usize, pose_rad: &JointArray) -> [f64; 2] {
-        let near = segment.saturating_sub(1)..(segment + 2).min(self.corners_rad.len() - 1);
-        near.fold([f64::INFINITY; 2], |least, k| {
-            let (point, radius_rad) = self.nearest(k, pose_rad);
-            let off_rad = distance(&point, pose_rad);
-            [least[0].min(off_rad), least[1].min(off_rad / radius_rad)]
-        })
+    #[inline(always)]
+    pub(super) fn off<S: Simd>(&self, simd: S, segment: usize, pose_rad: &PerJoint) -> [f64; 2] {
+        let mut least = [f64::INFINITY; 2];
+        for section in self.near(segment) {
+            let (_, off_rad, radius_rad) = section.nearest(simd, pose_rad);
+            least = [least[0].min(off_rad), least[1].min(off_rad / radius_rad)];
+        }
+        least
     }
 }
 
@@ -119,8 +164,7 @@ struct Fitted<'a> {
     path: &'a Path<'a>,
     grid: Grid,
     spacing_s: f64,
-    /// Of each joint.
-    deltas: Vec<Vec<f64>>,
+    deltas: Vec<PerJoint>,
     /// Near which segment each sample is.
     segments: Vec<usize>,
 }
@@ -130,14 +174,12 @@ impl<'a> Fitted<'a> {
         let duration_s = law.duration_s();
         let parts = grid.spacings() as f64;
         let spacing_s = (aim * duration_s / parts).max(DURATION_S_MIN / grid.overlap as f64);
-        let mut deltas = vec![Vec::with_capacity(grid.strokes); path.joints];
-        let mut last = *path.corners_rad.first()?;
+        let mut deltas = Vec::with_capacity(grid.strokes);
+        let mut last = PerJoint(*path.corners_rad.first()?);
         for i in 1..=grid.strokes {
             let on_law = law.at(i as f64 / grid.strokes as f64 * duration_s).1;
-            let here = if i == grid.strokes { *path.corners_rad.last()? } else { on_law };
-            for (deltas, (here, last)) in deltas.iter_mut().zip(here.iter().zip(&last)) {
-                deltas.push(here - last);
-            }
+            let here = PerJoint(if i == grid.strokes { *path.corners_rad.last()? } else { on_law });
+            deltas.push(here.minus(Scalar::new(), last));
             last = here;
         }
         let near = |sample: usize| law.at(grid.sample_at(sample) / parts * duration_s).0;
@@ -145,88 +187,117 @@ impl<'a> Fitted<'a> {
         Some(Self { path, grid, spacing_s, deltas, segments })
     }
 
-    /// A joint's bounds, from velocity to jerk.
-    fn bounds(&self, joint: usize) -> [Bounds; 3] {
-        let (motion, h) = (self.path.limits[joint].motion, self.spacing_s);
-        [
-            Bounds::even(&self.grid, 1, motion.velocity_rad_s * h),
-            Bounds::even(&self.grid, 2, motion.acceleration_rad_s2 * h * h),
-            Bounds::even(&self.grid, 3, motion.jerk_rad_s3 * h * h * h),
-        ]
+    /// What each joint may do, from velocity to jerk. Lanes beyond the last joint stand still.
+    fn bounds(&self) -> [Bounds<PerJoint>; 3] {
+        let h = self.spacing_s;
+        let mut most = [PerJoint::all(1.0); 3];
+        for (joint, limits) in self.path.limits.iter().enumerate().take(self.path.joints) {
+            let motion = limits.motion;
+            most[0].0[joint] = motion.velocity_rad_s * h;
+            most[1].0[joint] = motion.acceleration_rad_s2 * h * h;
+            most[2].0[joint] = motion.jerk_rad_s3 * h * h * h;
+        }
+        let [v, a, j] = most;
+        [Bounds::even(&self.grid, 1, v), Bounds::even(&self.grid, 2, a), Bounds::even(&self.grid, 3, j)]
     }
 
     fn run(mut self, tube: &Tube) -> Option<Rounded> {
-        let bounds: Vec<[Bounds; 3]> = (0..self.path.joints).map(|joint| self.bounds(joint)).collect();
-        let radius_rad = tube.radii_rad.iter().copied().fold(f64::INFINITY, f64::min);
-        let fitter = |bounds: &[Bounds; 3]| {
-            let [v, a, j] = bounds.each_ref().map(|b| (b.order, b.weight));
-            Fitter::new(self.grid, &[v, a, j, (0, TUBE_WEIGHT / radius_rad)])
-        };
-        let fitters: Vec<Fitter> = bounds.iter().map(fitter).collect::<Option<_>>()?;
-        let mut fits: Vec<Fit> = fitters.iter().zip(&self.deltas).map(|(f, d)| Fit::new(f, d)).collect();
-        for round in 0..=ROUNDS {
-            for (fit, bounds) in fits.iter_mut().zip(&bounds) {
-                if round > 0 {
-                    fit.advance();
-                }
-                fit.parts.iter_mut().zip(bounds).for_each(|(part, bounds)| part.clamp(bounds));
-            }
-            self.keep_in(tube, &mut fits);
-        }
-        fits.iter().zip(&mut self.deltas).for_each(|(fit, deltas)| fit.write(deltas));
+        let bounds = self.bounds();
+        let [v, a, j] = bounds.each_ref().map(|b| (b.order, b.weight));
+        let of_tube = PerJoint::all(TUBE_WEIGHT / tube.narrowest_rad());
+        let fitter = Fitter::new(self.grid, &[v, a, j, (0, of_tube)])?;
+        let mut fit = Fit::new(&fitter, &self.deltas);
+        vectorized(Rounds { of: &self, fit: &mut fit, bounds: &bounds, tube: &tube.narrower(NARROWER) });
+        fit.write(&mut self.deltas);
         self.scaled(tube, &bounds)
     }
 
-    /// Projects all samples of all joints into the tube: the last part of each fit is its position.
-    fn keep_in(&self, tube: &Tube, fits: &mut [Fit]) {
-        let base_rad = &self.path.corners_rad[0];
-        for (sample, segment) in self.segments.iter().enumerate() {
-            let mut pose_rad = *base_rad;
-            for (pose, fit) in pose_rad.iter_mut().zip(fits.iter()) {
-                *pose += fit.parts[3].excess[sample];
-            }
-            let inside_rad = tube.project(*segment, &pose_rad, NARROWER);
-            for (j, fit) in fits.iter_mut().enumerate() {
-                let part = &mut fit.parts[3];
-                part.target[sample] = inside_rad[j] - base_rad[j];
-                part.excess[sample] = pose_rad[j] - inside_rad[j];
-            }
+    /// Projects all samples into the tube: the last part of the fit is the position.
+    #[inline(always)]
+    fn keep_in<S: Simd>(&self, simd: S, tube: &Tube, fit: &mut Fit<PerJoint>) {
+        let base_rad = PerJoint(self.path.corners_rad[0]);
+        let Some(part) = fit.parts.last_mut() else { return };
+        let samples = part.target.iter_mut().zip(&mut part.excess).zip(&self.segments);
+        for ((target, excess), segment) in samples {
+            let pose_rad = base_rad.plus(simd, *excess);
+            let inside_rad = tube.project(simd, *segment, &pose_rad);
+            (*target, *excess) = (inside_rad.minus(simd, base_rad), pose_rad.minus(simd, inside_rad));
         }
     }
 
     /// The strokes, as fast as the limits allow, and how far they are from the path.
-    fn scaled(&self, tube: &Tube, bounds: &[[Bounds; 3]]) -> Option<Rounded> {
+    fn scaled(&self, tube: &Tube, bounds: &[Bounds<PerJoint>; 3]) -> Option<Rounded> {
         let mut scale: f64 = 0.0;
-        for (deltas, bounds) in self.deltas.iter().zip(bounds) {
-            for (order, bound) in (1..).zip(bounds) {
-                let most = bound.high.first()?;
-                scale = scale.max((self.grid.peak(deltas, order) / most).powf(1.0 / order as f64));
-            }
+        for (order, bounds) in (1..).zip(bounds) {
+            let of_limits = self.grid.peak(&self.deltas, order).by(Scalar::new(), bounds.weight).greatest();
+            scale = scale.max(of_limits.powf(1.0 / order as f64));
         }
         let spacing_s =
             self.spacing_s * (scale * (1.0 + SLACK)).max(DURATION_S_MIN / (self.spacing_s * OVERLAP as f64));
         let duration_s = (spacing_s * self.grid.overlap as f64).max(DURATION_S_MIN);
-        let stroke = |i: usize| Stroke {
+        let stroke = |(i, delta_rad): (usize, &PerJoint)| Stroke {
             start_s: spacing_s * i as f64,
             duration_s,
             n: self.grid.n,
-            delta_rad: std::array::from_fn(|j| self.deltas.get(j).map_or(0.0, |deltas| deltas[i])),
+            delta_rad: delta_rad.0,
         };
-        let strokes: Vec<Stroke> = (0..self.grid.strokes).map(stroke).collect();
+        let strokes: Vec<Stroke> = self.deltas.iter().enumerate().map(stroke).collect();
         let [deviation_rad, used] = self.off(tube);
         (spacing_s.is_finite() && used.is_finite()).then_some(Rounded { strokes, deviation_rad, used })
     }
 
     /// Farthest from the path, and the largest share of the tube's radius, at a fine sampling.
     fn off(&self, tube: &Tube) -> [f64; 2] {
-        let values: Vec<Vec<f64>> = self.deltas.iter().map(|d| self.grid.values(d, PHASES)).collect();
-        let base_rad = &self.path.corners_rad[0];
-        let spacings = self.grid.spacings();
-        (0..spacings * PHASES).fold([0.0; 2], |most, sample| {
-            let mut pose_rad = *base_rad;
-            pose_rad.iter_mut().zip(&values).for_each(|(pose, values)| *pose += values[sample]);
-            let [off_rad, used] = tube.off(self.segments[sample % spacings], &pose_rad);
-            [f64::max(most[0], off_rad), f64::max(most[1], used)]
-        })
+        let values = self.grid.values(&self.deltas, PHASES);
+        vectorized(Farthest { of: self, tube, values: &values })
+    }
+}
+
+/// All rounds of a fit.
+struct Rounds<'r, 'a, 'f> {
+    of: &'r Fitted<'a>,
+    fit: &'r mut Fit<'f, PerJoint>,
+    bounds: &'r [Bounds<PerJoint>; 3],
+    tube: &'r Tube,
+}
+
+impl Vectorized for Rounds<'_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for round in 0..=ROUNDS {
+            if round > 0 {
+                self.fit.advance(simd);
+            }
+            for (part, bounds) in self.fit.parts.iter_mut().zip(self.bounds) {
+                part.clamp(simd, bounds);
+            }
+            self.of.keep_in(simd, self.tube, self.fit);
+        }
+    }
+}
+
+/// The largest of [`Tube::off`] over a motion.
+struct Farthest<'r, 'a> {
+    of: &'r Fitted<'a>,
+    tube: &'r Tube,
+    values: &'r [PerJoint],
+}
+
+impl Vectorized for Farthest<'_, '_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> [f64; 2] {
+        let base_rad = PerJoint(self.of.path.corners_rad[0]);
+        let spacings = self.of.grid.spacings();
+        let mut most = [0.0; 2];
+        for (sample, value) in self.values.iter().enumerate() {
+            let segment = self.of.segments[sample % spacings];
+            let [off_rad, used] = self.tube.off(simd, segment, &base_rad.plus(simd, *value));
+            most = [f64::max(most[0], off_rad), f64::max(most[1], used)];
+        }
+        most
     }
 }
