@@ -1,12 +1,13 @@
-//! Which servo of which bus moves which joint.
+//! Which servo of which bus moves which joint or axis.
 //!
 //! A wrong sign, gear or zero sends a joint the wrong way at full speed, so none of them has a default, and every
 //! angle that the joint may be commanded must be a position that the servo can represent.
+use crate::axis::{Axis, ReadAxis};
 use crate::document::{Node, shown};
 use crate::protocol;
 use crate::protocol::identifiers::Use;
 use crate::reader::{Bounds, Table};
-use crate::robot::Robot;
+use crate::robot::{Robot, RobotJoint};
 use crate::settings::{Bus, BusKind, FEEDBACK_EVERY_MAX, SETPOINT_EVERY_MAX, Servo, Traffic};
 use crate::{stall, trust};
 use std::collections::BTreeSet;
@@ -114,28 +115,58 @@ fn read_traffic(table: &mut Table<'_>) -> Option<Traffic> {
     })
 }
 
-/// Reads the servos and puts them in the order of the joints; complete only when no fault was noted.
-pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[Option<Bus>]) -> Vec<Servo> {
+/// What servos are bound to: joints, then axes.
+#[derive(Clone, Copy)]
+struct Bound<'a> {
+    robot: Option<&'a Robot>,
+    axes: &'a [ReadAxis],
+}
+
+impl Bound<'_> {
+    /// Name and limits behind a slot.
+    fn slot(&self, slot: usize) -> Option<&RobotJoint> {
+        let robot = self.robot?;
+        match slot.checked_sub(robot.joints.len()) {
+            None => robot.joints.get(slot),
+            Some(axis) => self.axes.get(axis)?.as_ref().map(|axis| &axis.output),
+        }
+    }
+    /// As messages name it.
+    fn name(&self, slot: usize) -> String {
+        let joints = self.robot.map_or(0, |robot| robot.joints.len());
+        let kind = if slot < joints { "joint" } else { "axis" };
+        self.slot(slot)
+            .map_or_else(|| format!("{kind} {}", slot + 1), |found| format!("{kind} {}", found.name))
+    }
+}
+
+/// Reads the servos and puts them in the order of the joints, axes behind them; complete only when no fault was noted.
+pub(crate) fn read_servos(
+    top: &mut Table<'_>,
+    (robot, axes): (Option<&Robot>, &[ReadAxis]),
+    buses: &[Option<Bus>],
+) -> Vec<Servo> {
     let tables = top.tables("servo");
-    let mut bound_joints = BTreeSet::new();
+    let bound = Bound { robot, axes };
+    let mut taken_slots = BTreeSet::new();
     let mut nodes = BTreeSet::new();
     let mut uses = Vec::new();
     // Buses that carry a servo.
     let mut busy = BTreeSet::new();
     let mut servos = Vec::new();
     for mut table in tables {
-        let joint = read_joint(&mut table, robot, &mut bound_joints);
+        let joint = read_slot(&mut table, bound, &mut taken_slots);
         let bus = read_bus(&mut table, buses);
         let servo = read_servo(&mut table, joint, bus);
         busy.extend(bus);
         if let Some(servo) = &servo {
             if nodes.insert((servo.bus, servo.protocol.name(), servo.node_id)) {
-                check_identifiers(&table, servo, robot, &mut uses);
+                check_identifiers(&table, servo, bound, &mut uses);
             } else {
                 let id = servo.node_id.to_string();
                 table.fault("node_id", &id, "each node id once on a bus: two servos would answer");
             }
-            if let Some(joint) = robot.and_then(|robot| robot.joints.get(servo.joint)) {
+            if let Some(joint) = bound.slot(servo.joint) {
                 servo.protocol.check_joint(&table, joint, [servo.sign, servo.zero_offset_rad]);
                 trust::check_reaction(&table, servo, joint);
                 trust::check_feedback(&table, servo, joint);
@@ -144,15 +175,7 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
         table.done();
         servos.extend(servo);
     }
-    if let Some(robot) = robot {
-        for (i, joint) in robot.joints.iter().enumerate().filter(|(i, _)| !bound_joints.contains(i)) {
-            top.fault(
-                "servo",
-                "missing",
-                &format!("one table [[servo]] with joint = {:?} (joint {} of the robot)", joint.name, i + 1),
-            );
-        }
-    }
+    report_unbound(top, bound, &taken_slots);
     // An idle bus would be locked, opened and watched for nothing, and is most often a servo with the wrong bus.
     for (i, bus) in buses.iter().enumerate().filter(|(i, _)| !busy.contains(i)) {
         if let Some(bus) = bus {
@@ -166,6 +189,59 @@ pub(crate) fn read_servos(top: &mut Table<'_>, robot: Option<&Robot>, buses: &[O
     }
     servos.sort_by_key(|servo| servo.joint);
     servos
+}
+
+/// Joints and axes without a servo.
+fn report_unbound(top: &Table<'_>, bound: Bound<'_>, taken: &BTreeSet<usize>) {
+    let Some(robot) = bound.robot else { return };
+    for (i, joint) in robot.joints.iter().enumerate().filter(|(i, _)| !taken.contains(i)) {
+        let expected =
+            format!("one table [[servo]] with joint = {:?} (joint {} of the robot)", joint.name, i + 1);
+        top.fault("servo", "missing", &expected);
+    }
+    let first = robot.joints.len();
+    for (_, axis) in bound.axes.iter().enumerate().filter(|(i, _)| !taken.contains(&(first + i))) {
+        if let Some(axis) = axis {
+            top.fault("servo", "missing", &format!("one table [[servo]] with axis = {:?}", axis.name()));
+        }
+    }
+}
+
+/// The joint or the axis that a servo moves, as a slot.
+fn read_slot(table: &mut Table<'_>, bound: Bound<'_>, taken: &mut BTreeSet<usize>) -> Option<usize> {
+    if table.has("axis") && !table.has("joint") {
+        table.take("joint");
+        return read_axis(table, bound, taken);
+    }
+    let slot = read_joint(table, bound.robot, taken);
+    if table.take("axis").is_some() {
+        table.fault("axis", "given beside joint", "joint or axis, one of the two");
+        return None;
+    }
+    slot
+}
+
+fn read_axis(table: &mut Table<'_>, bound: Bound<'_>, taken: &mut BTreeSet<usize>) -> Option<usize> {
+    let name = table.text("axis", "the name of an [[axis]]")?;
+    let named = |axis: &ReadAxis| axis.as_ref().is_some_and(|axis| axis.name() == name);
+    let Some(index) = bound.axes.iter().position(named) else {
+        // An axis that is itself at fault was reported where it stands.
+        if bound.axes.iter().all(Option::is_some) {
+            let names: Vec<&str> = bound.axes.iter().flatten().map(Axis::name).collect();
+            let expected = match names.as_slice() {
+                [] => "the name of an [[axis]], and there is none".to_owned(),
+                names => format!("the name of an [[axis]]: {}", names.join(", ")),
+            };
+            table.fault("axis", &shown(&name), &expected);
+        }
+        return None;
+    };
+    let slot = bound.robot?.joints.len() + index;
+    if !taken.insert(slot) {
+        table.fault("axis", &shown(&name), "one servo an axis");
+        return None;
+    }
+    Some(slot)
 }
 
 fn read_joint(table: &mut Table<'_>, robot: Option<&Robot>, bound: &mut BTreeSet<usize>) -> Option<usize> {
@@ -234,12 +310,7 @@ struct UsedIdentifier {
 }
 
 /// Holds every identifier of a servo against those of the servos before it, and against its own.
-fn check_identifiers(
-    table: &Table<'_>,
-    servo: &Servo,
-    robot: Option<&Robot>,
-    taken: &mut Vec<UsedIdentifier>,
-) {
+fn check_identifiers(table: &Table<'_>, servo: &Servo, bound: Bound<'_>, taken: &mut Vec<UsedIdentifier>) {
     let mut clashed = false;
     for mine in servo.protocol.identifiers(servo.node_id) {
         let clash = taken.iter().find(|other| other.bus == servo.bus && other.by.clashes(&mine));
@@ -250,11 +321,10 @@ fn check_identifiers(
         // One message per servo: another id fixes all of them.
         if !clashed {
             clashed = true;
-            let joint = robot.and_then(|robot| robot.joints.get(other.joint));
-            let name = joint.map_or_else(|| format!("{}", other.joint), |joint| joint.name.clone());
+            let name = bound.name(other.joint);
             let value = format!("identifier {} for {}", mine.number(), mine.what);
             let expected =
-                format!("an identifier of its own on the bus: joint {name} has it for {}", other.by.what);
+                format!("an identifier of its own on the bus: {name} has it for {}", other.by.what);
             table.fault(mine.key, &value, &expected);
         }
     }

@@ -58,9 +58,9 @@ pub(crate) fn check_jump(fault_list: &FaultList, settings: &Settings) {
     let period_s = f64::from(settings.cycle.period_us) * 1e-6;
     let longest_s = f64::from(settings.cycle.tolerated_gap_periods + 1) * period_s;
     let jump_rad = settings.supervision.position_jump_rad_max;
-    let joints = settings.robot.joints.iter();
-    let fastest =
-        joints.max_by(|a, b| a.limits.motion.velocity_rad_s.total_cmp(&b.limits.motion.velocity_rad_s));
+    let fastest = settings
+        .all_slots()
+        .max_by(|a, b| a.limits.motion.velocity_rad_s.total_cmp(&b.limits.motion.velocity_rad_s));
     let Some(joint) = fastest else { return };
     let step_rad = joint.limits.motion.velocity_rad_s * longest_s;
     if jump_rad <= step_rad {
@@ -77,7 +77,7 @@ pub(crate) fn check_limp_risk(fault_list: &FaultList, settings: &Settings) {
     let first_percent = settings.supervision.first_speed_percent;
     let Some(servo) = settings.servos.iter().find(|servo| servo.limp_risk_acknowledged) else { return };
     if first_percent > LIMP_RISK_PERCENT_MAX {
-        let joint = settings.robot.joints.get(servo.joint).map_or("?", |joint| &joint.name);
+        let joint = settings.slot(servo.joint).map_or("?", |slot| &slot.name);
         let expected = format!(
             "at most {LIMP_RISK_PERCENT_MAX} percent: joint {joint} falls when commands stop (limp_risk_acknowledged), and each \
              enable begins at this speed"

@@ -4,6 +4,7 @@
 //! key, value and what was expected; unknown keys are faults.
 #![forbid(unsafe_code)]
 
+pub mod axis;
 mod binding;
 pub mod body;
 pub mod bus_load;
@@ -56,6 +57,7 @@ pub mod trajectory_file;
 pub mod trust;
 mod urdf;
 
+pub use axis::{AXES_MAX, Axis, AxisContact, AxisUnit, OnFault};
 pub use bus_load::BusLoad;
 pub use drive_features::{
     AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject, PositionMode, WrittenLimits,

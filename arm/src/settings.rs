@@ -1,4 +1,5 @@
 //! The settings of one arm's controller: robot, buses, servos, cycle, supervision.
+use crate::axis::{self, Axis};
 use crate::document::{self, Node};
 use crate::feed_forward::{self, FeedForward};
 use crate::protocol::{self, Protocol};
@@ -91,10 +92,10 @@ impl Bus {
     }
 }
 
-/// One servo: the binding of a joint to a node on a bus.
+/// One servo: the binding of a joint, or of an axis, to a node on a bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Servo {
-    /// Index into [`Robot::joints`].
+    /// Its slot: index into [`Robot::joints`], and behind them the axes ([`Settings::slot`]).
     pub joint: usize,
     /// Index into [`Settings::buses`].
     pub bus: usize,
@@ -175,7 +176,9 @@ pub struct Settings {
     pub scene: Scene,
     /// The buses.
     pub buses: Vec<Bus>,
-    /// One servo a joint, in the order of the joints.
+    /// Grippers, lifts: what has a servo and is no joint of the path.
+    pub axes: Vec<Axis>,
+    /// One servo a joint, in the order of the joints, then one an axis.
     pub servos: Vec<Servo>,
     /// The cycle.
     pub cycle: CycleSettings,
@@ -278,7 +281,8 @@ impl Settings {
         let robot = named_file(&mut top, "robot", robot);
         let scene = named_file(&mut top, "scene", Scene::load);
         let buses = binding::read_buses(&mut top);
-        let servos = binding::read_servos(&mut top, robot.as_ref(), &buses);
+        let axes = axis::read(&mut top, robot.as_ref());
+        let servos = binding::read_servos(&mut top, (robot.as_ref(), &axes), &buses);
         let cycle = top.table("cycle", "a table [cycle]").and_then(read_cycle);
         let supervision = top.table("supervision", "a table [supervision]").and_then(read_supervision);
         let feed_forward = feed_forward::read(&mut top, robot.as_ref(), &servos);
@@ -296,6 +300,7 @@ impl Settings {
             robot: robot?,
             scene: scene?,
             buses: buses.into_iter().collect::<Option<Vec<Bus>>>()?,
+            axes: axes.into_iter().collect::<Option<Vec<Axis>>>()?,
             servos,
             cycle: cycle?,
             supervision: supervision?,
@@ -311,6 +316,7 @@ impl Settings {
             fault_list.merge(faults);
         }
         consistency::check_jump(fault_list, &settings);
+        axis::check_servos(fault_list, &settings);
         protocol::check_settings(fault_list, &settings);
         consistency::check_traffic(fault_list, &settings);
         consistency::check_limp_risk(fault_list, &settings);

@@ -1,7 +1,7 @@
 //! A long table of bad files: each is refused under the key that is wrong, with words that help.
 mod bad_files_cases;
 mod common;
-use bad_files_cases::{Case, cubemars, damiao, feed_forward, robstride, settings};
+use bad_files_cases::{Case, axes, cubemars, damiao, feed_forward, robstride, settings};
 use common::Reader::{Robot, Scene, Settings, Trajectory};
 use common::{Reader, edited, faults_of};
 
@@ -316,7 +316,7 @@ const TRAJECTORY_CASES: &[Case] = &[
 
 #[test]
 fn bad_file_is_refused_under_its_key_with_words_that_help() {
-    let others = [damiao::CASES, robstride::CASES, cubemars::CASES, feed_forward::CASES];
+    let others = [axes::CASES, damiao::CASES, robstride::CASES, cubemars::CASES, feed_forward::CASES];
     for table in [ROBOT_CASES, SCENE_CASES, settings::CASES, TRAJECTORY_CASES].into_iter().chain(others) {
         for (reader, from, to, key, words) in table {
             let faults = faults_of(*reader, &edited(&reader.good_text(), from, to));
@@ -328,7 +328,7 @@ fn bad_file_is_refused_under_its_key_with_words_that_help() {
 
 #[test]
 fn good_file_behind_the_table_has_no_fault() {
-    let motors = [Reader::Damiao, Reader::RobStride, Reader::CubeMars];
+    let motors = [Reader::Damiao, Reader::Gripper, Reader::RobStride, Reader::CubeMars];
     for reader in [Robot, Scene, Settings, Trajectory].into_iter().chain(motors) {
         assert_eq!(reader.read(&reader.good_text()), Ok(()), "{reader:?}");
     }

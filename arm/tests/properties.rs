@@ -8,11 +8,12 @@ use taustream_arm::TrajectoryFile;
 use taustream_motion::stroke::{DURATION_S_MIN, END_S_MAX};
 use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
-const READERS: [Reader; 7] = [
+const READERS: [Reader; 8] = [
     Reader::Robot,
     Reader::Scene,
     Reader::Settings,
     Reader::Damiao,
+    Reader::Gripper,
     Reader::RobStride,
     Reader::CubeMars,
     Reader::Trajectory,

@@ -205,6 +205,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Stop(_)
         | Action::TorqueOff(_)
         | Action::ClearFault(_)
+        | Action::Axis(_)
         | Action::Reference(_)
         | Action::Status
         | Action::Watch(_) => true,

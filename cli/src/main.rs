@@ -90,6 +90,9 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
         Action::Stop(args) => command(form, settings, Command::Stop, args.waiting.wait_s),
         Action::TorqueOff(args) => command(form, settings, Command::TorqueOff, args.wait_s),
         Action::ClearFault(args) => command(form, settings, Command::ClearFault, args.wait_s),
+        Action::Axis(args) => {
+            interrupt::watch().and_then(|()| live::axis::run(form, &ArmName::read(settings)?, args))
+        }
         Action::Reference(args) => live::reference::run(form, settings, args),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Watch(args) => live::watch::run(form, settings, args),

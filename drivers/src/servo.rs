@@ -100,6 +100,8 @@ pub struct ServoStatus {
     pub position_rad: f64,
     /// Measured link velocity; NaN when the drive does not send it.
     pub velocity_rad_s: f64,
+    /// Measured torque at the link; NaN when the drive does not send it.
+    pub torque_nm: f64,
     /// Link angle that an adopted drive holds; NaN in every other state.
     pub hold_position_rad: f64,
     /// When the newest feedback arrived; `None` before the first.
@@ -137,6 +139,7 @@ impl ServoStatus {
         state: DriveState::Absent,
         position_rad: f64::NAN,
         velocity_rad_s: f64::NAN,
+        torque_nm: f64::NAN,
         hold_position_rad: f64::NAN,
         received: None,
         status_word: 0,

@@ -86,6 +86,8 @@ fn kinds() -> Vec<Kind> {
                 shipped("config/settings/odrive6.toml", &[]),
                 shipped("config/settings/piper.toml", &[]),
                 shipped("config/settings/damiao6.toml", &[("[cycle]", FEED_FORWARD)]),
+                shipped("config/settings/damiao6-gripper.toml", &[]),
+                shipped("config/settings/damiao6-gripper.toml", AXIS_IN_RAD),
             ],
             load: settings,
         },
@@ -101,6 +103,23 @@ fn kinds() -> Vec<Kind> {
 /// A section of torques, before `[cycle]`.
 const FEED_FORWARD: &str = "[feed_forward]\ngravity = true\ninertia = true\nshare = 1.0\n[[feed_forward.joint]]\njoint = \"elbow\"\n\
     torque_nm_max = 20.0\nrate_nm_s_max = 50.0\n[cycle]";
+
+/// The shipped axis in rad.
+const AXIS_IN_RAD: &[(&str, &str)] = &[
+    ("unit = \"m\"\nm_per_rad = 0.02", "unit = \"rad\""),
+    ("position_m = [0.0, 0.08]", "position_rad = [0.0, 4.0]"),
+    ("open_m = 0.08", "open_rad = 4.0"),
+    ("closed_m = 0.0", "closed_rad = 0.0"),
+    (
+        "{ velocity_m_s = 0.05, acceleration_m_s2 = 0.5, jerk_m_s3 = 10.0 }",
+        "{ velocity_rad_s = 2.5, acceleration_rad_s2 = 25.0, jerk_rad_s3 = 500.0 }",
+    ),
+    (
+        "{ lag_m = 0.004, force_n_max = 40.0, time_ms = 20, squeeze_m = 0.003 }",
+        "{ lag_rad = 0.2, torque_nm_max = 0.8, time_ms = 20, squeeze_rad = 0.15 }",
+    ),
+    ("tracking_error_m_max = 0.012", "tracking_error_rad_max = 0.6"),
+];
 
 /// A scene with every kind of obstacle, beside the mesh that it names.
 fn scene() -> (PathBuf, String) {

@@ -1,5 +1,5 @@
 //! Commands to the streamer and its answers (request-response).
-use crate::{LAYOUT_VERSION, Phase, Text, clock};
+use crate::{AxisGoal, LAYOUT_VERSION, Phase, Text, clock};
 use iceoryx2::prelude::ZeroCopySend;
 use std::time::Duration;
 
@@ -34,6 +34,15 @@ pub enum Command {
         /// Its true angle.
         at_rad: f64,
     },
+    /// Leads an axis that is no joint of the path.
+    Axis {
+        /// Zero-based axis, in the order of the settings.
+        axis: u32,
+        /// Where to.
+        goal: AxisGoal,
+        /// The force that is contact, N or Nm; `None`: the one of the settings.
+        force: Option<f64>,
+    },
 }
 
 /// A command on the wire.
@@ -43,8 +52,9 @@ pub struct CommandRequest {
     layout_version: u32,
     code: u32,
     joint: u32,
-    reserved: u32,
+    has_force: u32,
     value: f64,
+    force: f64,
     valid_until_ns: u64,
 }
 
@@ -80,6 +90,14 @@ pub enum CommandError {
         /// The value in the message.
         percent: f64,
     },
+    /// A number of an axis command is not finite.
+    #[error("axis: {what} is {value}; it must be a finite number")]
+    Axis {
+        /// Which number: "position" or "force".
+        what: &'static str,
+        /// The value in the message.
+        value: f64,
+    },
     /// The angle of a reference is not a finite number.
     #[error("reference at {at_rad} rad; it must be a finite number")]
     Angle {
@@ -93,6 +111,14 @@ impl CommandRequest {
     #[must_use]
     pub fn new(command: Command, valid_for: Duration) -> Self {
         Self { valid_until_ns: clock::ns_after(valid_for), ..Self::from(command) }
+    }
+
+    fn axis(&self, goal: AxisGoal) -> Result<Command, CommandError> {
+        let force = (self.has_force != 0).then_some(self.force);
+        match force {
+            Some(value) if !value.is_finite() => Err(CommandError::Axis { what: "force", value }),
+            _ => Ok(Command::Axis { axis: self.joint, goal, force }),
+        }
     }
 
     /// `CLOCK_MONOTONIC` until which the sender waits, ns; `u64::MAX` when it has not said so.
@@ -115,8 +141,21 @@ impl From<Command> for CommandRequest {
             Command::Speed { percent } => (8, 0, percent),
             Command::ClearFault => (9, 0, 0.0),
             Command::Reference { joint, at_rad } => (10, joint, at_rad),
+            Command::Axis { axis, goal: AxisGoal::Open, .. } => (11, axis, 0.0),
+            Command::Axis { axis, goal: AxisGoal::Closed, .. } => (12, axis, 0.0),
+            Command::Axis { axis, goal: AxisGoal::At(position), .. } => (13, axis, position),
+            Command::Axis { axis, goal: AxisGoal::Stop, .. } => (14, axis, 0.0),
         };
-        Self { layout_version: LAYOUT_VERSION, code, joint, reserved: 0, value, valid_until_ns: u64::MAX }
+        let force = if let Command::Axis { force, .. } = command { force } else { None };
+        Self {
+            layout_version: LAYOUT_VERSION,
+            code,
+            joint,
+            has_force: u32::from(force.is_some()),
+            value,
+            force: force.unwrap_or(0.0),
+            valid_until_ns: u64::MAX,
+        }
     }
 }
 
@@ -140,6 +179,11 @@ impl TryFrom<&CommandRequest> for Command {
             9 => Self::ClearFault,
             10 if r.value.is_finite() => Self::Reference { joint: r.joint, at_rad: r.value },
             10 => return Err(CommandError::Angle { at_rad: r.value }),
+            11 => r.axis(AxisGoal::Open)?,
+            12 => r.axis(AxisGoal::Closed)?,
+            13 if r.value.is_finite() => r.axis(AxisGoal::At(r.value))?,
+            13 => return Err(CommandError::Axis { what: "position", value: r.value }),
+            14 => r.axis(AxisGoal::Stop)?,
             got => return Err(CommandError::Unknown { got }),
         })
     }
@@ -182,5 +226,5 @@ impl CommandReply {
     }
 }
 
-const _: () = assert!(size_of::<CommandRequest>() == 32);
+const _: () = assert!(size_of::<CommandRequest>() == 40);
 const _: () = assert!(size_of::<CommandReply>() == 264);

@@ -5,6 +5,7 @@
 //! [`TrajectoryMessage`]; the one door is [`CheckedTrajectory`].
 #![deny(unsafe_code)]
 
+pub mod axis;
 pub mod bus;
 pub mod clock;
 pub mod command;
@@ -27,6 +28,7 @@ pub mod tip_goal;
 pub mod trajectory;
 pub mod way_points;
 
+pub use axis::{AxisGoal, AxisReport, AxisState};
 pub use bus::{BUSES_MAX, BusReport};
 pub use command::{Command, CommandReply, CommandRequest};
 pub use fault::{BusFault, Cause, Evidence, FaultReason};
@@ -43,4 +45,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 6;
+pub const LAYOUT_VERSION: u32 = 7;

@@ -1,9 +1,11 @@
 //! The streamer's state, published off the real-time thread at a settable rate.
 use crate::{
-    BUSES_MAX, BusReport, Cause, FaultReason, LAYOUT_VERSION, Pause, PauseReason, Phase, RobotDigest,
+    AxisReport, BUSES_MAX, BusReport, Cause, FaultReason, LAYOUT_VERSION, Pause, PauseReason, Phase,
+    RobotDigest,
 };
 use iceoryx2::prelude::ZeroCopySend;
 use taustream_motion::MAX_JOINTS;
+use taustream_motion::axis::AXES_MAX;
 
 /// A report on the wire. Read [`Report::checked`] before any field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -25,7 +27,7 @@ pub struct Report {
     pub phase: u32,
     /// [`FaultReason::code`], 0 for none.
     pub fault_reason: u32,
-    /// Zero-based joint of the fault; `u32::MAX` for none.
+    /// Zero-based joint of the fault, an axis behind the joints; `u32::MAX` for none.
     pub fault_joint: u32,
     /// Index of the bus of the fault; `u32::MAX` for none.
     pub fault_bus: u32,
@@ -95,6 +97,12 @@ pub struct Report {
     pub drive_status: [u32; MAX_JOINTS],
     /// Drive error codes, 0 for none.
     pub drive_error: [u32; MAX_JOINTS],
+    /// How many axes beside the path the arm has.
+    pub axis_count: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// The axes, in the order of the settings. What their servos say stands behind the joints, as that of joints does.
+    pub axes: [AxisReport; AXES_MAX],
     /// The buses, in the order of the settings.
     pub buses: [BusReport; BUSES_MAX],
     /// Cycles since start.
@@ -146,6 +154,20 @@ impl Report {
         usize::try_from(self.joint_count).unwrap_or(MAX_JOINTS).min(MAX_JOINTS)
     }
 
+    /// The axes that the arm has, in the order of the settings.
+    #[must_use]
+    pub fn axes(&self) -> &[AxisReport] {
+        let most = AXES_MAX.min(MAX_JOINTS - self.joints());
+        let count = usize::try_from(self.axis_count).unwrap_or(most).min(most);
+        self.axes.get(..count).unwrap_or(&self.axes)
+    }
+
+    /// How many servos: joints, then axes; never more than [`MAX_JOINTS`].
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.joints() + self.axes().len()
+    }
+
     /// The buses that the arm has, in the order of the settings.
     #[must_use]
     pub fn buses(&self) -> &[BusReport] {
@@ -169,7 +191,7 @@ impl Report {
         let index = |raw: u32, count: usize| usize::try_from(raw).ok().filter(|i| *i < count);
         Some(Cause {
             reason: self.fault()?,
-            joint: index(self.fault_joint, self.joints()),
+            joint: index(self.fault_joint, self.slots()),
             bus: index(self.fault_bus, self.buses().len()),
             code: self.fault_code,
             object: self.fault_object,

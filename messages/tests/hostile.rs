@@ -16,9 +16,9 @@ use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::trajectory::{Corrupted, MessageError};
 use taustream_messages::way_points::{Blend, WAY_POINTS_MAX};
 use taustream_messages::{
-    CheckedSceneRequest, CheckedTrajectory, Command, CommandReply, CommandRequest, LAYOUT_VERSION, Outcome,
-    Phase, PlanReply, PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply, SceneRequest,
-    TargetReply, TargetRequest, Text, TrajectoryMessage,
+    AxisGoal, AxisState, CheckedSceneRequest, CheckedTrajectory, Command, CommandReply, CommandRequest,
+    LAYOUT_VERSION, Outcome, Phase, PlanReply, PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply,
+    SceneRequest, TargetReply, TargetRequest, Text, TrajectoryMessage,
 };
 use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 
@@ -226,6 +226,10 @@ fn command_survives_the_wire_and_bad_ones_are_named() {
         Command::TorqueOff,
         Command::Speed { percent: 37.5 },
         Command::ClearFault,
+        Command::Axis { axis: 1, goal: AxisGoal::Open, force: None },
+        Command::Axis { axis: 0, goal: AxisGoal::Closed, force: Some(12.5) },
+        Command::Axis { axis: 3, goal: AxisGoal::At(-0.25), force: Some(1.0) },
+        Command::Axis { axis: 0, goal: AxisGoal::Stop, force: None },
     ];
     for command in commands {
         assert_eq!(Command::try_from(&CommandRequest::from(command)), Ok(command));
@@ -234,6 +238,21 @@ fn command_survives_the_wire_and_bad_ones_are_named() {
         let refused = Command::try_from(&CommandRequest::from(Command::Speed { percent }));
         assert!(matches!(refused, Err(CommandError::Percent { .. })), "{percent}");
     }
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for (goal, force, what) in [
+            (AxisGoal::At(bad), None, "position"),
+            (AxisGoal::At(0.1), Some(bad), "force"),
+            (AxisGoal::Open, Some(bad), "force"),
+        ] {
+            let request = CommandRequest::from(Command::Axis { axis: 0, goal, force });
+            let refused = Command::try_from(&request).unwrap_err();
+            assert!(matches!(refused, CommandError::Axis { what: said, .. } if said == what), "{refused}");
+        }
+    }
+    for state in AxisState::ALL {
+        assert_eq!(AxisState::from_code(state.code()), state);
+    }
+    assert_eq!(AxisState::from_code(77), AxisState::Fault);
 }
 
 #[test]

@@ -9,6 +9,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod axis;
 pub mod brake;
 pub mod chain;
 pub mod cut;

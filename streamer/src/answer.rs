@@ -67,6 +67,15 @@ pub enum AnswerReason {
     ReferenceNotNeeded { joint: usize, reading_rad: f64, at_rad: f64 },
     NoSuchJoint { joint: usize },
     Energised { joint: usize, state: DriveState },
+    AxisGoes { axis: usize, to: f64 },
+    AxisStops { axis: usize },
+    AxesStop,
+    NoSuchAxis { axis: usize, axes: usize },
+    AxisOutside { axis: usize, at: f64, range: [f64; 2] },
+    AxisForce { axis: usize, force: f64, most: f64 },
+    AxisFeelsNoForce { axis: usize },
+    AxisTakesLong { axis: usize, stroke_s: f64 },
+    AxisInMotion { axis: usize },
     Wait,
     ShuttingDown,
     TooLate { late_s: f64 },
@@ -85,7 +94,10 @@ impl AnswerReason {
             }
             _ => text,
         });
-        taken.or_else(|| self.of_referencing(names)).unwrap_or_else(|| self.refused(names))
+        taken
+            .or_else(|| self.of_referencing(names))
+            .or_else(|| self.of_axis(names))
+            .unwrap_or_else(|| self.refused(names))
     }
 
     #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded below")]
@@ -116,6 +128,7 @@ impl AnswerReason {
                 "the bus is open again and the state of its drives is being read; when `status` shows disabled, `enable`"
             }
             Self::Already => "the arm is in this state already",
+            Self::AxesStop => "the axes beside the path come to rest and hold there",
             Self::NothingMoves => "nothing moves",
             _ => return None,
         };
@@ -173,6 +186,46 @@ impl AnswerReason {
                 names.joint(joint),
                 state_word(state)
             ),
+            _ => return None,
+        })
+    }
+
+    /// Answers about axes beside the path.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "the other reasons are worded above and below")]
+    fn of_axis(&self, names: &Names) -> Option<String> {
+        let shown = |axis: usize| names.axis(axis);
+        let unit = |axis: usize| names.axis_unit(axis).word();
+        let force_unit = |axis: usize| names.axis_unit(axis).force_word();
+        Some(match *self {
+            Self::AxisGoes { axis, to } => format!("{} goes to {to:.6} {}", shown(axis), unit(axis)),
+            Self::AxisStops { axis } => format!("{} comes to rest and holds there", shown(axis)),
+            Self::NoSuchAxis { axis, axes } => {
+                format!("there is no axis {}; the settings of this arm have {axes}", axis + 1)
+            }
+            Self::AxisOutside { axis, at, range: [low, high] } => {
+                let by = (low - at).max(at - high);
+                format!(
+                    "{} cannot go to {at:.6} {unit}: it is {by:.6} {unit} outside [{low:.6}, {high:.6}]; give a position inside",
+                    shown(axis),
+                    unit = unit(axis)
+                )
+            }
+            Self::AxisForce { axis, force, most } => format!(
+                "{} takes a force above 0 up to {most:.3} {unit}, not {force:.3} {unit}; the settings state the most",
+                shown(axis),
+                unit = force_unit(axis)
+            ),
+            Self::AxisFeelsNoForce { axis } => format!(
+                "{} has no force in its settings ([axis.contact]): contact is found by its distance behind the command; leave --force out",
+                shown(axis)
+            ),
+            Self::AxisTakesLong { axis, stroke_s } => {
+                format!(
+                    "{} would take {stroke_s:.0} s; 600 s are the most; choose a nearer position",
+                    shown(axis)
+                )
+            }
+            Self::AxisInMotion { axis } => format!("{} moves; `stop` first", shown(axis)),
             _ => return None,
         })
     }

@@ -1,8 +1,9 @@
 //! The cycle: the only place where the stages meet.
 //!
-//! `subscribe -> splice -> sample -> guard -> feed-forward -> encode -> send -> receive -> supervise -> report`. No stage calls
+//! `subscribe -> splice -> sample -> guard -> axes -> feed-forward -> encode -> send -> receive -> supervise -> report`. No stage calls
 //! another, none returns early, none reads a clock: everything is a function of the tick and of what arrived, so a
 //! recorded run replays exactly.
+use crate::axes::Axes;
 use crate::buses::Buses;
 use crate::cycle_state::CycleState;
 use crate::feed_forward::FeedForward;
@@ -30,6 +31,8 @@ pub enum Stage {
     Sample,
     /// It was let pass or replaced.
     Guard,
+    /// The setpoints of the axes beside the path were added.
+    Axes,
     /// Torques were added to it.
     FeedForward,
     /// Frames were written.
@@ -46,11 +49,12 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Subscribe,
         Self::Splice,
         Self::Sample,
         Self::Guard,
+        Self::Axes,
         Self::FeedForward,
         Self::Encode,
         Self::Send,
@@ -66,6 +70,7 @@ impl Stage {
             Self::Splice => "splice",
             Self::Sample => "sample",
             Self::Guard => "guard",
+            Self::Axes => "axes",
             Self::FeedForward => "feed-forward",
             Self::Encode => "encode",
             Self::Send => "send",
@@ -98,6 +103,7 @@ pub struct Core {
     ledger: Ledger,
     track: Track,
     guard: Guard,
+    axes: Axes,
     feed_forward: FeedForward,
     buses: Buses,
     supervisor: Supervisor,
@@ -110,15 +116,15 @@ impl Core {
     pub fn new(settings: &Settings, buses: Buses, intake: Intake, reports: Writers) -> Self {
         let limits = settings.robot.limits();
         let joints = settings.robot.joints.len();
-        let cycle = &settings.cycle;
         Self {
             intake,
             ledger: Ledger::new(settings),
             track: Track::new(settings),
-            guard: Guard::new(limits, joints, cycle.period_us),
+            guard: Guard::new(limits, joints, settings.cycle.period_us),
+            axes: Axes::new(settings),
             feed_forward: FeedForward::new(settings),
             supervisor: Supervisor::new(settings, Records::none()),
-            reporter: Reporter::new(settings.robot.message_digest, joints, buses.local(), cycle, reports),
+            reporter: Reporter::new(settings, buses.local(), reports),
             buses,
         }
     }
@@ -160,8 +166,10 @@ impl Core {
         }
         if let Some(pose_rad) = &actions.pose_rad {
             self.ledger.set_pose(pose_rad, tick.number);
+            self.axes.set_pose(pose_rad, tick.number);
             self.track.restart();
         }
+        self.axes.apply(&actions.axes);
         if actions.clear_faults {
             self.buses.clear_faults();
         }
@@ -207,7 +215,9 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     probe.ended(Stage::Sample);
     let guarded = core.guard.limit(&requested, &core.ledger, &mut cycle_state); // The last check before the bus.
     probe.ended(Stage::Guard);
-    let command = core.feed_forward.add(guarded, &core.ledger, &cycle_state);
+    let with_axes = core.axes.add(guarded, &mut cycle_state);
+    probe.ended(Stage::Axes);
+    let command = core.feed_forward.add(with_axes, &core.ledger, &cycle_state);
     probe.ended(Stage::FeedForward);
 
     let drive_commands = core.supervisor.referencing().to_drives(command.joints());
@@ -216,6 +226,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     core.buses.send(&mut cycle_state);
     core.ledger.record(&command, requested.restart, &mut cycle_state);
     let replaced = core.track.commit(&command.setpoint().position_rad, &core.ledger, &mut cycle_state);
+    core.axes.record(&command, &mut cycle_state);
     core.intake.recycle(replaced);
     probe.ended(Stage::Send);
     core.buses.receive(tick.wake_time, &mut cycle_state);
@@ -225,6 +236,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
 
     let mut answers: Answers = [None; _];
     let actions = core.supervisor.evaluate(&cycle_state, core.intake.shutdown(), &mut answers);
+    core.axes.observe(core.supervisor.watch(), core.supervisor.phase(), &mut cycle_state);
     probe.ended(Stage::Supervise);
     core.reporter.write(&cycle_state, &command, &core.track, (&core.supervisor, &actions));
     core.intake.answer(cycle_state.trajectory_result, &answers);

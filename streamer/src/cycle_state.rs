@@ -3,8 +3,9 @@ use crate::phases::Event;
 use crate::successor::CutRefusal;
 use crate::tick::Tick;
 use taustream_drivers::{CanId, ErrorFrame, JointSet, LinkFault, Nanos, ServoStatus};
+use taustream_messages::{AxisReport, BusFault, Command, Phase};
 pub use taustream_messages::{BUSES_MAX, Cause};
-use taustream_messages::{BusFault, Command, Phase};
+use taustream_motion::axis::AXES_MAX;
 use taustream_motion::limits::Quantity;
 use taustream_motion::time_scale::Scale;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -239,8 +240,14 @@ pub struct CycleState {
     pub lost: Option<LostSetpoints>,
     /// The drives, after receiving.
     pub servos: [ServoStatus; MAX_JOINTS],
-    /// What the joints were commanded last ([`crate::last_sent::Ledger::commanded_rad`]).
+    /// What the joints were commanded last ([`crate::last_sent::Ledger::commanded_rad`]), and behind them the axes.
     pub commanded_rad: JointArray,
+    /// Why the last check of an axis's setpoint refused it, in the cycle in which it did.
+    pub axis_trip: Option<Trip>,
+    /// Axes whose commands move.
+    pub axes_moving: [bool; AXES_MAX],
+    /// What the axes do, at the end of the cycle.
+    pub axes: [AxisReport; AXES_MAX],
 }
 
 impl CycleState {
@@ -274,6 +281,9 @@ impl CycleState {
             lost: None,
             servos: [ServoStatus::UNKNOWN; MAX_JOINTS],
             commanded_rad: [0.0; MAX_JOINTS],
+            axis_trip: None,
+            axes_moving: [false; AXES_MAX],
+            axes: [AxisReport::default(); AXES_MAX],
         }
     }
 

@@ -17,6 +17,7 @@ use crate::cycle_state::{Braking, CycleState, Trip, TripKind};
 use crate::last_sent::{LastSent, Ledger};
 use crate::track::RequestedSetpoint;
 use taustream_drivers::JointCommand;
+use taustream_motion::axis::AxisSetpoint;
 use taustream_motion::brake::{Brake, JointState};
 use taustream_motion::limits::Quantity;
 use taustream_motion::range::PermittedRange;
@@ -55,6 +56,30 @@ impl GuardedCommand {
     /// The same with torques that have passed the torque guard.
     pub(crate) fn with_torque(mut self, passed_nm: &JointArray) -> Self {
         self.joints.iter_mut().zip(passed_nm).for_each(|(joint, passed_nm)| joint.torque_nm = *passed_nm);
+        self
+    }
+    /// The same with the setpoint of an axis, which has passed the axes' own check.
+    pub(crate) fn with_slot(mut self, slot: usize, at: &AxisSetpoint) -> Self {
+        let AxisSetpoint { state, jerk_rad_s3 } = *at;
+        if let Some(joint) = self.joints.get_mut(slot) {
+            *joint = JointCommand {
+                position_rad: state.position_rad,
+                velocity_rad_s: state.velocity_rad_s,
+                acceleration_rad_s2: state.acceleration_rad_s2,
+                torque_nm: 0.0,
+            };
+        }
+        let setpoint = &mut self.setpoint;
+        for (values, value) in [
+            (&mut setpoint.position_rad, state.position_rad),
+            (&mut setpoint.velocity_rad_s, state.velocity_rad_s),
+            (&mut setpoint.acceleration_rad_s2, state.acceleration_rad_s2),
+            (&mut setpoint.jerk_rad_s3, jerk_rad_s3),
+        ] {
+            if let Some(slot) = values.get_mut(slot) {
+                *slot = value;
+            }
+        }
         self
     }
     /// As drivers take it.

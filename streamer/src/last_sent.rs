@@ -231,14 +231,14 @@ impl Ledger {
         }
     }
 
-    /// The arm stands at this pose.
+    /// The joints of the path stand at this pose.
     ///
     /// Real time: copies.
     pub fn set_pose(&mut self, position_rad: &JointArray, tick: u64) {
-        for (last, position_rad) in self.last.iter_mut().zip(position_rad) {
+        for (last, position_rad) in self.last.iter_mut().zip(position_rad).take(self.joints) {
             *last = LastSent { every: last.every, ..LastSent::ZERO }.at_rest(*position_rad, tick);
         }
-        self.commanded_rad = *position_rad;
+        self.commanded_rad = self.position_rad();
     }
 
     /// The arm stands where each joint was commanded last.

@@ -13,6 +13,8 @@
 pub mod answer;
 pub mod approach;
 pub mod arguments;
+pub mod axes;
+mod axis_commands;
 pub mod bench;
 pub mod buses;
 pub mod check;

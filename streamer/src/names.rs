@@ -1,8 +1,8 @@
 //! The names that an arm's settings give to joints and buses, and the sentences about them that every reader gets alike:
 //! the log, the answers to commands, `status`.
 use crate::pose_store::Directories;
-use taustream_arm::Settings;
 use taustream_arm::text::counted;
+use taustream_arm::{AxisUnit, Settings};
 use taustream_drivers::ErrorFrame;
 use taustream_drivers::bring_up::Refusal;
 use taustream_drivers::words::{explain_on, explain_refusal_on, explain_status};
@@ -31,14 +31,25 @@ pub struct ServoName {
     pub falls: bool,
 }
 
+/// An axis beside the path as its settings name it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AxisName {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: AxisUnit,
+}
+
 /// Names of joints and buses, in the order of the settings; empty where the settings could not be read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// The joints, base to tip.
     pub joints: Vec<String>,
+    /// The axes beside the path.
+    pub axes: Vec<AxisName>,
     /// The buses.
     pub buses: Vec<BusName>,
-    /// The servos, in the order of the joints.
+    /// The servos, in the order of the joints, then of the axes.
     pub servos: Vec<ServoName>,
     /// Where the last pose is kept; empty where nobody keeps it.
     pub directories: Directories,
@@ -60,6 +71,11 @@ impl Names {
         };
         Self {
             joints: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
+            axes: settings
+                .axes
+                .iter()
+                .map(|axis| AxisName { name: axis.name().to_owned(), unit: axis.unit })
+                .collect(),
             buses: settings.buses.iter().map(bus).collect(),
             servos: settings.servos.iter().map(servo).collect(),
             directories: Directories::default(),
@@ -89,8 +105,7 @@ impl Names {
     #[must_use]
     pub fn fall_warning(&self) -> Option<String> {
         let falling = self.servos.iter().enumerate().filter(|(_, servo)| servo.falls);
-        let names: Vec<&str> =
-            falling.map(|(joint, _)| self.joints.get(joint).map_or("?", String::as_str)).collect();
+        let names: Vec<&str> = falling.map(|(slot, _)| self.slot_name(slot).unwrap_or("?")).collect();
         (!names.is_empty()).then(|| {
             format!(
                 "KEEP CLEAR, and support the arm before `disable`: falling when commands stop (limp_risk_acknowledged): {}",
@@ -123,13 +138,36 @@ impl Names {
         explain_status(self.servos.get(joint).map(|servo| servo.protocol), word)
     }
 
-    /// A joint as text, by its zero-based index: "joint 3 `elbow`".
+    /// The name behind a slot: of a joint, or of an axis behind the joints.
+    fn slot_name(&self, slot: usize) -> Option<&str> {
+        let axis = || self.axes.get(slot.checked_sub(self.joints.len())?).map(|axis| axis.name.as_str());
+        self.joints.get(slot).map(String::as_str).or_else(axis)
+    }
+
+    /// A joint or an axis as text, by its zero-based slot: "joint 3 `elbow`", "axis `gripper`".
     #[must_use]
     pub fn joint(&self, joint: usize) -> String {
-        match self.joints.get(joint) {
+        let is_axis = !self.joints.is_empty() && joint >= self.joints.len();
+        match self.slot_name(joint) {
+            Some(name) if is_axis => format!("axis `{name}`"),
             Some(name) => format!("joint {} `{name}`", joint + 1),
             None => format!("joint {}", joint + 1),
         }
+    }
+
+    /// An axis as text, by its zero-based index: "axis `gripper`".
+    #[must_use]
+    pub fn axis(&self, axis: usize) -> String {
+        match self.axes.get(axis) {
+            Some(AxisName { name, .. }) => format!("axis `{name}`"),
+            None => format!("axis {}", axis + 1),
+        }
+    }
+
+    /// The unit of an axis.
+    #[must_use]
+    pub fn axis_unit(&self, axis: usize) -> AxisUnit {
+        self.axes.get(axis).map_or(AxisUnit::Rad, |axis| axis.unit)
     }
 
     /// A bus as text, by its zero-based index: "bus `arm` (vcan0)".
@@ -310,6 +348,16 @@ mod tests {
         for (cause, expected) in cases {
             assert_eq!(names().fault(&cause), expected);
         }
+    }
+
+    #[test]
+    fn slot_behind_the_joints_is_an_axis_by_its_name() {
+        let mut names = names();
+        names.axes = vec![AxisName { name: "gripper".into(), unit: AxisUnit::Metre }];
+        let cause = Cause::new(FaultReason::FeedbackLate).at_joint(2).amount(0.051, 0.05);
+        assert_eq!(names.fault(&cause), "feedback late (s) at axis `gripper`: 0.051000 against 0.050000");
+        assert_eq!((names.joint(1).as_str(), names.joint(3).as_str()), ("joint 2 `lift`", "joint 4"));
+        assert_eq!((names.axis(0).as_str(), names.axis(1).as_str()), ("axis `gripper`", "axis 2"));
     }
 
     /// Goal: where there is no cable nobody is sent to look at one.

@@ -8,7 +8,7 @@ use crate::phases::Event;
 use crate::supervise::{Actions, Supervisor, is_energised};
 use crate::watch::REST_RAD_S;
 use taustream_drivers::{DriveState, ServoStatus};
-use taustream_messages::{Command, FaultReason, Phase};
+use taustream_messages::{AxisGoal, Command, FaultReason, Phase};
 use taustream_motion::stopping::SpeedRequest;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -46,7 +46,9 @@ impl Supervisor {
             None => {}
         }
         let result = match pending.command {
-            Command::Enable | Command::Resume if self.shutting_down != Shutdown::No => {
+            Command::Enable | Command::Resume | Command::Axis { .. }
+                if self.shutting_down != Shutdown::No =>
+            {
                 Err(AnswerReason::ShuttingDown)
             }
             Command::Enable => self.enable(cycle_state, actions),
@@ -62,6 +64,7 @@ impl Supervisor {
             Command::Speed { percent } => self.set_speed(percent, cycle_state, actions),
             Command::ClearFault => self.clear_fault(cycle_state, actions),
             Command::Reference { joint, at_rad } => self.reference(joint, at_rad, cycle_state),
+            Command::Axis { axis, goal, force } => self.axis((axis, goal, force), cycle_state, actions),
         };
         let (accepted, why) = match result {
             Ok(why) => (true, why),
@@ -161,7 +164,7 @@ impl Supervisor {
             let holds = servo.state == DriveState::Adopted;
             let position_rad = if holds { servo.hold_position_rad } else { servo.position_rad };
             let (error_rad, limit_rad) =
-                ((position_rad - servo.position_rad).abs(), self.rules.tracking_error_rad_max);
+                ((position_rad - servo.position_rad).abs(), self.watch.tracking_limit_rad(joint));
             if error_rad.is_nan() || error_rad > limit_rad {
                 return Err(AnswerReason::Tracking { joint, error_rad, limit_rad });
             }
@@ -193,6 +196,9 @@ impl Supervisor {
             Phase::Configuring | Phase::Disabled | Phase::Disabling | Phase::Fault => {
                 Ok(AnswerReason::Already)
             }
+            Phase::Holding | Phase::Paused if self.moving_axis(cycle_state).is_some() => {
+                Err(AnswerReason::AxisInMotion { axis: self.moving_axis(cycle_state).unwrap_or(0) })
+            }
             Phase::Enabling | Phase::Holding | Phase::Paused | Phase::Locked => {
                 self.step(Event::DisableRequested, cycle_state, actions);
                 Ok(AnswerReason::Disabling)
@@ -208,8 +214,11 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
+        actions.axes.stop_all = true;
         if self.step(Event::PauseRequested, cycle_state, actions) {
             Ok(AnswerReason::Pausing)
+        } else if self.moving_axis(cycle_state).is_some() {
+            Ok(AnswerReason::AxesStop)
         } else if matches!(self.phase, Phase::Pausing | Phase::Paused) {
             Ok(AnswerReason::Already)
         } else {
@@ -243,8 +252,11 @@ impl Supervisor {
         cycle_state: &CycleState,
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
+        actions.axes.stop_all = true;
         if self.step(Event::StopRequested, cycle_state, actions) {
             Ok(AnswerReason::Stopping)
+        } else if self.phase == Phase::Holding && self.moving_axis(cycle_state).is_some() {
+            Ok(AnswerReason::AxesStop)
         } else if matches!(self.phase, Phase::Stopping | Phase::FastStopping | Phase::Braking) {
             Ok(AnswerReason::Already)
         } else {
@@ -393,7 +405,8 @@ impl Supervisor {
         cycle_state: &CycleState,
     ) -> Result<(usize, f64), AnswerReason> {
         let joint = usize::try_from(joint).unwrap_or(usize::MAX);
-        let Some(servo) = cycle_state.servos.get(joint).filter(|_| joint < self.joints) else {
+        let Some(servo) = cycle_state.servos.get(joint).filter(|_| joint < self.joints + self.axes.len())
+        else {
             return Err(AnswerReason::NoSuchJoint { joint });
         };
         if let Some((energised, state)) = self.energised(cycle_state) {
@@ -423,5 +436,7 @@ fn stops_the_arm(command: Command) -> bool {
         | Command::Speed { .. }
         | Command::ClearFault
         | Command::Reference { .. } => false,
+        // A request to stop stops the axis, however late.
+        Command::Axis { goal, .. } => goal == AxisGoal::Stop,
     }
 }

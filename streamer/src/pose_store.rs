@@ -136,7 +136,7 @@ impl PoseRecords {
         recorder: Recorder,
     ) -> Self {
         let joints = settings.servos.iter().filter_map(|servo| {
-            let name = settings.robot.joints.get(servo.joint)?.name.clone();
+            let name = settings.slot(servo.joint)?.name.clone();
             Some(Named { joint: servo.joint, name, binding: binding_digest(settings, servo) })
         });
         Self {
@@ -381,7 +381,7 @@ fn needs_record(report: &Report) -> bool {
         | ReferenceState::OutOfRange
         | ReferenceState::Incremental => false,
     };
-    report.reference_state.iter().take(report.joints()).any(needs)
+    report.reference_state.iter().take(report.slots()).any(needs)
 }
 
 impl Named {

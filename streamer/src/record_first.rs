@@ -68,6 +68,7 @@ impl Supervisor {
             | Command::FastStop
             | Command::TorqueOff
             | Command::Speed { .. }
+            | Command::Axis { .. }
             | Command::ClearFault => false,
         };
         if !needed || self.shutting_down != Shutdown::No || self.records.requester.is_none() {

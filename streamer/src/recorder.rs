@@ -18,6 +18,7 @@ use std::sync::mpsc::Receiver;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use taustream_arm::{Settings, TrajectoryFile};
+use taustream_messages::AxisReport;
 use taustream_motion::JointArray;
 
 /// How often the queue is emptied.
@@ -57,6 +58,7 @@ impl Recorder {
         let mut log = Log {
             out: BufWriter::new(File::create(path)?),
             joints: settings.robot.joints.len(),
+            axes: settings.axes.iter().map(|axis| axis.name().to_owned()).collect(),
             buses: settings.buses.len(),
             candidates: Vec::with_capacity(CANDIDATES_MAX),
         };
@@ -101,6 +103,7 @@ impl Recorder {
 struct Log {
     out: BufWriter<File>,
     joints: usize,
+    axes: Vec<String>,
     buses: usize,
     candidates: Vec<Candidate>,
 }
@@ -157,7 +160,21 @@ impl Log {
             "off_path_rad": cycle.off_path_rad.get(..self.joints),
             "joint_sent": cycle.joint_sent.get(..self.joints),
             "sent": cycle.sent.get(..self.buses), "lost": cycle.lost.get(..self.buses),
+            "axes": self.axes(cycle),
         })
+    }
+
+    /// What the axes beside the path do, in their own units.
+    fn axes(&self, cycle: &CycleRecord) -> Vec<Value> {
+        let slots = cycle.position_rad.iter().zip(&cycle.joint_sent).skip(self.joints);
+        let line = |((name, axis), (output_rad, sent)): ((&String, &AxisReport), (&f64, &bool))| {
+            json!({
+                "name": name, "state": axis.state().word(), "unit": axis.unit(), "output_rad": output_rad,
+                "command": axis.command, "target": axis.target, "measured": axis.measured, "force": axis.force,
+                "sent": sent,
+            })
+        };
+        self.axes.iter().zip(&cycle.axes).zip(slots).map(line).collect()
     }
 
     fn line(&mut self, value: &Value) -> io::Result<()> {
@@ -182,6 +199,7 @@ mod tests {
     use crate::phases::Event;
     use std::sync::mpsc::channel;
     use taustream_messages::{FaultReason, Phase};
+    use taustream_motion::axis::AXES_MAX;
     use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
     fn settings() -> Settings {
@@ -204,6 +222,7 @@ mod tests {
             joint_sent: [true; MAX_JOINTS],
             sent: [7; BUSES_MAX],
             lost: [0; BUSES_MAX],
+            axes: [AxisReport::default(); AXES_MAX],
         }
     }
 

@@ -55,7 +55,7 @@ pub struct Rule {
 
 impl Rule {
     fn of(servo: &Servo, settings: &Settings) -> Self {
-        let joint = settings.robot.joints.get(servo.joint);
+        let joint = settings.slot(servo.joint);
         let range_rad = joint.map_or([0.0; 2], |joint| joint.limits.position_rad);
         Self { feedback: servo.feedback, period_rad: servo.feedback_period_rad(), range_rad }
     }

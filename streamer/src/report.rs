@@ -10,8 +10,10 @@ use crate::track::Track;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use taustream_arm::Settings;
 use taustream_drivers::ErrorFrame;
-use taustream_messages::{BusFault, BusReport, LAYOUT_VERSION, Phase, Replaces, Report, RobotDigest};
+use taustream_messages::{AxisReport, BusFault, BusReport, LAYOUT_VERSION, Phase, Replaces, Report};
+use taustream_motion::axis::AXES_MAX;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Reports that may wait for the service thread.
@@ -97,8 +99,10 @@ pub struct CycleRecord {
     pub s: f64,
     /// The time scale.
     pub sigma: f64,
-    /// What was encoded, rad.
+    /// What was encoded, rad; axes behind the joints.
     pub position_rad: JointArray,
+    /// What the axes do.
+    pub axes: [AxisReport; AXES_MAX],
     /// How far `position_rad` is from the trajectory while a difference is faded out, rad.
     pub off_path_rad: JointArray,
     /// Whether the setpoint of each joint was handed to its bus in this cycle.
@@ -247,15 +251,10 @@ struct Running {
 }
 
 impl Reporter {
-    /// A reporter for an arm of so many joints and buses.
+    /// A reporter for the arm of `settings`, with these local links.
     #[must_use]
-    pub fn new(
-        digest: RobotDigest,
-        joints: usize,
-        local: &[bool],
-        cycle: &taustream_arm::settings::CycleSettings,
-        queues: Writers,
-    ) -> Self {
+    pub fn new(settings: &Settings, local: &[bool], queues: Writers) -> Self {
+        let (cycle, joints, axes) = (&settings.cycle, settings.robot.joints.len(), settings.axes.len());
         let period_ns = u64::from(cycle.period_us.max(1)) * 1_000;
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of a period")]
         let ticks = (1e9 / (cycle.report_rate_hz * period_ns as f64)).round().clamp(1.0, 1e9);
@@ -269,8 +268,9 @@ impl Reporter {
             layout_version: LAYOUT_VERSION,
             joint_count: u32::try_from(joints).unwrap_or(u32::MAX),
             bus_count: u32::try_from(local.len()).unwrap_or(u32::MAX),
+            axis_count: u32::try_from(axes).unwrap_or(u32::MAX),
             buses,
-            robot_digest: digest,
+            robot_digest: settings.robot.message_digest,
             ..Report::default()
         };
         Self {
@@ -329,7 +329,7 @@ impl Reporter {
         c.cycles += 1;
         c.cycles_skipped += cycle_state.tick.skipped;
         c.cycles_late += u64::from(cycle_state.tick.lateness_ns() > self.period_ns / 2);
-        c.guard_trips += u64::from(cycle_state.trip.is_some());
+        c.guard_trips += u64::from(cycle_state.trip.is_some() || cycle_state.axis_trip.is_some());
         c.stalls += u64::from(stalls);
         for (found, bus) in cycle_state.buses.iter().zip(&mut c.buses) {
             let lost = u64::from(lost_frames(found));
@@ -436,6 +436,7 @@ impl Reporter {
                 s: if cycle_state.trajectory_id == 0 { 0.0 } else { cycle_state.trajectory_s },
                 sigma: cycle_state.scale.sigma,
                 position_rad: command.setpoint().position_rad,
+                axes: cycle_state.axes,
                 off_path_rad: cycle_state.off_path_rad,
                 joint_sent: std::array::from_fn(|joint| cycle_state.taken.contains(joint)),
                 sent: cycle_state.buses.map(|b| b.sent),
@@ -463,7 +464,8 @@ impl Reporter {
     ) -> Report {
         let setpoint = command.setpoint();
         let (tracking_error_rad, tracking_error_rad_max) = supervisor.watch().tracking_rad();
-        let joints = self.counts.joints();
+        let (joints, slots) = (self.counts.joints(), self.counts.slots());
+        let of_path = |values: &JointArray| of_path(joints, values);
         let mut r = self.counts;
         (r.tick, r.time_ns, r.phase) =
             (cycle_state.tick.number, cycle_state.tick.wake_time.0, supervisor.phase().code());
@@ -477,28 +479,29 @@ impl Reporter {
             (bus.receive_lost, bus.echoes_missing) = (found.overflowed, found.echoes_missing);
             (bus.error_class, bus.error_data) = (found.newest_error.class, found.newest_error.data);
         }
-        r.energised = u32::from(cycle_state.servos.iter().take(joints).any(|s| is_energised(s.state)));
+        r.energised = u32::from(cycle_state.servos.iter().take(slots).any(|s| is_energised(s.state)));
         r.generation = track.newest_generation();
         let run = self.last_running;
         (r.trajectory_id, r.trajectory_s, r.trajectory_duration_s) = (run.id, run.s, run.duration_s);
         (r.successor_id, r.successor_from_s) =
             track.waiting().map_or((0, 0.0), |w| (w.trajectory.trajectory_id, w.from_s));
         let last = track.waiting().map(|waiting| &waiting.trajectory).or(track.running());
-        (r.end_s, r.end_rad) = last.map_or((0.0, cycle_state.commanded_rad), |last| {
+        (r.end_s, r.end_rad) = last.map_or((0.0, of_path(&cycle_state.commanded_rad)), |last| {
             (last.trajectory.duration_s(), last.trajectory.end_rad())
         });
         (r.sigma, r.speed_percent) = (cycle_state.scale.sigma, supervisor.speed() * 100.0);
-        r.command_rad = cycle_state.commanded_rad;
-        r.command_velocity_rad_s = setpoint.velocity_rad_s;
-        r.command_acceleration_rad_s2 = setpoint.acceleration_rad_s2;
-        r.command_jerk_rad_s3 = setpoint.jerk_rad_s3;
+        r.command_rad = of_path(&cycle_state.commanded_rad);
+        r.command_velocity_rad_s = of_path(&setpoint.velocity_rad_s);
+        r.command_acceleration_rad_s2 = of_path(&setpoint.acceleration_rad_s2);
+        r.command_jerk_rad_s3 = of_path(&setpoint.jerk_rad_s3);
+        r.axes = cycle_state.axes;
         (r.tracking_error_rad, r.tracking_error_rad_max) = (tracking_error_rad, tracking_error_rad_max);
         (r.first_speed, r.adopted) =
             (u32::from(supervisor.is_first_speed()), u32::from(supervisor.has_adopted()));
         r.multi_turn_offset_rad = supervisor.referencing().offsets_rad();
         r.reference_state =
             std::array::from_fn(|joint| supervisor.referencing().resolved(joint).reference_state.code());
-        for (joint, servo) in cycle_state.servos.iter().enumerate().take(joints) {
+        for (joint, servo) in cycle_state.servos.iter().enumerate().take(slots) {
             r.measured_rad[joint] = servo.position_rad;
             r.measured_velocity_rad_s[joint] = servo.velocity_rad_s;
             r.feedback_age_s[joint] = supervisor.watch().age_s(cycle_state, joint);
@@ -537,6 +540,11 @@ fn accepted(cycle_state: &CycleState, track: &Track) -> Option<Record> {
         | Decision::NotAtBase { .. }
         | Decision::NotReady { .. } => None,
     }
+}
+
+/// What belongs to the joints of the path; axes behind them are left out.
+fn of_path(joints: usize, values: &JointArray) -> JointArray {
+    std::array::from_fn(|joint| if joint < joints { values[joint] } else { 0.0 })
 }
 
 fn lost_frames(found: &BusState) -> u32 {

@@ -4,6 +4,7 @@
 //! speed along the path changes, whether the trajectory is dropped. Nothing resumes by itself after a fault. While
 //! drives hold, the commanded pose stays the truth: measured replaces commanded only when every drive is off.
 use crate::answer::{AnswerReason, CommandAnswer};
+use crate::axes::AxisRequests;
 use crate::cycle_state::{Braking, Cause, CycleState, Decision, TRANSITIONS_MAX, Transition};
 use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
@@ -11,8 +12,8 @@ use crate::record_first::{LEAVE_RECORD_S_MAX, Records};
 use crate::referencing::Referencing;
 use crate::stall::Stalls;
 use crate::watch::Watch;
-use taustream_arm::Settings;
 use taustream_arm::settings::Supervision;
+use taustream_arm::{Axis, Settings};
 use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Pause, PauseReason, Phase};
 use taustream_motion::stopping::{SpeedRequest, StopRules};
@@ -36,6 +37,8 @@ pub struct Actions {
     pub pose_rad: Option<JointArray>,
     /// The faults of the drives are being reset.
     pub clear_faults: bool,
+    /// What is asked of the axes beside the path.
+    pub axes: AxisRequests,
     /// Failed buses are restarted, as this command asked.
     pub restore_buses: Option<u64>,
     /// The changes of phase, in order.
@@ -49,7 +52,12 @@ pub struct Actions {
 pub struct Supervisor {
     pub(crate) rules: Supervision,
     pub(crate) limits: [JointLimits; MAX_JOINTS],
+    /// Joints of the path.
     pub(crate) joints: usize,
+    /// Joints and axes.
+    slots: usize,
+    /// Axes beside the path.
+    pub(crate) axes: Vec<Axis>,
     pub(crate) watch: Watch,
     pub(crate) phase: Phase,
     since: Nanos,
@@ -90,6 +98,8 @@ impl Supervisor {
             rules: *rules,
             limits,
             joints,
+            slots: settings.slots().min(MAX_JOINTS),
+            axes: settings.axes.clone(),
             watch: Watch::new(settings),
             phase: Phase::Configuring,
             since: Nanos(0),
@@ -306,6 +316,10 @@ impl Supervisor {
             let cause = if self.phase == Phase::FastStopping { self.cause.unwrap_or(cause) } else { cause };
             self.raise(Event::GuardTrip, cause, cycle_state, actions);
         }
+        if let Some(trip) = cycle_state.axis_trip {
+            let cause = Cause::new(FaultReason::Guard).at_joint(trip.joint).amount(trip.value, trip.limit);
+            self.raise(Event::StopFault, cause, cycle_state, actions);
+        }
         if self.phase == Phase::Braking {
             if cycle_state.braking == Braking::Rested {
                 self.step(Event::AtRest, cycle_state, actions);
@@ -412,7 +426,6 @@ impl Supervisor {
 
     /// Drives that hold from before: each is either kept or off, and those that are kept answer and stay.
     fn evaluate_adopted(&mut self, cycle_state: &CycleState, actions: &mut Actions) {
-        let rules = self.rules;
         let without_feedback = |this: &Self, joint| this.watch.age_s(cycle_state, joint).is_infinite();
         let lost = self.servos(cycle_state).find_map(|(joint, servo)| match servo.state {
             DriveState::Disabled => None,
@@ -420,7 +433,7 @@ impl Supervisor {
             DriveState::Adopted if without_feedback(self, joint) => None,
             DriveState::Adopted => {
                 let sag_rad = (servo.position_rad - servo.hold_position_rad).abs();
-                let limit = rules.tracking_error_rad_max;
+                let limit = self.watch.tracking_limit_rad(joint);
                 let far = Cause::new(FaultReason::TrackingError).at_joint(joint).amount(sag_rad, limit);
                 let late = self.watch.late_cause(cycle_state, joint);
                 late.or_else(|| (sag_rad.is_nan() || sag_rad > limit).then_some(far))
@@ -514,10 +527,13 @@ impl Supervisor {
                 }
             }
             Shutdown::Orderly => {
+                actions.axes.stop_all = true;
+                let axes_move = cycle_state.axes_moving.contains(&true);
                 match self.phase {
                     Phase::Moving | Phase::Pausing | Phase::Paused => {
                         self.step(Event::StopRequested, cycle_state, actions);
                     }
+                    Phase::Holding if axes_move => {}
                     Phase::Holding | Phase::Locked | Phase::Enabling => {
                         self.step(Event::DisableRequested, cycle_state, actions);
                     }
@@ -556,7 +572,7 @@ impl Supervisor {
         &self,
         cycle_state: &'a CycleState,
     ) -> impl Iterator<Item = (usize, &'a ServoStatus)> + use<'a> {
-        cycle_state.servos.iter().enumerate().take(self.joints)
+        cycle_state.servos.iter().enumerate().take(self.slots)
     }
 
     pub(crate) fn all(&self, cycle_state: &CycleState, test: impl Fn(&ServoStatus) -> bool) -> bool {

@@ -33,6 +33,8 @@ struct Answers {
     jump_limit_rad: f64,
     tracking_rad: f64,
     tracking_rad_max: f64,
+    /// The command less the measured position that answers it.
+    lag_rad: f64,
     /// Cycles in a row in which the drive sent its position.
     commanded_cycles: u32,
     past_rad: [f64; REST_CYCLES],
@@ -48,6 +50,7 @@ impl Answers {
         jump_limit_rad: f64::INFINITY,
         tracking_rad: 0.0,
         tracking_rad_max: 0.0,
+        lag_rad: f64::NAN,
         commanded_cycles: 0,
         past_rad: [f64::NAN; REST_CYCLES],
         past_at: [Nanos(0); REST_CYCLES],
@@ -58,6 +61,9 @@ impl Answers {
 #[derive(Debug)]
 pub struct Watch {
     rules: Supervision,
+    /// Tracking error that stops the arm, by slot.
+    tracking_rad_max: JointArray,
+    /// Joints and axes.
     joints: usize,
     velocity_rad_s_max: JointArray,
     period_s: f64,
@@ -80,8 +86,9 @@ impl Watch {
     pub fn new(settings: &Settings) -> Self {
         Self {
             rules: Supervision { lost_cycles_max: settings.lost_cycles_max(), ..settings.supervision },
-            joints: settings.robot.joints.len(),
-            velocity_rad_s_max: settings.robot.limits().map(|l| l.stop.velocity_rad_s),
+            tracking_rad_max: std::array::from_fn(|slot| settings.tracking_error_rad_max(slot)),
+            joints: settings.slots(),
+            velocity_rad_s_max: settings.slot_limits().map(|l| l.stop.velocity_rad_s),
             period_s: f64::from(settings.cycle.period_us) * 1e-6,
             bus_of: bus_of(settings),
             transport_cycles: transport_cycles(settings),
@@ -127,7 +134,8 @@ impl Watch {
             }
             (answer.received, answer.position_rad) = (Some(received), servo.position_rad);
             answer.attended_s = self.attended_s;
-            answer.tracking_rad = (servo.position_rad - command_rad).abs();
+            answer.lag_rad = command_rad - servo.position_rad;
+            answer.tracking_rad = answer.lag_rad.abs();
             if cycle_state.live {
                 answer.tracking_rad_max = answer.tracking_rad_max.max(answer.tracking_rad);
             }
@@ -235,7 +243,7 @@ impl Watch {
         let checks = [
             (FaultReason::FeedbackLate, self.no_feedback_s(joint), rules.feedback_age_s_max),
             (FaultReason::PositionJump, answer.jump_rad, answer.jump_limit_rad),
-            (FaultReason::TrackingError, answer.tracking_rad, rules.tracking_error_rad_max),
+            (FaultReason::TrackingError, answer.tracking_rad, self.tracking_limit_rad(joint)),
         ];
         // A value that is not a number is beyond every limit.
         let found = checks.into_iter().find(|(_, value, limit)| value.is_nan() || value > limit);
@@ -288,6 +296,18 @@ impl Watch {
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.fastest().is_some_and(|(_, speed_rad_s)| speed_rad_s <= REST_RAD_S)
+    }
+
+    /// Tracking error that stops the arm.
+    #[must_use]
+    pub(crate) fn tracking_limit_rad(&self, joint: usize) -> f64 {
+        self.tracking_rad_max.get(joint).copied().unwrap_or(0.0)
+    }
+
+    /// The command of a slot less the measured position that answers it; NaN before the first.
+    #[must_use]
+    pub(crate) fn lag_rad(&self, joint: usize) -> f64 {
+        self.answers.get(joint).map_or(f64::NAN, |answer| answer.lag_rad)
     }
 
     /// Tracking error of every joint now, and the largest since the last restart, rad.

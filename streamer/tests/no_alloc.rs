@@ -17,7 +17,7 @@ use taustream_arm::Settings;
 use taustream_drivers::Nanos;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
 use taustream_drivers::sim::FaultRequest;
-use taustream_messages::{Command, Phase, Replaces};
+use taustream_messages::{AxisGoal, AxisState, Command, Phase, Replaces};
 use taustream_motion::cut::kept;
 use taustream_motion::limits::check_motion_from;
 use taustream_motion::{Stroke, Trajectory};
@@ -49,6 +49,29 @@ fn cycle_over_sixty_thousand_runs_with_motions_stops_and_faults_never_allocates(
 fn cycle_with_damiao_motors_never_allocates() {
     let mut arm = counted("no-alloc-damiao", shipped("damiao6.toml", str::to_owned));
     live_through(&mut arm, 40_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+/// A gripper that opens, closes on an object, is led elsewhere in motion and is stopped, beside all that happens to the arm.
+#[test]
+fn cycle_with_a_gripper_never_allocates() {
+    let mut arm = counted("no-alloc-gripper", shipped("damiao6-gripper.toml", str::to_owned));
+    live_through(&mut arm, 10_000);
+    let joints = arm.simulator.simulator.joints();
+    let object = FaultRequest::parse("joint=gripper,kind=object,value=1.5", &joints).unwrap();
+    for goal in [AxisGoal::Open, AxisGoal::Closed, AxisGoal::At(0.05), AxisGoal::Stop, AxisGoal::Closed] {
+        arm.ask(Command::Axis { axis: 0, goal, force: None });
+        arm.run(400);
+    }
+    let now = arm.now();
+    arm.ask(Command::Axis { axis: 0, goal: AxisGoal::Open, force: None });
+    arm.run(3_000);
+    arm.simulator.simulator.request(now, object);
+    arm.ask(Command::Axis { axis: 0, goal: AxisGoal::Closed, force: Some(20.0) });
+    arm.run(3_000);
+    assert_eq!(arm.newest.unwrap().axes[0].state(), AxisState::InContact);
+    arm.ask(Command::FastStop);
+    recover(&mut arm);
     assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
 }
 

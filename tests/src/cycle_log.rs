@@ -32,6 +32,43 @@ pub struct LoggedCycle {
     pub sent: Vec<u64>,
     /// Frames refused by each bus.
     pub lost: Vec<u64>,
+    /// The axes beside the path.
+    #[serde(default)]
+    pub axes: Vec<LoggedAxis>,
+}
+
+impl LoggedCycle {
+    /// The setpoint of a slot, a joint or an axis behind the joints, and whether it was handed to its bus.
+    #[must_use]
+    pub fn slot(&self, slot: usize) -> Option<(f64, bool)> {
+        let Some(axis) = slot.checked_sub(self.position_rad.len()) else {
+            return Some((*self.position_rad.get(slot)?, *self.joint_sent.get(slot)?));
+        };
+        self.axes.get(axis).map(|axis| (axis.output_rad, axis.sent))
+    }
+}
+
+/// One axis beside the path, in its own unit.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+pub struct LoggedAxis {
+    /// Its name.
+    pub name: String,
+    /// The word of its state.
+    pub state: String,
+    /// "rad" or "m".
+    pub unit: String,
+    /// Setpoint that was encoded: angle of its servo's output, rad.
+    pub output_rad: f64,
+    /// Commanded position.
+    pub command: f64,
+    /// Where it goes.
+    pub target: f64,
+    /// Measured position; nothing before the first feedback.
+    pub measured: Option<f64>,
+    /// Measured force; nothing where its servo does not say.
+    pub force: Option<f64>,
+    /// Its setpoint was handed to its bus in this cycle.
+    pub sent: bool,
 }
 
 /// The cut of a trajectory that replaces another one in motion.

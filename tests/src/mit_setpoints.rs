@@ -231,9 +231,8 @@ fn compare_command(
     period_s: f64,
 ) -> Result<(), String> {
     let node = motor.node_id;
-    let angle = |cycle: &LoggedCycle| {
-        cycle.position_rad.get(motor.joint).map(|rad| (rad - motor.zero_rad) * motor.sign)
-    };
+    let angle =
+        |cycle: &LoggedCycle| cycle.slot(motor.joint).map(|(rad, _)| (rad - motor.zero_rad) * motor.sign);
     let wanted = angle(cycle).ok_or_else(|| format!("no setpoint of joint {}", motor.joint + 1))?;
     let [reach_rad, reach_rad_s] = motor.reach;
     if !packs(wanted, command.position, 16, [-reach_rad, reach_rad]) {

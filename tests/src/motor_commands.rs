@@ -136,9 +136,10 @@ fn compare_joint(
     let mut compared = 0;
     // A command without gains, which no cycle sent, may stand for the one that a cycle sent right behind it to the same place.
     let (mut stood_for, mut last_rad) = (0_usize, f64::NAN);
-    for cycle in cycles.iter().filter(|cycle| cycle.joint_sent.get(joint) == Some(&true)) {
+    let sent = |cycle: &&&LoggedCycle| cycle.slot(joint).is_some_and(|(_, sent)| sent);
+    for cycle in cycles.iter().filter(sent) {
         let flaw = |what: String| Flaw::Bus { sync: 0, tick: cycle.tick, what };
-        let wanted_rad = cycle.position_rad.get(joint).copied().unwrap_or(f64::NAN);
+        let wanted_rad = cycle.slot(joint).map_or(f64::NAN, |(wanted_rad, _)| wanted_rad);
         let is_at =
             |command: &Commanded, rad: f64| (command.position_rad - rad).abs() <= command.half_rad + ROOM_RAD;
         let found = rest.by_ref().find(|command| {

@@ -20,17 +20,47 @@ pub struct Scenario {
     pub run: fn(&mut TestBench, &Goals) -> Result<()>,
     /// It kills the streamer, whose log then ends in the middle of something.
     pub kills: bool,
+    /// It leads an axis beside the path called `gripper`; an arm without axes passes it over.
+    pub needs_gripper: bool,
 }
 
 /// Every scenario, in the order in which they run.
 pub const ALL: &[Scenario] = &[
-    Scenario { name: "motor_goals_round_obstacles_with_pause_reached", run: goals_with_pause, kills: false },
-    Scenario { name: "motor_silent_mid_motion_fast_stop_names_joint", run: motor_silent, kills: false },
-    Scenario { name: "motor_fault_mid_motion_fast_stop_names_joint", run: motor_fault, kills: false },
+    Scenario {
+        name: "motor_goals_round_obstacles_with_pause_reached",
+        run: goals_with_pause,
+        kills: false,
+        needs_gripper: false,
+    },
+    Scenario {
+        name: "motor_silent_mid_motion_fast_stop_names_joint",
+        run: motor_silent,
+        kills: false,
+        needs_gripper: false,
+    },
+    Scenario {
+        name: "motor_fault_mid_motion_fast_stop_names_joint",
+        run: motor_fault,
+        kills: false,
+        needs_gripper: false,
+    },
     Scenario {
         name: "motor_streamer_killed_mid_motion_servos_react_by_themselves",
         run: streamer_killed,
         kills: true,
+        needs_gripper: false,
+    },
+    Scenario {
+        name: "gripper_opens_grips_an_object_and_moves_beside_the_path",
+        run: gripper_at_work,
+        kills: false,
+        needs_gripper: true,
+    },
+    Scenario {
+        name: "gripper_silent_mid_motion_fast_stop_names_axis",
+        run: gripper_silent,
+        kills: false,
+        needs_gripper: true,
     },
 ];
 
@@ -129,5 +159,73 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     std::thread::sleep(Duration::from_millis(200));
     let still = at(bench).iter().zip(&rest_rad).all(|(now, then)| (now - then).abs() < 1e-6);
     ensure!(still && rest_rad.len() == 6, "brakes do not hold: {rest_rad:?}, then {:?}", at(bench));
+    Ok(())
+}
+
+/// What `taustream axis gripper ..` answers: its state, commanded and measured position.
+fn lead(bench: &TestBench, words: &[&str]) -> Result<(String, f64, f64)> {
+    let answer = bench.cli_done(&[&["axis", "gripper"], words, &["--json"]].concat())?;
+    let said: serde_json::Value = serde_json::from_str(&answer.stdout)?;
+    let axis = said.get("axis").context("an answer without its axis")?;
+    let number = |key: &str| axis.get(key).and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN);
+    let state = axis.get("state").and_then(serde_json::Value::as_str).unwrap_or_default();
+    Ok((state.to_owned(), number("command"), number("measured")))
+}
+
+/// The object between the jaws, as an angle of the motor's output and as their distance.
+const OBJECT: (&str, f64) = ("fault joint=gripper,kind=object,value=1.5", 0.03);
+
+fn gripper_at_work(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    bench.cli_refused(&["axis", "gripper", "open"], "`enable` first")?;
+    enable(bench)?;
+    let (state, command_m, _) = lead(bench, &["open"])?;
+    ensure!(state == "holding" && (command_m - 0.08).abs() < 1e-6, "open: {state} at {command_m} m");
+    bench.cli_refused(&["axis", "gripper", "to", "0.09"], "0.010000 m outside")?;
+    bench.cli_refused(&["axis", "gripper", "close", "--force", "41"], "up to 40.000 N")?;
+    bench.simulator.show(OBJECT.0)?;
+    let (state, command_m, measured_m) = lead(bench, &["close", "--force", "20"])?;
+    ensure!(state == "in contact", "closing on an object: {state}");
+    ensure!((measured_m - OBJECT.1).abs() < 1e-3, "stopped at {measured_m} m");
+    ensure!(
+        (0.0..=0.0031).contains(&(measured_m - command_m)),
+        "{command_m} m commanded, {measured_m} m measured"
+    );
+    let motion = set_off(bench, goals, 0, 0.3)?;
+    let (state, command_m, _) = lead(bench, &["to", "0.05"])?;
+    ensure!(
+        state == "holding" && (command_m - 0.05).abs() < 1e-6,
+        "beside the path: {state} at {command_m} m"
+    );
+    let report = arrive_within(bench, motion, goals.rad(0)?, AT_GOAL_RAD)?;
+    ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
+    bench.cli_done(&["disable"])?;
+    bench.await_phase(Phase::Disabled)?;
+    Ok(())
+}
+
+fn gripper_silent(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    enable(bench)?;
+    bench.cli_done(&["speed", "20"])?;
+    set_off(bench, goals, 0, 0.1)?;
+    bench.simulator.show("fault joint=gripper,kind=silence")?;
+    let report = bench.await_phase(Phase::Fault)?;
+    ensure!(
+        report.fault_joint == 6,
+        "the axis behind six joints is to blame, the report names {}",
+        report.fault_joint
+    );
+    let reason = report.fault().context("a fault without a reason")?;
+    ensure!(reason == FaultReason::FeedbackLate || reason == FaultReason::DriveFault, "reason {reason:?}");
+    let said = bench.cli_done(&["status"])?;
+    ensure!(said.stdout.contains("axis `gripper`"), "status does not name it: {}", said.stdout);
+    bench.cli_refused(&["axis", "gripper", "open"], "`clear-fault` first")?;
+    bench.simulator.show("clear")?;
+    bench.cli_done(&["disable"])?;
+    bench.await_report("all motors off", |report, _| report.energised == 0)?;
+    bring_back(bench)?;
+    enable(bench)?;
+    lead(bench, &["open"])?;
+    let motion = bench.replan(&goals.text(1)?)?;
+    arrive_within(bench, motion, goals.rad(1)?, AT_GOAL_RAD)?;
     Ok(())
 }

@@ -268,6 +268,7 @@ mod tests {
                 joint_sent,
                 sent: vec![1],
                 lost: vec![0],
+                axes: Vec::new(),
             });
         }
         cycles

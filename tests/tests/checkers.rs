@@ -93,6 +93,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             joint_sent: vec![true; JOINTS],
             sent: vec![7],
             lost: vec![0],
+            axes: Vec::new(),
         }));
     }
     (frames, log)

@@ -96,6 +96,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             joint_sent: vec![true; MOTORS],
             sent: vec![3],
             lost: vec![0],
+            axes: Vec::new(),
         }));
     }
     (frames, log)

@@ -53,6 +53,7 @@ fn recording() -> (Vec<BusFrame>, Vec<Event>) {
             joint_sent: vec![true; 4],
             sent: vec![2],
             lost: vec![0],
+            axes: Vec::new(),
         }));
     }
     (frames, log)

@@ -74,6 +74,10 @@ impl ServoProtocol for CubeMars {
         true
     }
 
+    fn measures_torque(&self) -> bool {
+        true
+    }
+
     /// Several motors may answer under one identifier that none of them receives: the first byte of the answer is the
     /// motor's.
     fn identifiers(&self, node_id: u8) -> Vec<Use> {

@@ -114,6 +114,10 @@ impl ServoProtocol for Damiao {
         matches!(self.mode, DamiaoMode::Mit(_))
     }
 
+    fn measures_torque(&self) -> bool {
+        true
+    }
+
     fn identifiers(&self, node_id: u8) -> Vec<Use> {
         let shared = Use::standard(0x7FF, "register requests", "node_id").shared();
         let own = COMMANDS.map(|(base, what)| Use::standard(base + u16::from(node_id), what, "node_id"));

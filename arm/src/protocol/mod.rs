@@ -75,6 +75,10 @@ pub(crate) trait ServoProtocol: Any + fmt::Debug + Send + Sync {
     fn carries_torque(&self) -> bool {
         false
     }
+    /// Its answers carry the torque that the servo measures.
+    fn measures_torque(&self) -> bool {
+        false
+    }
     /// `setpoint_every`, `stagger`, `feedback_every` and `packed` mean something to it.
     fn shapes_traffic(&self) -> bool {
         false
@@ -139,6 +143,11 @@ impl Protocol {
     #[must_use]
     pub fn carries_torque(&self) -> bool {
         self.0.carries_torque()
+    }
+    /// Its answers carry the torque that the servo measures.
+    #[must_use]
+    pub fn measures_torque(&self) -> bool {
+        self.0.measures_torque()
     }
     /// Its keys and values as settings files have them.
     #[must_use]

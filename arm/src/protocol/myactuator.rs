@@ -133,6 +133,10 @@ impl ServoProtocol for MyActuator {
         matches!(self.mode, MyActuatorMode::Motion(..))
     }
 
+    fn measures_torque(&self) -> bool {
+        matches!(self.mode, MyActuatorMode::Motion(..))
+    }
+
     fn identifiers(&self, node_id: u8) -> Vec<Use> {
         let shared = [(0x280, "commands to all motors"), (0x300, "numbering")]
             .map(|(id, what)| Use::standard(id, what, "node_id").shared());

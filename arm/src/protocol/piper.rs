@@ -133,6 +133,10 @@ impl ServoProtocol for Piper {
 
     fn check_settings(&self, fault_list: &FaultList, at: usize, servo: &Servo, settings: &Settings) {
         motors::check_every_cycle(fault_list, at, servo, settings);
+        if let Some(axis) = settings.axis_at(servo.joint) {
+            let expected = "a servo of another protocol: the Piper's own gripper has frames that this software does not send yet";
+            fault_list.add(None, &format!("servo[{at}].axis"), &format!("{:?}", axis.name()), expected);
+        }
         let arm: Vec<(usize, &Servo, &Self)> = settings
             .servos
             .iter()

@@ -95,6 +95,10 @@ impl ServoProtocol for RobStride {
         true
     }
 
+    fn measures_torque(&self) -> bool {
+        true
+    }
+
     /// Source: "RS00 User Manual" of 2026-04-28, section 4.1: the receiver is in the lowest byte, of what a motor sends the
     /// motor in the one above.
     fn identifiers(&self, node_id: u8) -> Vec<Use> {

@@ -1,6 +1,7 @@
 //! Cases of the larger files.
 use crate::common::Reader;
 
+pub(crate) mod axes;
 pub(crate) mod cubemars;
 pub(crate) mod damiao;
 pub(crate) mod feed_forward;

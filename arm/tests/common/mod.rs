@@ -11,6 +11,8 @@ pub(crate) enum Reader {
     Settings,
     /// Settings of Damiao motors.
     Damiao,
+    /// Settings of Damiao motors with a gripper.
+    Gripper,
     /// Settings of `RobStride` motors.
     RobStride,
     /// Settings of `CubeMars` motors.
@@ -35,6 +37,7 @@ impl Reader {
             Self::Scene => config().join("scenes/shelf.toml"),
             Self::Settings => config().join("settings/vcan6.toml"),
             Self::Damiao => config().join("settings/damiao6.toml"),
+            Self::Gripper => config().join("settings/damiao6-gripper.toml"),
             Self::RobStride => config().join("settings/robstride6.toml"),
             Self::CubeMars => config().join("settings/ak6.toml"),
             Self::Trajectory => config().join("trajectory.json"),
@@ -44,9 +47,13 @@ impl Reader {
     pub(crate) fn good_text(self) -> String {
         match self {
             Self::Trajectory => TRAJECTORY.to_owned(),
-            Self::Robot | Self::Scene | Self::Settings | Self::Damiao | Self::RobStride | Self::CubeMars => {
-                std::fs::read_to_string(self.file()).expect("shipped files are readable")
-            }
+            Self::Robot
+            | Self::Scene
+            | Self::Settings
+            | Self::Damiao
+            | Self::Gripper
+            | Self::RobStride
+            | Self::CubeMars => std::fs::read_to_string(self.file()).expect("shipped files are readable"),
         }
     }
     /// Reads a text as if it stood where the shipped file stands.
@@ -55,7 +62,7 @@ impl Reader {
         match self {
             Self::Robot => Robot::from_toml(&file, text).map(drop),
             Self::Scene => Scene::from_toml(&file, text).map(drop),
-            Self::Settings | Self::Damiao | Self::RobStride | Self::CubeMars => {
+            Self::Settings | Self::Damiao | Self::Gripper | Self::RobStride | Self::CubeMars => {
                 Settings::from_toml(&file, text).map(drop)
             }
             Self::Trajectory => TrajectoryFile::from_json(&file, text).map(drop),

@@ -247,7 +247,7 @@ pub(crate) struct DemoArgs {
 }
 
 /// A time to wait: finite, not negative, at most a day.
-fn waiting_s(text: &str) -> Result<f64, String> {
+pub(super) fn waiting_s(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
         _ => Err("expected seconds from 0 to 86400".to_owned()),

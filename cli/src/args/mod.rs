@@ -1,4 +1,5 @@
 //! The command line. Every name has its unit; the help states every default.
+mod axis;
 mod cuts;
 mod goal;
 mod import;
@@ -13,6 +14,7 @@ mod stream;
 mod timing;
 mod via;
 
+pub(crate) use axis::{AxisAction, AxisArgs};
 pub(crate) use goal::Goal;
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
@@ -220,6 +222,8 @@ pub(crate) enum Action {
     TorqueOff(CommandArgs),
     /// Clear a fault after its cause is fixed; then `enable`.
     ClearFault(CommandArgs),
+    /// Show the axes beside the path, grippers and lifts, or lead one.
+    Axis(AxisArgs),
     /// Show or set joint references.
     Reference(ReferenceArgs),
     /// Show the state of the arm: phase, joints, timing, buses.

@@ -47,6 +47,7 @@ pub(crate) fn word(command: Command) -> &'static str {
         Command::Speed { .. } => "speed",
         Command::ClearFault => "clear-fault",
         Command::Reference { .. } => "reference",
+        Command::Axis { .. } => "axis",
     }
 }
 
@@ -74,7 +75,7 @@ fn is_reached(command: Command, arm: Arm) -> bool {
         Command::ClearFault => matches!(phase, Phase::Locked | Phase::Disabled),
         // Whoever looks at the arm after the answer sees it no longer paused.
         Command::Resume => !matches!(phase, Phase::Pausing | Phase::Paused),
-        Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. } => true,
+        Command::TorqueOff | Command::Speed { .. } | Command::Reference { .. } | Command::Axis { .. } => true,
     }
 }
 
@@ -92,6 +93,7 @@ fn is_so_already(command: Command, phase: Phase) -> bool {
         | Command::TorqueOff
         | Command::Speed { .. }
         | Command::Reference { .. }
+        | Command::Axis { .. }
         | Command::ClearFault => false,
     }
 }
@@ -110,6 +112,7 @@ fn is_lost(command: Command, phase: Phase) -> bool {
         | Command::TorqueOff
         | Command::Speed { .. }
         | Command::Reference { .. }
+        | Command::Axis { .. }
         | Command::ClearFault => false,
     }
 }

@@ -1,4 +1,5 @@
 //! Commands that talk to the running streamer and planner.
+pub(crate) mod axis;
 pub(crate) mod cancel;
 pub(crate) mod client;
 pub(crate) mod command;

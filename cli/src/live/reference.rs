@@ -80,9 +80,9 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &ReferenceArgs) -> Res
     form.print(&shown)
 }
 
-/// A joint by its name, or by its number from 1.
+/// A joint or an axis by its name, or by its number from 1; axes follow the joints.
 fn joint_of(settings: &Settings, word: &str) -> Result<usize, Failure> {
-    let joints = &settings.robot.joints;
+    let joints: Vec<_> = settings.all_slots().collect();
     let by_name = joints.iter().position(|joint| joint.name == word);
     let by_number = || word.parse::<usize>().ok()?.checked_sub(1).filter(|joint| *joint < joints.len());
     by_name.or_else(by_number).ok_or_else(|| {
@@ -132,7 +132,7 @@ impl References {
                 report.reference_state.get(servo.joint).copied().unwrap_or_default(),
             );
             let measured_rad = at(&report.measured_rad);
-            let joint = settings.robot.joints.get(servo.joint);
+            let joint = settings.slot(servo.joint);
             let range_rad = joint.map_or([0.0; 2], |joint| joint.limits.position_rad);
             let reading_rad = measured_rad - at(&report.multi_turn_offset_rad);
             let possible = match servo.feedback {

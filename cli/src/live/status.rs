@@ -1,4 +1,5 @@
 //! `taustream status`: one report of the streamer, as text or as JSON.
+use super::axis::AxisStatus;
 use super::client::Client;
 use crate::arm::ArmName;
 use crate::failure::Failure;
@@ -117,6 +118,8 @@ pub(crate) struct Status {
     adopted: bool,
     motion: Option<MotionStatus>,
     joints: Vec<JointStatus>,
+    /// Grippers and lifts.
+    axes: Vec<AxisStatus>,
     buses: Vec<BusStatus>,
     /// Links that move and have no shape: nothing keeps them from being hit.
     unmodelled_links: Vec<String>,
@@ -183,6 +186,7 @@ impl Status {
             adopted: r.adopted == 1,
             motion,
             joints: joints(r, arm),
+            axes: AxisStatus::all(r, arm),
             buses: buses(r, arm),
             unmodelled_links: arm.unmodelled_links.clone(),
             sequence: r.sequence,
@@ -296,6 +300,15 @@ impl Status {
     }
 }
 
+impl Status {
+    fn beside_the_path(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for axis in &self.axes {
+            writeln!(f, "{axis}")?;
+        }
+        self.buses.iter().try_for_each(|bus| write!(f, "{bus}"))
+    }
+}
+
 impl fmt::Display for BusStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -366,9 +379,7 @@ impl fmt::Display for Status {
         {
             writeln!(f, "drive of joint {joint}: {error}")?;
         }
-        for b in &self.buses {
-            write!(f, "{b}")?;
-        }
+        self.beside_the_path(f)?;
         writeln!(
             f,
             "cycle {}: late {}, skipped {}, stalls {}, guard trips {}",

@@ -1,4 +1,5 @@
 //! `taustream check`: is a configuration sound, and what does it mean?
+use super::axis_line::AxisLine;
 use super::bus_table::BusTable;
 use super::checked_robot::CheckedRobot;
 use super::feed_forward_line::FeedForwardLine;
@@ -187,13 +188,14 @@ struct CheckedSettings {
     first_speed_percent: f64,
     buses: Vec<BusTable>,
     servos: Vec<ServoLine>,
+    axes: Vec<AxisLine>,
     feed_forward: Option<FeedForwardLine>,
 }
 
 impl CheckedSettings {
     fn of(settings: &Settings) -> Self {
         let line = |servo: &Servo| ServoLine {
-            joint: settings.robot.joints.get(servo.joint).map(|j| j.name.clone()).unwrap_or_default(),
+            joint: settings.slot(servo.joint).map(|slot| slot.name.clone()).unwrap_or_default(),
             bus: settings.buses.get(servo.bus).map(|b| b.name.clone()).unwrap_or_default(),
             node_id: servo.node_id,
             protocol: servo.protocol.name().to_owned(),
@@ -219,6 +221,7 @@ impl CheckedSettings {
             first_speed_percent: settings.supervision.first_speed_percent,
             buses: buses.filter_map(|(i, bus)| BusTable::of(settings, i, bus)).collect(),
             servos: settings.servos.iter().map(line).collect(),
+            axes: AxisLine::all(settings),
             feed_forward: FeedForwardLine::of(settings),
         }
     }
@@ -245,6 +248,9 @@ impl fmt::Display for CheckedSettings {
                 "  {:<18} {:<10} {:>4}  {:<8} {:>5} {:>12.6}  {limp:<14}  {}",
                 s.joint, s.bus, s.node_id, s.protocol, s.sign, s.zero_offset_rad, s.own
             )?;
+        }
+        for axis in &self.axes {
+            writeln!(f, "{axis}")?;
         }
         if let Some(feed_forward) = &self.feed_forward {
             writeln!(f, "{feed_forward}")?;

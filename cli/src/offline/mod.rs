@@ -1,4 +1,5 @@
 //! Commands that need files only.
+mod axis_line;
 pub(crate) mod bench;
 mod bus_table;
 pub(crate) mod check;

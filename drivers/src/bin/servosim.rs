@@ -58,17 +58,19 @@ fn prepare(args: &Arguments) -> anyhow::Result<(Settings, LinkedSimulator)> {
 
 /// Angles of all joints, inside their ranges.
 fn angles(text: &str, settings: &Settings) -> anyhow::Result<Vec<f64>> {
-    let joints = &settings.robot.joints;
+    let joints: Vec<_> = settings.all_slots().collect();
     let pieces: Vec<&str> = text.split(',').collect();
+    // Axes behind the joints may be left out: they start where the section says.
     anyhow::ensure!(
-        pieces.len() == joints.len(),
-        "--start-rad has {} angles; {} has {} joints",
+        [settings.robot.joints.len(), joints.len()].contains(&pieces.len()),
+        "--start-rad has {} angles; {} has {} joints and {} axes",
         pieces.len(),
         settings.robot.name,
-        joints.len()
+        settings.robot.joints.len(),
+        settings.axes.len()
     );
     let mut angles_rad = Vec::with_capacity(pieces.len());
-    for (piece, joint) in pieces.iter().zip(joints) {
+    for (piece, joint) in pieces.iter().zip(&joints) {
         let [low_rad, high_rad] = joint.limits.position_rad;
         let angle_rad =
             piece.trim().parse::<f64>().ok().filter(|angle_rad| (low_rad..=high_rad).contains(angle_rad));

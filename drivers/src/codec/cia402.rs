@@ -124,7 +124,7 @@ impl Cia402Driver {
         let interpolation = crate::codec::cia402_words::interpolation_period(setpoint_us)
             .ok_or(Cia402Error::Period { period_us: setpoint_us })?;
         let on_bus = settings.servos.iter().filter(|servo| servo.bus == bus);
-        let joint = |servo: &Servo| settings.robot.joints.get(servo.joint);
+        let joint = |servo: &Servo| settings.slot(servo.joint);
         let mine = || {
             let expected = |servo| joint(servo).and_then(|joint| ExpectedScale::of(servo, joint));
             on_bus.clone().filter_map(move |servo| Some((servo, CountScale::of(servo)?, expected(servo)?)))
@@ -361,6 +361,7 @@ impl ServoDriver for Cia402Driver {
             // The position read while configuring is no feedback yet: nothing would tell its age.
             position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
             velocity_rad_s: f64::NAN,
+            torque_nm: f64::NAN,
             hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
             status_word: u32::from(node.status()),

@@ -77,7 +77,7 @@ impl<M: AnsweringMotor> MotorDriver<M> {
         time("tracking_error_rad_max and position_jump_rad_max", near_rad)?;
         let clock = StepTimer::new(settings.cycle.period_us);
         let mut driver = Self { motors: Vec::new(), joints: Vec::new(), clock };
-        let joints = settings.robot.joints.len().min(MAX_JOINTS);
+        let joints = settings.slots().min(MAX_JOINTS);
         for servo in settings.servos.iter().filter(|servo| servo.bus == bus) {
             let Some(motor) = motor(servo)? else { continue };
             let joint = servo.joint;
@@ -141,6 +141,7 @@ impl<M: AnsweringMotor> ServoDriver for MotorDriver<M> {
             state: joint.machine.state(),
             position_rad: joint.mapping.link_rad(measured.position_rad),
             velocity_rad_s: measured.velocity_rad_s * joint.mapping.sign,
+            torque_nm: measured.torque_nm * joint.mapping.sign,
             hold_position_rad: f64::NAN,
             received: joint.received,
             status_word: joint.machine.status_word(),

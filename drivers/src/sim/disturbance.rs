@@ -8,6 +8,8 @@ pub enum Disturbance {
     Fault(u16),
     /// The joint is jammed, or free again.
     Jammed(bool),
+    /// The joint cannot pass this link angle, or is free again.
+    Object(Option<f64>),
     /// The encoder reads this much too far.
     EncoderShift(f64),
     /// CiA 402: the warning bit of the statusword. Damiao has none: the temperatures that it states rise.

@@ -213,6 +213,7 @@ impl Drive {
         match disturbance {
             Disturbance::Fault(code) => self.fail(code, out),
             Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warning) => self.warning = warning,
             Disturbance::RefuseWrites(code) => self.refuse_writes = code,

@@ -25,6 +25,11 @@ pub enum FaultKind {
     },
     /// The joint is jammed.
     Stuck,
+    /// A rigid object is in its way: it cannot pass this link angle.
+    Object {
+        /// Where.
+        at_rad: f64,
+    },
     /// The encoder slips: it reads this much too far.
     Jump {
         /// How far.
@@ -103,7 +108,7 @@ pub enum FaultRequestError {
     },
     /// The kind is unknown.
     #[error(
-        "kind={0} is unknown: expected silence, delay, drop, fault, stuck, jump, warning, refuse or restart"
+        "kind={0} is unknown: expected silence, delay, drop, fault, stuck, object, jump, warning, refuse or restart"
     )]
     Kind(String),
     /// The event is unknown.
@@ -234,6 +239,7 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, FaultRequestError> {
     const DELAY: Fits = Fits { low: 0.0, high: 10_000.0, words: "milliseconds from 0 to 10000" };
     const CHANCE: Fits = Fits { low: 0.0, high: 1.0, words: "a probability from 0 to 1" };
     const ANGLE: Fits = Fits { low: -100.0, high: 100.0, words: "radians from -100 to 100" };
+    const PLACE: Fits = Fits { low: -1e4, high: 1e4, words: "radians of the link, from -10000 to 10000" };
     const EMCY: &str = "an EMCY code from 1 to 0xFFFF";
     const ABORT: &str = "an SDO abort code, for example 0x08000022";
     let kind = match pieces.need("kind")? {
@@ -245,6 +251,10 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, FaultRequestError> {
             FaultKind::Fault { code: u16::try_from(code).unwrap_or(0x1000) }
         }
         "stuck" => FaultKind::Stuck,
+        "object" => {
+            pieces.get("value").ok_or(FaultRequestError::Missing("value"))?;
+            FaultKind::Object { at_rad: pieces.number("value", 0.0, &PLACE)? }
+        }
         "jump" => FaultKind::Jump { by_rad: pieces.number("value", 0.2, &ANGLE)? },
         "warning" => FaultKind::Warning,
         "refuse" => FaultKind::Refuse { code: pieces.code(0x0800_0000, u32::MAX, ABORT)? },
@@ -281,6 +291,7 @@ impl fmt::Display for FaultKind {
             Self::Drop { probability } => write!(f, "drop of {:.1} %", probability * 100.0),
             Self::Fault { code } => write!(f, "fault 0x{code:04X}"),
             Self::Stuck => write!(f, "stuck"),
+            Self::Object { at_rad } => write!(f, "object at {at_rad} rad"),
             Self::Jump { by_rad } => write!(f, "jump by {by_rad} rad"),
             Self::Warning => write!(f, "warning"),
             Self::Refuse { code } => write!(f, "refusal 0x{code:08X}"),

@@ -44,6 +44,8 @@ pub(crate) struct Plant {
     pub(crate) velocity_rad_s: f64,
     /// The joint is jammed.
     pub(crate) jammed: bool,
+    /// Link angle that the joint cannot pass, and the direction in which it lies: +1 or -1.
+    object: Option<(f64, f64)>,
     /// Torque of the arm's weight in its pose; `None`: the joint is a pendulum.
     pub(crate) weight_nm: Option<f64>,
     energised: bool,
@@ -60,6 +62,7 @@ impl Plant {
             position_rad,
             velocity_rad_s: 0.0,
             jammed: false,
+            object: None,
             weight_nm: None,
             energised: false,
             brake_closed: parameters.brake,
@@ -87,6 +90,11 @@ impl Plant {
         !self.brake_closed
     }
 
+    /// Puts a rigid object in the way of the joint, or takes it away.
+    pub(crate) fn place_object(&mut self, at_rad: Option<f64>) {
+        self.object = at_rad.map(|at_rad| (at_rad, 1.0_f64.copysign(at_rad - self.position_rad)));
+    }
+
     /// Moves on by `dt_s` under a motor torque.
     pub(crate) fn step(&mut self, torque_nm: f64, dt_s: f64) {
         self.move_brake(dt_s);
@@ -104,6 +112,11 @@ impl Plant {
         self.velocity_rad_s =
             if self.jammed || driven.abs() <= held { 0.0 } else { driven - held.copysign(driven) };
         self.position_rad += dt_s * self.velocity_rad_s;
+        if let Some((at_rad, direction)) = self.object
+            && (self.position_rad - at_rad) * direction > 0.0
+        {
+            (self.position_rad, self.velocity_rad_s) = (at_rad, 0.0);
+        }
     }
 
     /// The torque that the motor gives at the present speed: a motor at its speed limit brakes but does not drive.
@@ -222,6 +235,12 @@ mod tests {
         plant.energise(true);
         run(&mut plant, 50.0, 0.1);
         assert!(plant.velocity_rad_s > 1.0);
+        plant.place_object(Some(plant.position_rad + 0.02));
+        let stop_rad = plant.position_rad + 0.02;
+        run(&mut plant, 50.0, 0.5);
+        assert!((plant.position_rad - stop_rad).abs() < 1e-15, "passed the object: {}", plant.position_rad);
+        run(&mut plant, -50.0, 0.1);
+        assert!(plant.position_rad < stop_rad - 0.01, "stuck to the object: {}", plant.position_rad);
         plant.jammed = true;
         let at_rad = plant.position_rad;
         run(&mut plant, 50.0, 0.1);

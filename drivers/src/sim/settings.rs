@@ -39,7 +39,7 @@ pub fn drives(settings: &Settings, start_rad: Option<&[f64]>) -> Result<Vec<Driv
     let section = Section::new(settings, table);
     let mut setups: Vec<DriveSetup> =
         settings.servos.iter().filter_map(|servo| section.setup(settings, servo)).collect();
-    setups.sort_by_key(|setup| settings.robot.joints.iter().position(|joint| joint.name == setup.joint));
+    setups.sort_by_key(|setup| settings.all_slots().position(|slot| slot.name == setup.joint));
     section.plant_objects(&mut setups);
     section.masses(settings);
     section.unknown_keys();
@@ -277,7 +277,7 @@ impl<'a> Section<'a> {
         Self {
             table,
             file: &settings.file,
-            joints: settings.robot.joints.len(),
+            joints: settings.slots(),
             faults: RefCell::default(),
             shared: RefCell::default(),
         }
@@ -286,7 +286,7 @@ impl<'a> Section<'a> {
 
 impl Section<'_> {
     fn setup(&self, settings: &Settings, servo: &Servo) -> Option<DriveSetup> {
-        let joint = settings.robot.joints.get(servo.joint);
+        let joint = settings.slot(servo.joint);
         let limits = joint.map(|joint| joint.limits).unwrap_or_default();
         let name = joint.map_or_else(|| format!("joint {}", servo.joint + 1), |joint| joint.name.clone());
         let known = REGISTRY.iter().find(|known| known.name == servo.protocol.name())?;
@@ -391,7 +391,7 @@ impl Section<'_> {
         let value = self.table.get(key)?;
         let Value::Array(list) = value else { return Some(value) };
         if list.len() != self.joints {
-            let expected = format!("one value for all joints, or {}", self.joints);
+            let expected = format!("one value for all, or {}: joints, then axes", self.joints);
             self.fault(key, &format!("a list of {}", list.len()), &expected);
             return None;
         }

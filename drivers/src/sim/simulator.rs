@@ -293,6 +293,7 @@ impl ServoSimulator {
             FaultKind::Drop { probability } => unit.loss = probability,
             FaultKind::Fault { .. }
             | FaultKind::Stuck
+            | FaultKind::Object { .. }
             | FaultKind::Jump { .. }
             | FaultKind::Warning
             | FaultKind::Refuse { .. }
@@ -312,6 +313,7 @@ impl ServoSimulator {
             FaultKind::Drop { .. } => unit.loss = 0.0,
             FaultKind::Fault { .. }
             | FaultKind::Stuck
+            | FaultKind::Object { .. }
             | FaultKind::Jump { .. }
             | FaultKind::Warning
             | FaultKind::Refuse { .. }
@@ -337,6 +339,7 @@ fn disturbance(kind: FaultKind, begins: bool) -> Option<Disturbance> {
         FaultKind::Silence | FaultKind::Delay { .. } | FaultKind::Drop { .. } => None,
         FaultKind::Fault { code } => begins.then_some(Disturbance::Fault(code)),
         FaultKind::Stuck => Some(Disturbance::Jammed(begins)),
+        FaultKind::Object { at_rad } => Some(Disturbance::Object(begins.then_some(at_rad))),
         FaultKind::Jump { by_rad } => Some(Disturbance::EncoderShift(if begins { by_rad } else { 0.0 })),
         FaultKind::Warning => Some(Disturbance::Warning(begins)),
         FaultKind::Refuse { code } => Some(Disturbance::RefuseWrites(if begins { code } else { 0 })),

@@ -96,6 +96,7 @@ impl StageClock {
                 | Stage::Splice
                 | Stage::Sample
                 | Stage::Guard
+                | Stage::Axes
                 | Stage::FeedForward
                 | Stage::Encode
                 | Stage::Supervise

@@ -179,7 +179,9 @@ impl Arm {
 
     pub(crate) fn move_it(&mut self, size: f64) -> Trajectory {
         // Towards the middle, so that motions that were cut short do not add up to the end of a range.
-        let hold_position_rad = self.newest.map_or([0.0; 8], |cycle| cycle.position_rad);
+        let mut hold_position_rad = self.newest.map_or([0.0; 8], |cycle| cycle.position_rad);
+        // Behind the joints stand axes that are no joints of the path.
+        hold_position_rad[JOINTS..].fill(0.0);
         let size = if hold_position_rad[0] > 0.0 { -size } else { size };
         let stroke = |start_s: f64, sign: f64| Stroke {
             start_s,

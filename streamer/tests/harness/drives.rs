@@ -188,6 +188,7 @@ impl ServoDriver for FakeDriver {
             state: world.states[joint],
             position_rad: self.received[joint].map_or(f64::NAN, |_| self.position_rad[joint]),
             velocity_rad_s: f64::NAN,
+            torque_nm: f64::NAN,
             hold_position_rad: if world.states[joint] == DriveState::Adopted {
                 world.hold_position_rad[joint] - world.revolution_rad[joint]
             } else {

@@ -3,7 +3,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use taustream_arm::Damiao;
+use taustream_arm::{Damiao, Settings};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::mit_setpoints::{self, LogEnds, check_setpoints};
 use taustream_tests::motor_commands;
@@ -47,7 +47,9 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read(arguments)?;
-    let chosen: Vec<&Scenario> = ALL.iter().filter(|s| s.name.contains(&arguments.only)).collect();
+    let has_axes = !Settings::load(&place.settings)?.axes.is_empty();
+    let fits = |s: &&Scenario| s.name.contains(&arguments.only) && (has_axes || !s.needs_gripper);
+    let chosen: Vec<&Scenario> = ALL.iter().filter(fits).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
     let mut passed = 0;
     for scenario in &chosen {

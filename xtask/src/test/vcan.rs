@@ -30,6 +30,7 @@ pub(super) const STEPS: &[Step] = &[
     step("scenarios of RobStride motors", |place| motor_goals(place, "robstride6")),
     step("scenarios of CubeMars motors", |place| motor_goals(place, "ak6")),
     step("scenarios of ODrive drives", |place| motor_goals(place, "odrive6")),
+    step("scenarios of a gripper beside the path", gripper),
     step("figures", figures),
 ];
 
@@ -92,6 +93,12 @@ fn three_goals(place: &Place, settings: &str) -> Result<Outcome> {
 fn motor_goals(place: &Place, settings: &str) -> Result<Outcome> {
     let file = format!("config/settings/{settings}.toml");
     scenarios(place, "motor-scenarios", &["--settings", &file, "--only", "goals"])
+}
+
+/// A gripper opens, grips, moves beside the path, and is named when it is silent.
+fn gripper(place: &Place) -> Result<Outcome> {
+    let file = "config/settings/damiao6-gripper.toml";
+    scenarios(place, "motor-scenarios", &["--settings", file, "--only", "gripper"])
 }
 
 fn scenarios(place: &Place, program: &str, further: &[&str]) -> Result<Outcome> {

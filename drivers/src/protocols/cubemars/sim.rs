@@ -184,6 +184,7 @@ impl ServoModel for CubeMarsMotor {
                 self.error = named.unwrap_or(OVER_CURRENT);
             }
             Disturbance::Jammed(jammed) => self.joint.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.joint.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.joint.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(_) => {}

@@ -366,6 +366,7 @@ impl ServoModel for Motor {
                 self.disable(named.unwrap_or(OVER_CURRENT));
             }
             Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.registers.locked = code != 0,

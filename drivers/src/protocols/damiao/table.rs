@@ -85,7 +85,7 @@ impl DamiaoMotor {
         if !(1..=15).contains(&node_id) {
             return Err(DriverError::NodeId { joint, node_id, words: "Damiao motors have 1 to 15" });
         }
-        let limits = settings.robot.joints.get(joint).map(|joint| joint.limits).unwrap_or_default();
+        let limits = settings.slot(joint).map(|joint| joint.limits).unwrap_or_default();
         Ok(Some(Self { node_id, damiao, speed_rad_s: limits.stop.velocity_rad_s, wire }))
     }
 

@@ -383,6 +383,7 @@ impl ServoModel for Motor {
                 self.mechanics.plant.energise(false);
             }
             Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.locked = code != 0,

@@ -99,7 +99,7 @@ impl MyActuatorMotor {
         if !(1..=32).contains(&node_id) {
             return Err(DriverError::NodeId { joint, node_id, words: "MyActuator motors have 1 to 32" });
         }
-        let limits = settings.robot.joints.get(joint).map(|joint| joint.limits).unwrap_or_default();
+        let limits = settings.slot(joint).map(|joint| joint.limits).unwrap_or_default();
         Ok(Some(Self {
             node_id,
             settings: own,

@@ -131,6 +131,7 @@ impl ServoDriver for OdriveDriver {
             state: axis.state(),
             position_rad: position_turns / mapping.turns_a_rad() + mapping.zero_offset_rad,
             velocity_rad_s: velocity_turns_s / mapping.turns_a_rad(),
+            torque_nm: f64::NAN,
             hold_position_rad: f64::NAN,
             received: *received,
             status_word: axis.status_word(),

@@ -52,8 +52,8 @@ pub fn driver(settings: &Settings, bus: usize) -> Result<OdriveDriver, DriverErr
     let mut driver = OdriveDriver::new(timeouts, near_rad, settings.cycle.period_us);
     for servo in settings.servos.iter().filter(|servo| servo.bus == bus) {
         let Some(odrive) = servo.protocol.get::<Odrive>() else { continue };
-        let (joint, joints) = (servo.joint, settings.robot.joints.len().min(MAX_JOINTS));
-        let limits = settings.robot.joints.get(joint).filter(|_| joint < joints).map(|joint| joint.limits);
+        let (joint, joints) = (servo.joint, settings.slots().min(MAX_JOINTS));
+        let limits = settings.slot(joint).filter(|_| joint < joints).map(|joint| joint.limits);
         let Some(limits) = limits else { return Err(DriverError::JointBeyond { joint, joints }) };
         driver.add(mapping(servo, odrive), plan(odrive, limits.stop.velocity_rad_s));
     }

@@ -194,6 +194,7 @@ impl Odrive {
                 self.fail(if named == 0 { ERROR_DRIVER } else { named });
             }
             Disturbance::Jammed(jammed) => self.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             // It has no warnings.
             Disturbance::Warning(_) => {}

@@ -120,6 +120,7 @@ impl ServoDriver for PiperDriver {
             state: self.controller.state(place),
             position_rad: angle.map_or(f64::NAN, |angle| slot.link_rad(angle)),
             velocity_rad_s: speed.map_or(f64::NAN, |speed| f64::from(speed) * 1e-3 * slot.sign),
+            torque_nm: f64::NAN,
             hold_position_rad: f64::NAN,
             received: self.received.get(place).copied().flatten(),
             status_word: self.controller.status_word(place),

@@ -69,8 +69,8 @@ pub fn driver(settings: &Settings, bus: usize) -> Result<PiperDriver, DriverErro
     };
     let mut slots = [JointSlot { joint: 0, sign: 1.0, zero_offset_rad: 0.0 }; JOINTS];
     for ((slot, planned), (servo, _)) in slots.iter_mut().zip(&mut plan.joints).zip(joints) {
-        let (joint, joints) = (servo.joint, settings.robot.joints.len().min(MAX_JOINTS));
-        let limits = settings.robot.joints.get(joint).filter(|_| joint < joints).map(|joint| joint.limits);
+        let (joint, joints) = (servo.joint, settings.slots().min(MAX_JOINTS));
+        let limits = settings.slot(joint).filter(|_| joint < joints).map(|joint| joint.limits);
         let Some(limits) = limits else { return Err(DriverError::JointBeyond { joint, joints }) };
         *slot = JointSlot { joint, sign: servo.sign, zero_offset_rad: servo.zero_offset_rad };
         *planned = (arm_range_rad(servo, limits.position_rad), limits.stop.velocity_rad_s);

@@ -330,6 +330,7 @@ impl ServoModel for RobStrideMotor {
                 }
             }
             Disturbance::Jammed(jammed) => self.joint.mechanics.plant.jammed = jammed,
+            Disturbance::Object(at_rad) => self.joint.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.joint.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.held.locked = code != 0,
