@@ -16,7 +16,7 @@ fn bench_counts_every_slice_and_stage() {
     for link in [None, Some(LinkChoice::Local)] {
         let result = cycle(&options(link)).unwrap();
         assert!(result.streamer_cycle.count >= 190 && result.bare_cycle.count >= 190, "{result:?}");
-        assert_eq!(result.stages.len(), 10);
+        assert_eq!(result.stages.len(), 11);
         assert!(result.stages.iter().all(|s| s.time.count > 0 && s.time.p50_ns > 0), "{result:?}");
         let whole: f64 = result.stages.iter().map(|s| s.share_percent).sum();
         assert!((whole - 100.0).abs() < 1e-6, "the stages are {whole} % of the cycle: {result:?}");
