@@ -169,22 +169,25 @@ impl Field {
     }
 
     /// Population's best at the end, method `i` against `j`.
-    pub(super) fn at_the_end(&self, [i, j]: [usize; 2], [ours, theirs]: [&str; 2], level: Level) -> Effect {
-        let of = |k: usize| -> Vec<f64> {
-            self.free(&[i, j]).filter_map(|run| self.of(k).get(run).map(Course::last)).collect()
-        };
-        Effect::ratio((ours, &of(i)), (theirs, &of(j)), (FLOOR, level)).margin(GAIN_PERCENT)
+    pub(super) fn at_the_end(&self, pair: [usize; 2], names: [&str; 2], level: Level) -> Effect {
+        self.gain(pair, names, level, |course| Some(course.last()))
     }
 
     /// Population's best after a quarter of the iterations, method `i` against `j`.
-    pub(super) fn after_a_quarter(
+    pub(super) fn after_a_quarter(&self, pair: [usize; 2], names: [&str; 2], level: Level) -> Effect {
+        self.gain(pair, names, level, |course| course.after(0.25))
+    }
+
+    /// A figure of method `i` against that of `j`, in scenes that both leave free.
+    fn gain(
         &self,
         [i, j]: [usize; 2],
         [ours, theirs]: [&str; 2],
         level: Level,
+        figure: impl Fn(&Course) -> Option<f64>,
     ) -> Effect {
         let of = |k: usize| -> Vec<f64> {
-            self.free(&[i, j]).filter_map(|run| self.of(k).get(run)?.after(0.25)).collect()
+            self.free(&[i, j]).filter_map(|run| figure(self.of(k).get(run)?)).collect()
         };
         Effect::ratio((ours, &of(i)), (theirs, &of(j)), (FLOOR, level)).margin(GAIN_PERCENT)
     }

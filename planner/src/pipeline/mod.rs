@@ -3,6 +3,7 @@
 //! straight line -> RRT-Connect -> shortcuts -> timing with rounded corners -> proof -> improvement. The first path that is
 //! found is shortened, rounded and proven at once; from then on there is an answer, and later stages can only replace it by
 //! a better one. A longer deadline does the same work first, then more, so it can only give a better motion.
+mod answer;
 mod corners;
 mod quick;
 mod slower;
@@ -16,7 +17,7 @@ use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
 use crate::objective::{Evaluator, Objective};
-use crate::plan::{CUT_SHORT, Plan, PlanError, PlanOptions, Remedy};
+use crate::plan::{Plan, PlanError, PlanOptions};
 use crate::refine::{self, PathProblem, refine};
 use crate::rng::SeededRng;
 use crate::search::Searcher;
@@ -24,7 +25,7 @@ use crate::shortcut::shorten;
 use crate::timing::{Path, Timed, stand_still};
 use crate::torque::TorqueLimits;
 use crate::tree::Space;
-use crate::verify::{Proof, Stretch, Violation, measured, prove_candidate};
+use crate::verify::{Proof, Stretch, Violation, prove_candidate};
 use crate::world::World;
 use rustix::time::{ClockId, clock_gettime};
 use std::ops::Range;
@@ -549,62 +550,5 @@ impl<'a> Pipeline<'a> {
             }
         }
         false
-    }
-
-    /// Finds the least distance of the motion that is the answer.
-    fn measure_best(&mut self) {
-        let Some(mut best) = self.best.take() else { return };
-        if let Some(stretches) = self.stretches(&best.trajectory) {
-            best.proof = measured(&stretches, &best.trajectory, &best.proof, self.space.budget);
-        }
-        self.best = Some(best);
-    }
-
-    fn finish(mut self) -> Result<Plan, PlanError> {
-        self.note_time("timing, corners and proof".to_owned());
-        self.measure_best();
-        let stages = self.stages;
-        let budget = self.space.budget;
-        let cut = budget.was_cut();
-        let tried = self.tried.join(", ");
-        match (self.best, self.violation) {
-            (Some(Best { trajectory, proof, how: last, score }), _) => {
-                // What won comes first: messages hold 240 bytes.
-                let mut how = last;
-                if cut {
-                    how.push_str(CUT_SHORT);
-                }
-                if !tried.is_empty() && tried != how {
-                    how = format!("{how} (tried: {tried})");
-                }
-                let (energy_j, checks) = (self.evaluator.energy_j(&trajectory), self.space.checks());
-                let (planning_s, first_s) = (budget.elapsed_s(), self.first_s);
-                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, first_s, checks, stages })
-            }
-            (None, Some(violation)) => {
-                if cut && matches!(violation, Violation::Unresolved { .. }) {
-                    let tried = format!("{tried}, {violation}");
-                    let remedy = Remedy::Clock(self.options.deadline);
-                    return Err(PlanError::NotFound { tried, remedy, explanation: explained(stages) });
-                }
-                Err(PlanError::Unproven { tried, violation, explanation: explained(stages) })
-            }
-            (None, None) if self.untimed && !cut => {
-                Err(PlanError::Untimed { tried, explanation: explained(stages) })
-            }
-            (None, None) => {
-                let remedy = match self.options.planner {
-                    _ if cut => Remedy::Clock(self.options.deadline),
-                    PlannerKind::Straight => Remedy::Planner,
-                    PlannerKind::Auto
-                    | PlannerKind::RrtConnect
-                    | PlannerKind::Rrt
-                    | PlannerKind::Rbf
-                    | PlannerKind::Bfo
-                    | PlannerKind::Optimiser(_) => Remedy::Budget(self.options.deadline),
-                };
-                Err(PlanError::NotFound { tried, remedy, explanation: explained(stages) })
-            }
-        }
     }
 }
