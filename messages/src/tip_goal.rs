@@ -2,9 +2,11 @@
 use crate::plan::PlanRequestError;
 use iceoryx2::prelude::ZeroCopySend;
 
-/// A position or a pose of the tip, in the base's frame.
+/// A position or a pose of a tip, in the base's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipGoal {
+    /// Which tip, counted from 0: a serial arm has one.
+    pub tip: u32,
     /// Where it shall be.
     pub position_m: [f64; 3],
     /// How far off it may be.
@@ -48,7 +50,7 @@ const STRAIGHT: u32 = 4;
 pub(crate) struct TipGoalWire {
     /// 0 for a pose of the joints.
     kind: u32,
-    reserved: u32,
+    tip: u32,
     position_m: [f64; 3],
     tolerance_m: f64,
     quaternion_xyzw: [f64; 4],
@@ -60,8 +62,13 @@ pub(crate) struct TipGoalWire {
 impl From<Option<&TipGoal>> for TipGoalWire {
     fn from(goal: Option<&TipGoal>) -> Self {
         let Some(goal) = goal else { return Self::default() };
-        let mut wire =
-            Self { kind: TIP, position_m: goal.position_m, tolerance_m: goal.tolerance_m, ..Self::default() };
+        let mut wire = Self {
+            kind: TIP,
+            tip: goal.tip,
+            position_m: goal.position_m,
+            tolerance_m: goal.tolerance_m,
+            ..Self::default()
+        };
         if let Some(o) = goal.orientation {
             wire.kind |= TURNED;
             (wire.quaternion_xyzw, wire.tolerance_rad) = (o.quaternion_xyzw, o.tolerance_rad);
@@ -91,6 +98,7 @@ impl TipGoalWire {
             return bad("tolerance of the position (m)", self.tolerance_m);
         }
         let mut goal = TipGoal {
+            tip: self.tip,
             position_m: self.position_m,
             tolerance_m: self.tolerance_m,
             orientation: None,

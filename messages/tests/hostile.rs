@@ -258,6 +258,7 @@ fn command_survives_the_wire_and_bad_ones_are_named() {
 #[test]
 fn goals_of_the_tip_survive_the_wire_and_numbers_that_make_no_sense_are_refused() {
     let tip = TipGoal {
+        tip: 1,
         position_m: [0.4, -0.3, 0.35],
         tolerance_m: 1e-3,
         orientation: Some(TipOrientation {

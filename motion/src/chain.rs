@@ -1,4 +1,8 @@
-//! Forward kinematics of a serial chain of revolute joints.
+//! Forward kinematics of a tree of revolute joints: a serial arm, or several arms on one base.
+//!
+//! Frame 0 is the base and frame i stands behind joint i-1 (counted from 0). Each joint stands in the base or in the frame of an
+//! earlier joint, so that it moves its own frame and those that hang on it, and no other. In a serial arm joint j moves every frame
+//! behind it; whoever asks which joint moves what asks [`Chain::moves`].
 //!
 //! Sines and cosines come from `libm`, so that every machine computes the same pose.
 //!
@@ -58,25 +62,62 @@ impl Column {
         Self { linear_m: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };
 }
 
-/// A serial chain of up to 8 joints.
+/// Each joint is a bit of what moves a frame.
+const _: () = assert!(MAX_JOINTS <= u32::BITS as usize);
+
+/// A tree of up to [`MAX_JOINTS`] joints with one or more tips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chain {
     joints: [ChainJoint; MAX_JOINTS],
     count: usize,
+    /// The frame that each joint stands in.
+    parents: [usize; MAX_JOINTS],
+    /// The joints that move each frame, a bit each.
+    movers: [u32; MAX_JOINTS + 1],
+    tips: [usize; MAX_JOINTS],
+    tip_count: usize,
 }
 
 impl Chain {
-    /// Makes a chain of 1 to 8 joints; `None` otherwise.
+    /// Makes a serial chain of 1 to [`MAX_JOINTS`] joints, whose tip is the last frame; `None` otherwise.
     #[must_use]
     pub fn new(joints: &[ChainJoint]) -> Option<Self> {
-        if !(1..=MAX_JOINTS).contains(&joints.len()) {
+        let mut parents = [0; MAX_JOINTS];
+        parents.iter_mut().enumerate().for_each(|(joint, parent)| *parent = joint);
+        Self::tree(joints, parents.get(..joints.len())?, &[joints.len()])
+    }
+    /// Makes a tree: for each joint the frame that it stands in, and the frames that are tips, the first of which is the one that is
+    /// meant where none is named.
+    ///
+    /// `None` for no joint or too many, for a joint that stands in the frame of itself or of a later one, and for tips that are
+    /// none, twice, the base, or no frame.
+    #[must_use]
+    pub fn tree(joints: &[ChainJoint], parents: &[usize], tips: &[usize]) -> Option<Self> {
+        let count = joints.len();
+        let is_tree = parents.len() == count && parents.iter().enumerate().all(|(joint, p)| *p <= joint);
+        let is_tip = |(i, tip): (usize, &usize)| {
+            (1..=count).contains(tip) && tips.iter().take(i).all(|other| other != tip)
+        };
+        let has_tips = !tips.is_empty() && tips.iter().enumerate().all(is_tip);
+        if !(1..=MAX_JOINTS).contains(&count) || !is_tree || !has_tips {
             return None;
         }
-        let mut kept = [ChainJoint::from_dh(0.0, 0.0, 0.0, 0.0); MAX_JOINTS];
-        for (slot, joint) in kept.iter_mut().zip(joints) {
-            *slot = *joint;
+        let mut made = Self {
+            joints: [ChainJoint::from_dh(0.0, 0.0, 0.0, 0.0); MAX_JOINTS],
+            count,
+            parents: [0; MAX_JOINTS],
+            movers: [0; MAX_JOINTS + 1],
+            tips: [0; MAX_JOINTS],
+            tip_count: tips.len(),
+        };
+        made.joints.iter_mut().zip(joints).for_each(|(slot, joint)| *slot = *joint);
+        made.parents.iter_mut().zip(parents).for_each(|(slot, parent)| *slot = *parent);
+        made.tips.iter_mut().zip(tips).for_each(|(slot, tip)| *slot = *tip);
+        for (joint, parent) in parents.iter().enumerate() {
+            let before = made.movers.get(*parent).copied()?;
+            *made.movers.get_mut(joint + 1)? = before | (1 << joint);
         }
-        Some(Self { joints: kept, count: joints.len() })
+        Some(made)
     }
     /// How many joints.
     #[must_use]
@@ -88,37 +129,93 @@ impl Chain {
     pub fn joint(&self, index: usize) -> Option<&ChainJoint> {
         self.joints.get(index).filter(|_| index < self.count)
     }
-    /// The base frame (index 0, identity) and the frame after each joint; unused ones repeat the last.
+    /// The frame that a joint stands in: 0 for the base, and for a joint that is not there.
+    ///
+    /// Real time: a look-up.
+    #[must_use]
+    pub fn parent_frame(&self, joint: usize) -> usize {
+        self.parents.get(joint).copied().unwrap_or(0)
+    }
+    /// True when a joint moves a frame: the frame is its own, or hangs on it.
+    ///
+    /// Real time: a look-up.
+    #[must_use]
+    pub fn moves(&self, joint: usize, frame: usize) -> bool {
+        joint < self.count && self.movers.get(frame).is_some_and(|movers| movers & (1 << joint) != 0)
+    }
+    /// The joints that move a frame, base first.
+    pub fn movers(&self, frame: usize) -> impl DoubleEndedIterator<Item = usize> + '_ {
+        (0..self.count).filter(move |joint| self.moves(*joint, frame))
+    }
+    /// The last frame that carries both of two frames: what moves it moves both alike, and every other joint moves one of them or
+    /// none.
+    ///
+    /// Real time: arithmetic only.
+    #[must_use]
+    pub fn common_frame(&self, a: usize, b: usize) -> usize {
+        let movers = |frame: usize| self.movers.get(frame).copied().unwrap_or(0);
+        // Joints come after those that carry them, so that the highest one that is shared is the last.
+        let shared = movers(a) & movers(b);
+        (u32::BITS - shared.leading_zeros()) as usize
+    }
+    /// The frames that are tips.
+    #[must_use]
+    pub fn tips(&self) -> &[usize] {
+        self.tips.get(..self.tip_count).unwrap_or_default()
+    }
+    /// The first tip: the only one of a serial arm.
+    #[must_use]
+    pub fn tip_frame(&self) -> usize {
+        self.tips.first().copied().unwrap_or(self.count)
+    }
+    /// True when every joint but the first stands in the frame of the one before it, and the last frame is the only tip.
+    #[must_use]
+    pub fn is_serial(&self) -> bool {
+        let parents = self.parents.iter().take(self.count).enumerate();
+        self.tips() == [self.count] && parents.into_iter().all(|(joint, parent)| *parent == joint)
+    }
+    /// The base frame (index 0, identity) and the frame behind each joint; unused ones repeat the last.
     ///
     /// Real time: no allocation.
     #[must_use]
     pub fn frames(&self, position_rad: &JointArray) -> [Pose; MAX_JOINTS + 1] {
         let mut frames = [Pose::identity(); MAX_JOINTS + 1];
-        let mut tip = Pose::identity();
-        let moves = self.joints.iter().zip(position_rad).take(self.count);
-        let mut slots = frames.iter_mut().skip(1);
-        for ((joint, angle_rad), slot) in moves.zip(slots.by_ref()) {
+        let mut last = Pose::identity();
+        let moves = self.joints.iter().zip(&self.parents).zip(position_rad).take(self.count).enumerate();
+        for (i, ((joint, parent), angle_rad)) in moves {
             let turn = rotation(&joint.axis, angle_rad + joint.offset_rad);
-            tip = tip * joint.pre * turn * joint.post;
-            *slot = tip;
+            if *parent != i {
+                last = frames.get(*parent).copied().unwrap_or(last);
+            }
+            last = last * joint.pre * turn * joint.post;
+            if let Some(slot) = frames.get_mut(i + 1) {
+                *slot = last;
+            }
         }
-        for slot in slots {
-            *slot = tip;
-        }
+        frames.iter_mut().skip(self.count + 1).for_each(|slot| *slot = last);
         frames
     }
-    /// The pose of the tip, and how each joint moves it: the geometric Jacobian in base coordinates, a column a joint;
-    /// those of unused joints are zero.
+    /// The pose of one frame, that of the base for one that is not there.
+    ///
+    /// Real time: no allocation.
+    #[must_use]
+    pub fn frame(&self, frame: usize, position_rad: &JointArray) -> Pose {
+        self.frames(position_rad).get(frame).copied().unwrap_or_default()
+    }
+    /// The pose of a frame, as a rule a tip, and how each joint moves it: the geometric Jacobian in base coordinates, a column a
+    /// joint; those of joints that do not move it are zero.
     ///
     /// Real time: no allocation.
     ///
     /// Source: Siciliano et al., Robotics: Modelling, Planning and Control, section 3.1.3 (revolute joints).
     #[must_use]
-    pub fn jacobian(&self, position_rad: &JointArray) -> (Pose, [Column; MAX_JOINTS]) {
+    pub fn jacobian(&self, frame: usize, position_rad: &JointArray) -> (Pose, [Column; MAX_JOINTS]) {
         let frames = self.frames(position_rad);
-        let [.., tip] = frames;
+        let tip = frames.get(frame).copied().unwrap_or_default();
         let mut columns = [Column::ZERO; MAX_JOINTS];
-        for ((column, joint), parent) in columns.iter_mut().zip(&self.joints).zip(&frames).take(self.count) {
+        let joints = self.joints.iter().zip(&self.parents).take(self.count);
+        for (index, (column, (joint, parent))) in columns.iter_mut().zip(joints).enumerate() {
+            let Some(parent) = frames.get(*parent).filter(|_| self.moves(index, frame)) else { continue };
             // A turn about the axis leaves the axis where it is, so the joint's own angle does not matter.
             let before = parent * joint.pre;
             let angular = before.rotation * joint.axis.into_inner();

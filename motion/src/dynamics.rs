@@ -1,7 +1,7 @@
-//! Inverse dynamics and energy of a serial chain of rigid bodies.
+//! Inverse dynamics and energy of a tree of rigid bodies.
 //!
-//! Torques come from the recursive Newton-Euler equations over the chain, in the base's frame: outward the motion of every
-//! body, inward the torque at its joint. Gravity enters as an acceleration of the base. Friction, gears and the
+//! Torques come from the recursive Newton-Euler equations over the tree, in the base's frame: outward the motion of every
+//! body, inward the torque at its joint, which bears whatever hangs on it. Gravity enters as an acceleration of the base. Friction, gears and the
 //! motors' own inertia are not part of it.
 //!
 //! Everything is held in arrays of [`MAX_JOINTS`] and owned, so that a real-time thread can keep it.
@@ -63,6 +63,24 @@ impl Moving {
     };
 }
 
+/// How a frame moves, seen where its joint stands.
+#[derive(Clone, Copy)]
+struct Carried {
+    spin: Vector3<f64>,
+    spin_up: Vector3<f64>,
+    at_m: Vector3<f64>,
+    push: Vector3<f64>,
+}
+
+impl Carried {
+    const REST: Self = Self {
+        spin: Vector3::new(0.0, 0.0, 0.0),
+        spin_up: Vector3::new(0.0, 0.0, 0.0),
+        at_m: Vector3::new(0.0, 0.0, 0.0),
+        push: Vector3::new(0.0, 0.0, 0.0),
+    };
+}
+
 impl Dynamics {
     /// The dynamics of a chain with one body a joint, base first, and gravity in the base's frame. Bodies beyond the last
     /// joint do not count.
@@ -76,14 +94,20 @@ impl Dynamics {
     /// Real time: no allocation.
     #[must_use]
     pub fn torques_nm(&self, q: &JointArray, v: &JointArray, a: &JointArray) -> JointArray {
-        let moving = self.outward(&self.chain.frames(q), v, a);
+        let mut moving = self.outward(&self.chain.frames(q), v, a);
         let mut torques = [0.0; MAX_JOINTS];
-        let (mut force, mut moment, mut behind) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
-        for (joint, torque) in moving.iter().zip(&mut torques).take(self.chain.joints()).rev() {
-            moment = joint.moment_nm + moment + (behind - joint.at_m).cross(&force);
-            force += joint.force_n;
-            behind = joint.at_m;
-            *torque = joint.axis.dot(&moment);
+        for index in (0..self.chain.joints()).rev() {
+            let (Some(joint), Some(torque)) = (moving.get(index).copied(), torques.get_mut(index)) else {
+                continue;
+            };
+            *torque = joint.axis.dot(&joint.moment_nm);
+            // A joint comes after the one that bears it.
+            let before = self.chain.parent_frame(index).checked_sub(1);
+            if let Some(before) = before.and_then(|before| moving.get_mut(before)) {
+                let arm_m = joint.at_m - before.at_m;
+                before.moment_nm = before.moment_nm + joint.moment_nm + arm_m.cross(&joint.force_n);
+                before.force_n += joint.force_n;
+            }
         }
         torques
     }
@@ -99,16 +123,22 @@ impl Dynamics {
 
     /// The motion of every joint's body and what it needs, base to tip.
     fn outward(&self, frames: &[Pose], v: &JointArray, a: &JointArray) -> [Moving; MAX_JOINTS] {
-        let (mut spin, mut spin_up) = (Vector3::zeros(), Vector3::zeros());
         // An arm at rest on the ground is one that is accelerated upward in free space.
-        let (mut at_m, mut push) = (Vector3::zeros(), -self.gravity_m_s2);
+        let base = Carried { push: -self.gravity_m_s2, ..Carried::REST };
+        let mut carried = [base; MAX_JOINTS + 1];
+        let mut before_joint = base;
         let mut moving = [Moving::REST; MAX_JOINTS];
         for (i, (slot, body)) in moving.iter_mut().zip(&self.bodies).enumerate() {
+            let parent_frame = self.chain.parent_frame(i);
             let (Some(joint), [Some(parent), Some(frame)]) =
-                (self.chain.joint(i), [frames.get(i), frames.get(i + 1)])
+                (self.chain.joint(i), [frames.get(parent_frame), frames.get(i + 1)])
             else {
                 break;
             };
+            if parent_frame != i {
+                before_joint = carried.get(parent_frame).copied().unwrap_or(base);
+            }
+            let Carried { mut spin, mut spin_up, mut at_m, mut push } = before_joint;
             let before = parent * joint.pre;
             let axis = before.rotation * joint.axis.into_inner();
             let step = before.translation.vector - at_m;
@@ -121,6 +151,10 @@ impl Dynamics {
             let inertia = turned(frame, &body.inertia_kg_m2);
             let moment_nm = inertia * spin_up + spin.cross(&(inertia * spin)) + lever.cross(&force_n);
             *slot = Moving { axis, at_m, spin_rad_s: spin, force_n, moment_nm };
+            before_joint = Carried { spin, spin_up, at_m, push };
+            if let Some(slot) = carried.get_mut(i + 1) {
+                *slot = before_joint;
+            }
         }
         moving
     }
@@ -134,9 +168,9 @@ impl Dynamics {
         let bodies = self.bodies.iter().zip(frames.iter().skip(1)).zip(&moving).take(self.chain.joints());
         for (i, ((body, frame), joint)) in bodies.enumerate() {
             let center = frame.rotation * body.center_m + frame.translation.vector;
-            let before = moving.iter().zip(v).take(i + 1);
+            let before = moving.iter().zip(v).enumerate().filter(|(j, _)| self.chain.moves(*j, i + 1));
             let velocity: Vector3<f64> =
-                before.map(|(joint, v)| joint.axis.cross(&(center - joint.at_m)) * *v).sum();
+                before.map(|(_, (joint, v))| joint.axis.cross(&(center - joint.at_m)) * *v).sum();
             let spin = joint.spin_rad_s;
             kinetic += 0.5 * body.mass_kg * velocity.norm_squared();
             kinetic += 0.5 * spin.dot(&(turned(frame, &body.inertia_kg_m2) * spin));
@@ -195,7 +229,13 @@ mod tests {
             let (mass_kg, center_m) = (3.0 + 2.0 * random.next(), random.vector() * 0.2);
             *body = Body { mass_kg, center_m, inertia_kg_m2: root * root.transpose() };
         }
-        Dynamics::new(Chain::new(&joints).unwrap(), bodies, random.vector() * 9.8)
+        // Every other one is a tree.
+        let mut parent = |joint: usize| {
+            if count % 2 == 0 || random.next() > 0.0 { joint } else { joint / 2 }
+        };
+        let parents: std::vec::Vec<usize> = (0..count).map(&mut parent).collect();
+        let chain = Chain::tree(&joints, &parents, &[count]).unwrap();
+        Dynamics::new(chain, bodies, random.vector() * 9.8)
     }
 
     /// Goal: the torques are those of the Lagrangian, whose energies come from another function: work in is energy gained.

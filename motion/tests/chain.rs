@@ -159,7 +159,7 @@ fn jacobian_at_two_thousand_poses_is_the_derivative_of_the_tip() {
             (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span))).collect();
         let chain = if seed % 2 == 0 { standard(&rows) } else { modified(&rows) };
         let position_rad = rng.joints(count, PI);
-        let (tip, columns) = chain.jacobian(&position_rad);
+        let (tip, columns) = chain.jacobian(count, &position_rad);
         assert_eq!(tip, chain.frames(&position_rad)[MAX_JOINTS]);
         let gap_to = |joint: usize, column: &Column| {
             let at = |by: f64| {
@@ -180,6 +180,112 @@ fn jacobian_at_two_thousand_poses_is_the_derivative_of_the_tip() {
         if count > 1 {
             assert!(gap_to(0, &columns[1]) > 1e-6, "seed {seed}: the columns do not differ");
         }
+    }
+}
+
+/// A tree of any shape: for each joint the frame that it stands in, at random.
+fn any_tree(rng: &mut SeededRng) -> (Chain, Vec<usize>) {
+    let count = rng.whole(1, u32::try_from(MAX_JOINTS).unwrap()) as usize;
+    let joints: Vec<ChainJoint> = (0..count)
+        .map(|_| {
+            let [a, alpha, d, offset] = [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span));
+            ChainJoint::from_mdh(a, alpha, d, offset)
+        })
+        .collect();
+    let parents: Vec<usize> =
+        (0..count).map(|joint| rng.whole(0, u32::try_from(joint).unwrap()) as usize).collect();
+    (Chain::tree(&joints, &parents, &[count]).unwrap(), parents)
+}
+
+/// Goal: each frame of a tree is the product along its own branch, a joint moves exactly the frames that move when it turns, and
+/// columns are derivatives for them and zero for all others.
+#[test]
+fn joints_of_a_tree_move_their_own_branches_and_nothing_else() {
+    const STEP_RAD: f64 = 1e-6;
+    let mut still = 0;
+    for seed in 0..1_000 {
+        let mut rng = SeededRng::from_seed(seed);
+        let (chain, parents) = any_tree(&mut rng);
+        let count = chain.joints();
+        let position_rad = rng.joints(count, PI);
+        let frames = chain.frames(&position_rad);
+        for (joint, parent) in parents.iter().enumerate() {
+            let alone = Chain::new(&[*chain.joint(joint).unwrap()]).unwrap();
+            let mut angle_rad = [0.0; MAX_JOINTS];
+            angle_rad[0] = position_rad[joint];
+            let expected = frames[*parent] * alone.frames(&angle_rad)[1];
+            let gap = (expected.to_homogeneous() - frames[joint + 1].to_homogeneous()).amax();
+            assert!(gap < 1e-12, "seed {seed}, joint {joint}: {gap:e}");
+        }
+        for frame in 0..=count {
+            let (tip, columns) = chain.jacobian(frame, &position_rad);
+            assert_eq!(tip, frames[frame]);
+            for (joint, column) in columns.iter().enumerate() {
+                let at = |by: f64| {
+                    let mut moved_rad = position_rad;
+                    moved_rad[joint] += by;
+                    chain.frames(&moved_rad)[frame]
+                };
+                let (low, high) = (at(-STEP_RAD), at(STEP_RAD));
+                let moves = joint < count && low != high;
+                assert_eq!(chain.moves(joint, frame), moves, "seed {seed}, joint {joint}, frame {frame}");
+                if !moves {
+                    still += 1;
+                    assert_eq!(*column, Column::ZERO, "seed {seed}, joint {joint}, frame {frame}");
+                    continue;
+                }
+                let linear_m = (high.translation.vector - low.translation.vector) / (2.0 * STEP_RAD);
+                let angular = (high.rotation * low.rotation.inverse()).scaled_axis() / (2.0 * STEP_RAD);
+                let gap = (linear_m - column.linear_m).amax().max((angular - column.angular).amax());
+                assert!(gap < 1e-8, "seed {seed}, joint {joint}, frame {frame}: {gap:e}");
+            }
+        }
+    }
+    assert!(still > 10_000, "{still}: the trees hardly branch");
+}
+
+#[test]
+fn frame_that_two_frames_share_is_the_last_that_carries_both() {
+    for seed in 0..300 {
+        let mut rng = SeededRng::from_seed(seed);
+        let (chain, parents) = any_tree(&mut rng);
+        let carriers = |mut frame: usize| {
+            let mut all = vec![frame];
+            while frame > 0 {
+                frame = parents[frame - 1];
+                all.push(frame);
+            }
+            all
+        };
+        for a in 0..=chain.joints() {
+            for b in 0..=chain.joints() {
+                let (of_a, of_b) = (carriers(a), carriers(b));
+                let expected = of_a.iter().find(|frame| of_b.contains(frame));
+                assert_eq!(Some(&chain.common_frame(a, b)), expected, "seed {seed}: {a} and {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn trees_that_are_none_are_refused() {
+    let joints = [ChainJoint::from_dh(0.1, 0.2, 0.3, 0.0); 4];
+    let tree = |parents: &[usize], tips: &[usize]| Chain::tree(&joints, parents, tips);
+    let branched = tree(&[0, 1, 0, 3], &[2, 4]).unwrap();
+    assert!(branched.tips() == [2, 4] && branched.tip_frame() == 2 && !branched.is_serial());
+    assert!(Chain::new(&joints).unwrap().is_serial());
+    assert!(!tree(&[0, 1, 2, 3], &[2, 4]).unwrap().is_serial(), "two tips");
+    for (parents, tips) in [
+        (&[0, 1, 0][..], &[3][..]),
+        (&[0, 2, 0, 3], &[4]),
+        (&[0, 1, 0, 4], &[4]),
+        (&[1, 1, 1, 1], &[4]),
+        (&[0, 1, 0, 3], &[]),
+        (&[0, 1, 0, 3], &[0]),
+        (&[0, 1, 0, 3], &[5]),
+        (&[0, 1, 0, 3], &[2, 4, 2]),
+    ] {
+        assert!(tree(parents, tips).is_none(), "{parents:?}, tips {tips:?}");
     }
 }
 

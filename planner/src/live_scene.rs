@@ -339,7 +339,7 @@ impl Draft<'_> {
     fn tip(&self, name: &str) -> Result<Pose, SceneChangeError> {
         let no_tip = || SceneChangeError::NoTip { name: name.to_owned() };
         let frames = self.robot.chain.frames(self.at_rest.ok_or_else(no_tip)?);
-        frames.get(self.robot.joints.len()).copied().ok_or_else(no_tip)
+        frames.get(self.robot.chain.tip_frame()).copied().ok_or_else(no_tip)
     }
 
     /// Takes an object out; what was said of it counts no more.

@@ -100,16 +100,19 @@ impl<'a> Evaluator<'a> {
         let [length, travel, _] = CostModel::default().weights;
         let (course, duration_s) = (Course::new(motion), motion.duration_s());
         let at = |i: u32| course.at(duration_s * f64::from(i) / f64::from(SAMPLES));
-        let tip = |q: &JointArray| {
-            let [.., tip] = self.robot.chain.frames(q);
-            tip.translation.vector
-        };
+        let frames = |q: &JointArray| self.robot.chain.frames(q);
         let mut last = at(0);
         let mut cost = 0.0;
         for i in 1..=SAMPLES {
             let here = at(i);
             let turned: f64 = here.iter().zip(&last).map(|(a, b)| (a - b).abs()).sum();
-            cost += travel * turned + length * (tip(&here) - tip(&last)).norm();
+            let (here_at, last_at) = (frames(&here), frames(&last));
+            let moved_m = |tip: &usize| {
+                let [here, last] =
+                    [here_at.get(*tip), last_at.get(*tip)].map(|f| f.copied().unwrap_or_default());
+                (here.translation.vector - last.translation.vector).norm()
+            };
+            cost += travel * turned + length * self.robot.chain.tips().iter().map(moved_m).sum::<f64>();
             last = here;
         }
         cost

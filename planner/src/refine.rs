@@ -127,7 +127,8 @@ impl Problem for PathProblem<'_> {
         let snapshot = &mut *self.snapshot.borrow_mut();
         let corners = self.corners(x);
         let (mut length_m, mut travel_rad, mut penalty, mut collides) = (0.0, 0.0, 0.0, false);
-        let mut last: Option<parry3d_f64::math::Vector> = None;
+        let tips = self.world.robot().chain.tips();
+        let mut last: [Option<parry3d_f64::math::Vector>; MAX_JOINTS] = [None; MAX_JOINTS];
         for segment in corners.windows(2) {
             let [from, to] = segment else { continue };
             travel_rad += from.iter().zip(to).map(|(a, b)| (b - a).abs()).sum::<f64>();
@@ -138,9 +139,11 @@ impl Problem for PathProblem<'_> {
                 }
                 let share = f64::from(i) / f64::from(POSES_PER_SEGMENT);
                 self.world.place(&Space::between(from, to, share), snapshot);
-                let tip = snapshot.tip();
-                length_m += last.map_or(0.0, |l| (tip - l).length());
-                last = Some(tip);
+                for (frame, last) in tips.iter().zip(&mut last) {
+                    let tip = snapshot.origin(*frame);
+                    length_m += last.map_or(0.0, |l| (tip - l).length());
+                    *last = Some(tip);
+                }
                 for pair in self.world.pairs() {
                     let hinge = self.world.hinge(pair, snapshot);
                     penalty += hinge;

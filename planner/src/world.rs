@@ -27,7 +27,7 @@ pub enum Other {
 /// Two bodies that must keep apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
-    /// Index of the link body; in a pair of links, the one nearer to the tip.
+    /// Index of the link body; in a pair of links, the one whose frame comes later.
     pub link: usize,
     /// What it must not touch.
     pub other: Other,
@@ -62,7 +62,7 @@ impl StillBody {
     }
 }
 
-/// The axis of a joint in the frame before it: a point of it, and its direction.
+/// The axis of a joint in the frame that it stands in: a point of it, and its direction.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     point: Vector,
@@ -122,10 +122,10 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Where the last frame's origin is, m.
+    /// Where the origin of a frame is, m.
     #[must_use]
-    pub fn tip(&self) -> Vector {
-        self.frames.last().map_or(Vector::ZERO, |f| f.translation)
+    pub fn origin(&self, frame: usize) -> Vector {
+        self.frames.get(frame).map_or(Vector::ZERO, |f| f.translation)
     }
 }
 
@@ -216,7 +216,7 @@ impl<'a> World<'a> {
         let body_m = |(body, at): (&LinkBody, &Posed)| {
             let frame = snapshot.frames.get(body.frame);
             let own_m = frame.map_or(0.0, |f| (at.centre - f.translation).length());
-            (0..body.frame).map(step_m).sum::<f64>() + own_m + body.body.bound_m()
+            self.robot.chain.movers(body.frame).map(step_m).sum::<f64>() + own_m + body.body.bound_m()
         };
         self.links.iter().zip(&snapshot.at).map(body_m).fold(0.0, f64::max)
     }
@@ -228,13 +228,15 @@ impl<'a> World<'a> {
         let joint = |index: usize| self.robot.chain.joint(index);
         let before_m = |index: usize| joint(index).map_or(0.0, |j| j.pre.translation.vector.norm());
         let behind_m = |index: usize| joint(index).map_or(0.0, |j| j.post.translation.vector.norm());
+        let chain = &self.robot.chain;
         let mut reach_m = [0.0; MAX_JOINTS];
         for (joint, reach) in reach_m.iter_mut().enumerate().take(self.robot.joints.len()) {
-            for (body, at) in self.links.iter().zip(&snapshot.at).filter(|(b, _)| b.frame > joint) {
+            for (body, at) in self.links.iter().zip(&snapshot.at).filter(|(b, _)| chain.moves(joint, b.frame))
+            {
                 let own_m =
                     snapshot.frames.get(body.frame).map_or(0.0, |f| (at.centre - f.translation).length());
-                let chain_m = behind_m(joint)
-                    + (joint + 1..body.frame).map(|next| before_m(next) + behind_m(next)).sum::<f64>();
+                let next = chain.movers(body.frame).filter(|next| *next > joint);
+                let chain_m = behind_m(joint) + next.map(|next| before_m(next) + behind_m(next)).sum::<f64>();
                 *reach = f64::max(*reach, chain_m + own_m + body.body.bound_m());
             }
         }
@@ -450,13 +452,14 @@ impl<'a> World<'a> {
         })
     }
 
-    /// How far points of each pair can move against each other when joint j turns by at most `turn_rad[j]` away
-    /// from the pose of the snapshot, written into `moves_m[link body][first joint]`.
+    /// How far points of each body can move against each frame that carries it when joint j turns by at most `turn_rad[j]` away
+    /// from the pose of the snapshot, written into `moves_m[link body][frame]`.
     ///
-    /// Turn the joints one after the other, base first: joint j then turns everything beyond it rigidly, in the
+    /// Turn the joints that move a body one after the other, base first: joint j then turns everything beyond it rigidly, in the
     /// snapshot's shape, about an axis that the joints before it have only carried along. So a point moves by at
-    /// most the sum over j of turn j times its distance to axis j *in the snapshot*: no larger lever can occur on the way. In a
-    /// pair of links, the joints before the lower link move both and drop out. Bodies that are not concerned have no bound.
+    /// most the sum over j of turn j times its distance to axis j *in the snapshot*: no larger lever can occur on the way. Seen from a
+    /// frame that carries the body, only the joints between the two count. There is no bound against other frames, nor for bodies that
+    /// are not concerned.
     pub fn moves_m(
         &self,
         (snapshot, concerned): (&Snapshot, &Concerned),
@@ -468,36 +471,39 @@ impl<'a> World<'a> {
             direction: frame.rotation * axis.direction,
         };
         let mut axes = [Axis { point: Vector::ZERO, direction: Vector::ZERO }; MAX_JOINTS];
-        for (placed, of_joint) in axes.iter_mut().zip(self.axes.iter().zip(&snapshot.frames)) {
-            *placed = axis(of_joint);
+        for (joint, (placed, own)) in axes.iter_mut().zip(&self.axes).enumerate() {
+            *placed = axis((own, &snapshot.frames[self.robot.chain.parent_frame(joint)]));
         }
         moves_m.clear();
         moves_m.resize(self.links.len(), [f64::INFINITY; MAX_JOINTS + 1]);
         for index in concerned.bodies() {
             let (link, at) = (&self.links[index], &snapshot.at[index]);
-            let mut sums = [0.0; MAX_JOINTS + 1];
-            for joint in (0..link.frame).rev() {
+            let sums = &mut moves_m[index];
+            let (mut frame, mut sum_m) = (link.frame, 0.0);
+            sums[frame] = sum_m;
+            while let Some(joint) = frame.checked_sub(1) {
                 let Axis { point, direction } = axes[joint];
                 let lever_m =
                     if turn_rad[joint] > 0.0 { link.body.lever_m(at, point, direction) } else { 0.0 };
-                sums[joint] = sums[joint + 1] + turn_rad[joint] * lever_m;
+                sum_m += turn_rad[joint] * lever_m;
+                frame = self.robot.chain.parent_frame(joint);
+                sums[frame] = sum_m;
             }
-            moves_m[index] = sums;
         }
     }
 
-    /// The entry of [`Self::moves_m`] that belongs to a pair.
+    /// How far the points of a pair can move against each other, by [`Self::moves_m`]. What carries both links moves them alike and
+    /// drops out; on two branches both move against the frame that their branches stand in.
     #[must_use]
     pub fn pair_moves_m(&self, pair: &Pair, moves_m: &[[f64; MAX_JOINTS + 1]]) -> f64 {
-        let fixed = match pair.other {
-            Other::Obstacle(_) => 0,
-            Other::Link(l) => self.links[l].frame,
-        };
-        moves_m[pair.link][fixed]
+        let Other::Link(other) = pair.other else { return moves_m[pair.link][0] };
+        let (a, b) = (self.links[pair.link].frame, self.links[other].frame);
+        let common = self.robot.chain.common_frame(a, b);
+        moves_m[pair.link][common] + moves_m[other][common]
     }
 }
 
-/// The joints' axes, each in the frame before it.
+/// The joints' axes, each in the frame that it stands in.
 fn axes(robot: &Robot) -> Vec<Axis> {
     let axis = |joint: &ChainJoint| {
         let pre = to_parry(&joint.pre);

@@ -87,7 +87,7 @@ fn points(rng: &mut SeededRng, shape: &Shape) -> Vec<Point3<f64>> {
     }
 }
 
-/// A robot of one to eight joints with origins and axes anywhere, and two shapes a link.
+/// A robot of any number of joints with origins and axes anywhere, and two shapes a link; every other one is a tree.
 fn robot(template: &Robot, seed: u64) -> Robot {
     let mut rng = SeededRng::new(seed, 30);
     let count = 1 + rng.index(MAX_JOINTS);
@@ -108,10 +108,12 @@ fn robot(template: &Robot, seed: u64) -> Robot {
             shapes.push(LinkShape { link: frame, frame, pose: pose(&mut rng, 0.1), shape });
         }
     }
+    let parents: Vec<usize> =
+        (0..count).map(|joint| if seed % 2 == 0 { joint } else { rng.index(joint + 1) }).collect();
     let joint = template.joints[0].clone();
     let mut robot = template.clone();
     robot.joints = vec![joint; count];
-    robot.chain = Chain::new(&joints).expect("one to eight");
+    robot.chain = Chain::tree(&joints, &parents, &[count]).expect("a tree");
     robot.links = (0..=count).map(|i| format!("l{i}")).collect();
     robot.shapes = shapes;
     robot.allowed_by_rule = Vec::new();
@@ -171,9 +173,9 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
                         *closest = closest.max(moved_m / bound_m);
                     }
                 }
-                for joint in 0..shape.frame {
+                for joint in robot.chain.movers(shape.frame) {
                     let axis = robot.chain.joint(joint).expect("a joint");
-                    let base = before[joint] * axis.pre;
+                    let base = before[robot.chain.parent_frame(joint)] * axis.pre;
                     let lever_m = (base.inverse() * at(&before)).coords.cross(&axis.axis).norm();
                     assert!(lever_m <= world.reach_m()[joint] + 1e-12, "seed {seed}: reach of joint {joint}");
                 }
@@ -185,7 +187,8 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
     }
 }
 
-/// The bound that a sweep takes for a pair of links: points of the one, seen from the other.
+/// The bound that a sweep takes for a pair of links: distances between points of the two, and where one carries the other, points of
+/// that one seen from the other.
 fn assert_pairs_move_no_further(
     world: &World,
     moves_m: &[[f64; MAX_JOINTS + 1]],
@@ -197,6 +200,19 @@ fn assert_pairs_move_no_further(
         let Other::Link(other) = pair.other else { continue };
         let (shape, from) = (&shapes[pair.link], shapes[other].frame);
         let bound_m = world.pair_moves_m(pair, moves_m);
+        let at = |frames: &[Pose], shape: &LinkShape, point: &Point3<f64>| {
+            frames[shape.frame] * shape.pose * point
+        };
+        let others = points(rng, &shapes[other].shape);
+        for (point, beside) in points(rng, &shape.shape).iter().zip(&others) {
+            let apart_m =
+                |frames: &[Pose]| (at(frames, shape, point) - at(frames, &shapes[other], beside)).norm();
+            let moved_m = (apart_m(after) - apart_m(before)).abs();
+            assert!(moved_m <= bound_m + 1e-12, "{pair:?}: {moved_m} above {bound_m}");
+        }
+        if world.robot().chain.common_frame(shape.frame, from) != from {
+            continue;
+        }
         for point in points(rng, &shape.shape) {
             let seen = |frames: &[Pose]| frames[from].inverse() * frames[shape.frame] * shape.pose * point;
             let moved_m = (seen(after) - seen(before)).norm();

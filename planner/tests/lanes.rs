@@ -2,7 +2,7 @@
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
-use taustream_motion::chain::Pose;
+use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::lanes::Lanes;
 use taustream_planner::rng::SeededRng;
@@ -72,6 +72,15 @@ fn scene(rng: &mut SeededRng, obstacles: usize, far_m: f64) -> Scene {
     Scene { file: PathBuf::new(), margin_m: rng.within(0.0, 0.02), obstacles }
 }
 
+/// The three upper joints of an arm with what they carry, moved from its forearm to the base beside it.
+fn two_arms(mut robot: Robot) -> Robot {
+    let mut joints: Vec<ChainJoint> = (0..6).filter_map(|i| robot.chain.joint(i).copied()).collect();
+    joints[3].pre = Pose::translation(0.3, 0.3, 0.4) * joints[3].pre;
+    robot.chain = Chain::tree(&joints, &[0, 1, 2, 0, 4, 5], &[3, 6]).expect("a tree");
+    robot.allowed_by_rule.retain(|pair| *pair != (3, 4));
+    robot
+}
+
 fn pose(rng: &mut SeededRng, robot: &Robot) -> JointArray {
     let mut pose = [0.0; MAX_JOINTS];
     for (q, joint) in pose.iter_mut().zip(&robot.joints) {
@@ -85,8 +94,13 @@ fn pose(rng: &mut SeededRng, robot: &Robot) -> JointArray {
 /// Method: random scenes of every kind of shape, few obstacles and many; at least three poses in ten in contact, as many free.
 #[test]
 fn lanes_answer_as_the_exact_model_for_random_poses() {
-    for (arm, (name, far_m)) in [("ur5.toml", 1.1), ("piper.toml", 0.5)].into_iter().enumerate() {
-        let robot = Robot::load(&file(name)).expect("shipped");
+    let shipped = |name: &str| Robot::load(&file(name)).expect("shipped");
+    let robots = [
+        ("ur5.toml", shipped("ur5.toml"), 1.1),
+        ("piper.toml", shipped("piper.toml"), 0.5),
+        ("two arms", two_arms(shipped("ur5.toml")), 0.7),
+    ];
+    for (arm, (name, robot, far_m)) in robots.into_iter().enumerate() {
         let (mut free, mut all) = (0_u64, 0_u64);
         for number in 0..poses().div_ceil(POSES_PER_SCENE) {
             let mut rng = SeededRng::new(number, 60 + arm as u64);

@@ -278,7 +278,7 @@ fn service_goals_of_the_tip_are_planned_at_rest_and_in_motion_and_lines_at_rest_
         let here = tip_of(HOME).translation.vector;
         let aside = [here.x, here.y + 0.1, here.z];
         let at = |position_m: [f64; 3], orientation, line| CheckedPlanRequest {
-            tip: Some(TipGoal { position_m, tolerance_m: 0.0, orientation, line }),
+            tip: Some(TipGoal { tip: 0, position_m, tolerance_m: 0.0, orientation, line }),
             ..request(When::AtOnce, "", pose(HOME))
         };
         let position = at(there.translation.vector.into(), None, None);

@@ -37,7 +37,7 @@ pub(super) fn views(robot: &Robot, scene: &Scene, paths: &[(&str, Vec<JointArray
 fn tip_path(robot: &Robot, corners: &[JointArray]) -> Vec<[f64; 3]> {
     let place = |q: &JointArray| -> [f64; 3] {
         let frames = robot.chain.frames(q);
-        frames.get(robot.chain.joints()).map_or([f64::NAN; 3], |f| f.translation.vector.into())
+        frames.get(robot.chain.tip_frame()).map_or([f64::NAN; 3], |f| f.translation.vector.into())
     };
     let segment = |pair: &[JointArray]| -> Vec<[f64; 3]> {
         let [from, to] = pair else { return Vec::new() };

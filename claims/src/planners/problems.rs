@@ -168,7 +168,7 @@ fn walk(space: &Space, start_rad: JointArray, rng: &mut SeededRng) -> Vec<JointA
 fn tip(world: &World, pose_rad: &JointArray) -> [f64; 3] {
     let mut snapshot = Snapshot::default();
     world.place(pose_rad, &mut snapshot);
-    snapshot.tip().to_array()
+    snapshot.origin(world.robot().chain.tip_frame()).to_array()
 }
 
 /// Balls, boxes and posts around the arm, none where its first links stand.

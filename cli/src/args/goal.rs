@@ -142,7 +142,7 @@ impl GoalArgs {
             let TipPose { position_m, rotation } = self.to_pose?;
             let Tolerances(tolerance_rad) = self.tolerance_rad;
             let orientation = Some(Orientation { rotation, tolerance_rad });
-            Some(TipTarget { position_m, tolerance_m, orientation })
+            Some(TipTarget { tip: 0, position_m, tolerance_m, orientation })
         })
     }
 }

@@ -34,7 +34,7 @@ impl Session<'_> {
         let TipSpeed { linear_m_s, angular_rad_s, off_m_max } = TipSpeed::default();
         let straight = TipLine { linear_m_s, angular_rad_s, off_m_max };
         for (position_m, line) in [(change.tip_m, None), (change.line_to_m, Some(straight))] {
-            let tip = TipGoal { position_m, tolerance_m: 1e-3, orientation, line };
+            let tip = TipGoal { tip: 0, position_m, tolerance_m: 1e-3, orientation, line };
             let request = CheckedPlanRequest {
                 tip: Some(tip),
                 ..CheckedPlanRequest::to_pose(joints, [0.0; MAX_JOINTS])

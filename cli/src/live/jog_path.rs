@@ -32,6 +32,7 @@ pub(super) enum Jogged {
 pub(super) struct JogPath<'a> {
     robot: &'a Robot,
     jogged: Jogged,
+    tip_frame: usize,
     /// Pose of the joints as far as it was led.
     at_rad: JointArray,
     tip: Pose,
@@ -40,13 +41,14 @@ pub(super) struct JogPath<'a> {
 
 impl<'a> JogPath<'a> {
     pub(super) fn new(robot: &'a Robot, jogged: Jogged, from_rad: &JointArray) -> Self {
-        let (tip, _) = robot.chain.jacobian(from_rad);
+        let tip_frame = robot.chain.tip_frame();
+        let tip = robot.chain.frame(tip_frame, from_rad);
         let direction = match jogged {
             Jogged::Joint(_) => Vector3::zeros(),
             Jogged::Tip { axis, is_tools: false } => axis.into_inner(),
             Jogged::Tip { axis, is_tools: true } => tip.rotation * axis.into_inner(),
         };
-        Self { robot, jogged, at_rad: *from_rad, tip, direction }
+        Self { robot, jogged, tip_frame, at_rad: *from_rad, tip, direction }
     }
 
     /// The pose as far as it was led.
@@ -84,7 +86,7 @@ impl<'a> JogPath<'a> {
     /// One Newton step to the next point of the line, so that errors do not add up.
     fn step(&mut self, length_m: f64) -> bool {
         let next_m = self.tip.translation.vector + self.direction * length_m;
-        let (tip, columns) = self.robot.chain.jacobian(&self.at_rad);
+        let (tip, columns) = self.robot.chain.jacobian(self.tip_frame, &self.at_rad);
         let joints = self.robot.joints.len().min(MAX_JOINTS);
         let off_m = next_m - tip.translation.vector;
         let turn: Vector3<f64> = (self.tip.rotation * tip.rotation.inverse()).scaled_axis();
@@ -107,7 +109,7 @@ impl<'a> JogPath<'a> {
                 return false;
             }
         }
-        let (reached, _) = self.robot.chain.jacobian(&next_rad);
+        let reached = self.robot.chain.frame(self.tip_frame, &next_rad);
         if (reached.translation.vector - next_m).norm() > 0.5 * STEP_M {
             return false;
         }
@@ -135,9 +137,9 @@ mod tests {
             [(Vector3::z_axis(), false), (Vector3::x_axis(), false), (Vector3::y_axis(), true)]
         {
             let mut path = JogPath::new(&robot, Jogged::Tip { axis, is_tools }, &HOME);
-            let (from, _) = robot.chain.jacobian(&HOME);
+            let from = robot.chain.frame(6, &HOME);
             assert!((0..50).all(|_| path.lead(0.002)), "{axis:?}");
-            let (to, _) = robot.chain.jacobian(path.at_rad());
+            let to = robot.chain.frame(6, path.at_rad());
             let along = if is_tools { from.rotation * axis.into_inner() } else { axis.into_inner() };
             let off_m = to.translation.vector - from.translation.vector - along * 0.1;
             assert!(off_m.norm() < 1e-4, "{axis:?}: {off_m}");

@@ -197,7 +197,13 @@ fn tip_goal(target: &TipTarget, speed: Option<TipSpeed>) -> TipGoal {
         angular_rad_s,
         off_m_max,
     });
-    TipGoal { position_m: target.position_m, tolerance_m: target.tolerance_m, orientation, line }
+    TipGoal {
+        tip: u32::try_from(target.tip).unwrap_or(u32::MAX),
+        position_m: target.position_m,
+        tolerance_m: target.tolerance_m,
+        orientation,
+        line,
+    }
 }
 
 /// Asks the planner, prints the receipt, and waits for the end of the motion if requested.

@@ -30,7 +30,8 @@ pub(super) struct Stage<'a> {
     robot: &'a Robot,
     scene: &'a Scene,
     poses_rad: Vec<JointArray>,
-    tip_m: Vec<Point3<f64>>,
+    /// One line a tip.
+    tips_m: Vec<Vec<Point3<f64>>>,
 }
 
 /// One view's outlines.
@@ -38,10 +39,11 @@ struct Seen {
     view: View,
     /// One entry a pose, one outline a link.
     arm: Vec<Vec<Vec<Point>>>,
-    /// Origins of the frames, one line a pose.
+    /// Origins of the frames, one line a pose and tip.
     sticks: Vec<Vec<Point>>,
     obstacles: Vec<(String, Vec<Point>)>,
-    tip: Vec<Point>,
+    /// One path a tip.
+    tips: Vec<Vec<Point>>,
     x_m: Range<f64>,
     y_m: Range<f64>,
 }
@@ -51,16 +53,15 @@ impl<'a> Stage<'a> {
     pub(super) fn of(robot: &'a Robot, scene: &'a Scene, trajectory: &Trajectory) -> Self {
         let at = |share: f64| trajectory.sample(share * trajectory.duration_s()).position_rad;
         let shares = |count: u32| (0..count).map(move |k| f64::from(k) / f64::from(count - 1));
-        let tip = |share| {
-            let frames = robot.chain.frames(&at(share));
-            let [.., last] = frames;
-            Point3::from(last.translation.vector)
+        let tip = |frame: usize| {
+            let point = |share| Point3::from(robot.chain.frame(frame, &at(share)).translation.vector);
+            shares(PATH_POINTS).map(point).collect()
         };
         Self {
             robot,
             scene,
             poses_rad: shares(POSES).map(at).collect(),
-            tip_m: shares(PATH_POINTS).map(tip).collect(),
+            tips_m: robot.chain.tips().iter().map(|frame| tip(*frame)).collect(),
         }
     }
 
@@ -93,18 +94,24 @@ impl<'a> Stage<'a> {
                 outline(&shape.shape, &(frame * shape.pose), view)
             };
             arm.push(self.robot.shapes.iter().map(link).collect());
-            let used = frames.iter().take(self.robot.joints.len() + 1);
-            sticks.push(used.map(|f| view.of(&Point3::from(f.translation.vector))).collect());
+            let chain = &self.robot.chain;
+            for tip in chain.tips() {
+                let used = std::iter::once(0).chain(chain.movers(*tip).map(|joint| joint + 1));
+                let origin = |frame: usize| frames.get(frame).copied().unwrap_or_default().translation.vector;
+                sticks.push(used.map(|frame| view.of(&Point3::from(origin(frame)))).collect());
+            }
         }
         let obstacle = |o: &taustream_arm::Obstacle| (o.name.clone(), outline(&o.shape, &o.pose, view));
         let obstacles: Vec<(String, Vec<Point>)> = self.scene.obstacles.iter().map(obstacle).collect();
-        let tip: Vec<Point> = self.tip_m.iter().map(|p| view.of(p)).collect();
+        let seen = |tip_m: &Vec<Point3<f64>>| tip_m.iter().map(|p| view.of(p)).collect();
+        let tips: Vec<Vec<Point>> = self.tips_m.iter().map(seen).collect();
 
-        let own = || arm.iter().flatten().flatten().chain(sticks.iter().flatten()).chain(&tip);
+        let own =
+            || arm.iter().flatten().flatten().chain(sticks.iter().flatten()).chain(tips.iter().flatten());
         let others = || obstacles.iter().flat_map(|(_, o)| o);
         let x_m = reach(own().map(|p| p.0), others().map(|p| p.0));
         let y_m = reach(own().map(|p| p.1), others().map(|p| p.1));
-        Seen { view, arm, sticks, obstacles, tip, x_m, y_m }
+        Seen { view, arm, sticks, obstacles, tips, x_m, y_m }
     }
 }
 
@@ -156,7 +163,8 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
         chart.draw_series([closed(&shown, OBSTACLE, 1)])?;
     }
     let poses = seen.arm.len();
-    for (index, (links, stick)) in (0_u32..).zip(seen.arm.iter().zip(&seen.sticks)) {
+    let each = seen.sticks.len() / poses.max(1);
+    for (index, (links, sticks)) in (0_u32..).zip(seen.arm.iter().zip(seen.sticks.chunks(each.max(1)))) {
         let colour = between(f64::from(index) / f64::from(POSES - 1));
         let is_end = index == 0 || usize::try_from(index).is_ok_and(|i| i + 1 == poses);
         let opacity = if is_end { 0.38 } else { 0.10 };
@@ -164,14 +172,18 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
         if is_end {
             chart.draw_series(links.iter().map(|link| closed(link, colour, 1)))?;
         }
-        chart.draw_series([open(stick, colour, if is_end { 2 } else { 1 })])?;
-        chart.draw_series(
-            stick.iter().map(|p| Circle::new(*p, if is_end { 3 } else { 1 }, colour.filled())),
-        )?;
+        for stick in sticks {
+            chart.draw_series([open(stick, colour, if is_end { 2 } else { 1 })])?;
+            chart.draw_series(
+                stick.iter().map(|p| Circle::new(*p, if is_end { 3 } else { 1 }, colour.filled())),
+            )?;
+        }
     }
-    chart.draw_series(LineSeries::new(seen.tip.iter().copied(), PATH.stroke_width(2)))?;
-    let ends = seen.tip.first().into_iter().chain(seen.tip.last());
-    chart.draw_series(ends.map(|p| Circle::new(*p, 4, PATH.filled())))?;
+    for tip in &seen.tips {
+        chart.draw_series(LineSeries::new(tip.iter().copied(), PATH.stroke_width(2)))?;
+        let ends = tip.first().into_iter().chain(tip.last());
+        chart.draw_series(ends.map(|p| Circle::new(*p, 4, PATH.filled())))?;
+    }
     let font = ("sans-serif", LABEL_PX).into_font().color(&OBSTACLE);
     for (name, at) in labels(seen, (low, high), m_per_px) {
         chart.draw_series([Text::new(name.to_owned(), at, font.clone())])?;

@@ -102,7 +102,7 @@ impl<'a> ControlPointCost<'a> {
         let mut sum = Sum::new(&self.model, self.robot, &self.spheres);
         for (segment, step) in prefiltered.suspects {
             let pose = self.pose(corners.get(segment..segment + 2)?, step);
-            sum.penalise(&self.robot.chain.frames(&pose)[..=self.robot.chain.joints()]);
+            sum.penalise(&self.robot.chain.frames(&pose));
         }
         let travels = corners.windows(2).map(|pair| match pair {
             [from, to] => from.iter().zip(to).map(|(p, q)| (q - p).abs()).sum(),

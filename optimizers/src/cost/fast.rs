@@ -38,13 +38,16 @@ pub(super) struct Prefiltered {
 }
 
 impl Fast {
-    /// `None` for an arm or spheres that the kernel cannot see.
+    /// `None` for an arm or spheres that the kernel cannot see; it sees serial arms only.
     pub(super) fn new(
         chain: &Chain,
         spheres: &[(Point, f64)],
         model: &CostModel,
         phases: &[f64],
     ) -> Option<Self> {
+        if !chain.is_serial() {
+            return None;
+        }
         let sums = model.reading == Reading::Printed;
         let flat = Flat::new(&Skeleton::new(chain), spheres, model.expansion_m, sums)?;
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]

@@ -24,7 +24,7 @@ use crate::Reading;
 use taustream_arm::scene::Shape;
 use taustream_arm::{Robot, Scene};
 use taustream_motion::chain::Pose;
-use taustream_motion::{JointArray, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Trajectory};
 
 /// The numbers of the cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,7 +195,7 @@ struct Sum<'a> {
     model: &'a CostModel,
     robot: &'a Robot,
     spheres: &'a [(Point, f64)],
-    last: Option<(JointArray, Point)>,
+    last: Option<(JointArray, [Pose; MAX_JOINTS + 1])>,
     cost: PaperCost,
 }
 
@@ -206,24 +206,24 @@ impl<'a> Sum<'a> {
 
     fn add(&mut self, position_rad: &JointArray) {
         let frames = self.robot.chain.frames(position_rad);
-        let frames = &frames[..=self.robot.chain.joints()];
-        let tip = frames.last().map_or_else(Point::origin, origin);
-        if let Some((before_rad, before)) = self.last {
-            self.cost.path_length_m += (tip - before).norm();
-            let steps = position_rad.iter().zip(&before_rad);
+        if let Some((before_rad, before)) = &self.last {
+            for tip in self.robot.chain.tips() {
+                self.cost.path_length_m += (origin(&frames[*tip]) - origin(&before[*tip])).norm();
+            }
+            let steps = position_rad.iter().zip(before_rad);
             self.cost.joint_travel_rad += steps.map(|(q, p)| (q - p).abs()).sum::<f64>();
         }
-        self.last = Some((*position_rad, tip));
+        self.last = Some((*position_rad, frames));
         self.cost.poses += 1;
-        self.penalise(frames);
+        self.penalise(&frames);
     }
 
     /// Adds what a pose costs by being too near to spheres.
-    fn penalise(&mut self, frames: &[Pose]) {
+    fn penalise(&mut self, frames: &[Pose; MAX_JOINTS + 1]) {
+        let chain = &self.robot.chain;
         for (centre, radius_m) in self.spheres {
-            let distances_m = frames
-                .windows(2)
-                .filter_map(|pair| if let [a, b] = pair { Some((origin(a), origin(b))) } else { None })
+            let distances_m = (0..chain.joints())
+                .map(|joint| (origin(&frames[chain.parent_frame(joint)]), origin(&frames[joint + 1])))
                 .map(|(a, b)| distance_to_segment_m(centre, &a, &b));
             let distance_m = match self.model.reading {
                 Reading::Corrected => distances_m.fold(f64::INFINITY, f64::min),

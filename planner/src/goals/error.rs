@@ -15,6 +15,14 @@ pub enum GoalError {
         /// The value that was given.
         value_m: f64,
     },
+    /// A tip that the robot does not have.
+    #[error("there is no tip {}; the robot has {tips}", tip + 1)]
+    NoSuchTip {
+        /// Counted from 0.
+        tip: usize,
+        /// How many there are.
+        tips: usize,
+    },
     /// A tolerance is negative or no number.
     #[error("the tolerance of the {what} is {value}; it must be 0 or more ({unit})")]
     BadTolerance {
@@ -113,6 +121,7 @@ impl GoalError {
             Self::Plan(error) => error.stages(),
             Self::NoMotion { error, .. } | Self::NoneOf { error, .. } => error.stages(),
             Self::BadPosition { .. }
+            | Self::NoSuchTip { .. }
             | Self::BadTolerance { .. }
             | Self::TooFar { .. }
             | Self::Missed { .. }

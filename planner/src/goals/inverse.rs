@@ -60,7 +60,7 @@ impl<'a> Inverse<'a> {
 
     /// What is left, all in m.
     fn left(&self, pose_rad: &JointArray) -> Vector6<f64> {
-        let [.., tip] = self.robot.chain.frames(pose_rad);
+        let tip = self.robot.chain.frame(self.target.frame(self.robot), pose_rad);
         self.weighed(self.target.left(&tip))
     }
 
@@ -71,7 +71,7 @@ impl<'a> Inverse<'a> {
 
     /// One damped step, held to the ranges. A joint that stands at its end and would leave it takes no part.
     fn step(&self, pose_rad: &JointArray, damping: f64) -> JointArray {
-        let (tip, columns) = self.robot.chain.jacobian(pose_rad);
+        let (tip, columns) = self.robot.chain.jacobian(self.target.frame(self.robot), pose_rad);
         let left = self.weighed(self.target.left(&tip));
         let into_tip = tip.rotation.inverse();
         let is_asked = |i: usize| self.target.orientation.is_some() && left[3 + i] != 0.0;

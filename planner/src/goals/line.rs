@@ -158,7 +158,7 @@ pub fn plan_line(
     check_target(target)?;
     check_pose(robot, PoseOf::Start, &start_rad).map_err(GoalError::from)?;
     let reach_m = check_reach(robot, target)?;
-    let [.., tip] = robot.chain.frames(&start_rad);
+    let tip = robot.chain.frame(target.frame(robot), &start_rad);
     let line = Segment::new(&tip, target);
     if line.length_m < STEP_M * 1e-3 && line.angle_rad < STEP_RAD * 1e-3 {
         return Err(LineError::Still);
@@ -190,6 +190,8 @@ pub fn plan_line(
 
 /// The line itself, by the share of it that is behind.
 struct Segment {
+    /// Which tip goes along it.
+    tip: usize,
     from: Pose,
     towards_m: Vector3<f64>,
     /// From the first orientation to the last, in the first one's axes.
@@ -203,7 +205,14 @@ impl Segment {
         let towards_m = Vector3::from(target.position_m) - from.translation.vector;
         let rotation = target.orientation.map_or(from.rotation, |o| o.rotation);
         let turn = from.rotation.inverse() * rotation;
-        Self { from: *from, towards_m, turn, length_m: towards_m.norm(), angle_rad: turn.angle() }
+        Self {
+            tip: target.tip,
+            from: *from,
+            towards_m,
+            turn,
+            length_m: towards_m.norm(),
+            angle_rad: turn.angle(),
+        }
     }
 
     fn at(&self, share: f64) -> Pose {
@@ -214,7 +223,7 @@ impl Segment {
     fn target(&self, share: f64) -> TipTarget {
         let pose = self.at(share);
         let orientation = Some(Orientation { rotation: pose.rotation, tolerance_rad: [0.0; 3] });
-        TipTarget { orientation, ..TipTarget::position(pose.translation.vector.into()) }
+        TipTarget { tip: self.tip, orientation, ..TipTarget::position(pose.translation.vector.into()) }
     }
 
     /// Distance of the tip to the line, at most, by dense samples.
@@ -225,8 +234,8 @@ impl Segment {
         let mut most_m: f64 = 0.0;
         let mut k = 0.0;
         while k <= samples {
-            let [.., tip] =
-                robot.chain.frames(&motion.sample(motion.duration_s() * k / samples).position_rad);
+            let pose_rad = motion.sample(motion.duration_s() * k / samples).position_rad;
+            let tip = robot.chain.frame(self.target(0.0).frame(robot), &pose_rad);
             let way = tip.translation.vector - self.from.translation.vector;
             let share = (way.dot(&self.towards_m) / square).clamp(0.0, 1.0);
             most_m = most_m.max((way - self.towards_m * share).norm());

@@ -2,7 +2,7 @@
 //!
 //! Inverse kinematics ([`Inverse`]) from many guesses, or a swarm by name, finds poses whose tip is at the target. What is
 //! not exact, or nearer to anything than it may be, is dropped; to the nearest of the others motions are planned, and the
-//! best verified one wins. The tip is the robot's last frame.
+//! best verified one wins. A robot with several tips has a target for one of them.
 mod error;
 mod inverse;
 mod line;
@@ -190,9 +190,14 @@ fn check_target(target: &TipTarget) -> Result<(), GoalError> {
 
 /// An upper bound of the tip's distance to the first joint, unless the position is farther away.
 fn check_reach(robot: &Robot, target: &TipTarget) -> Result<f64, GoalError> {
-    let chain = &robot.chain;
-    let first = chain.joint(0).map_or_else(Vector3::zeros, |j| j.pre.translation.vector);
-    let joints = (0..chain.joints()).filter_map(|i| chain.joint(i));
+    let (chain, tips) = (&robot.chain, robot.chain.tips().len());
+    if target.tip >= tips {
+        return Err(GoalError::NoSuchTip { tip: target.tip, tips });
+    }
+    let frame = target.frame(robot);
+    let first = chain.movers(frame).next().and_then(|first| chain.joint(first));
+    let first = first.map_or_else(Vector3::zeros, |j| j.pre.translation.vector);
+    let joints = chain.movers(frame).filter_map(|i| chain.joint(i));
     let lengths = joints.map(|j| j.pre.translation.vector.norm() + j.post.translation.vector.norm());
     let reach_m = lengths.sum::<f64>() - first.norm();
     let distance_m = (Vector3::from(target.position_m) - first).norm();

@@ -143,6 +143,7 @@ impl Search<'_> {
                     world: self.world,
                     budget: self.budget,
                     start_rad: self.start_rad,
+                    tip_frame: self.target.frame(robot),
                     target_m: self.target.position_m,
                     reach_m: self.reach_m,
                     reading: self.reading,

@@ -26,6 +26,8 @@ pub(super) struct Swarm<'a> {
     pub(super) budget: &'a Budget<'a>,
     /// Where the arm starts.
     pub(super) start_rad: JointArray,
+    /// The frame that is led there.
+    pub(super) tip_frame: usize,
     /// Where the tip shall be, in the base's frame.
     pub(super) target_m: [f64; 3],
     /// Farthest that the tip can be from its first joint.
@@ -42,10 +44,8 @@ impl Swarm<'_> {
     pub(super) fn run(&self, method: &Method, seed: u64) -> Result<Option<JointArray>, Refusal> {
         let joints = &self.world.robot().joints;
         let chain = &self.world.robot().chain;
-        let position_m = |angles: &[f64]| {
-            let [.., tip] = chain.frames(&pose_of(angles));
-            tip.translation.vector.into()
-        };
+        let frame = self.tip_frame;
+        let position_m = |angles: &[f64]| chain.frame(frame, &pose_of(angles)).translation.vector.into();
         let bounds_rad: Vec<[f64; 2]> = joints.iter().map(|j| j.limits.position_rad).collect();
         let speeds_rad_s: Vec<f64> = joints.iter().map(|j| j.limits.motion.velocity_rad_s).collect();
         let start_rad: Vec<f64> = self.start_rad.iter().take(joints.len()).copied().collect();

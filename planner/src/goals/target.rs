@@ -11,9 +11,11 @@ pub const ERROR_RAD_MAX: f64 = 1e-6;
 /// Share of a tolerance that is aimed at, so that rounding does not decide whether a pose is inside.
 const AIM: f64 = 0.9;
 
-/// Where the tip (the robot's last frame) shall end, in the base's frame.
+/// Where a tip of the robot shall end, in the base's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipTarget {
+    /// Which one, counted from 0: a serial arm has one.
+    pub tip: usize,
     /// Where it shall be.
     pub position_m: [f64; 3],
     /// How far off it may be.
@@ -32,16 +34,21 @@ pub struct Orientation {
 }
 
 impl TipTarget {
-    /// A position, however the tip is turned.
+    /// A position of the first tip, however that is turned.
     #[must_use]
     pub fn position(position_m: [f64; 3]) -> Self {
-        Self { position_m, tolerance_m: 0.0, orientation: None }
+        Self { tip: 0, position_m, tolerance_m: 0.0, orientation: None }
+    }
+
+    /// The tip's frame; that of the first tip for one that is not there, which is refused before.
+    pub(super) fn frame(&self, robot: &Robot) -> usize {
+        robot.chain.tips().get(self.tip).copied().unwrap_or(robot.chain.tip_frame())
     }
 
     /// How far the tip of a pose is off, beyond no tolerance.
     #[must_use]
     pub fn error(&self, robot: &Robot, pose_rad: &JointArray) -> TipError {
-        let [.., tip] = robot.chain.frames(pose_rad);
+        let tip = robot.chain.frame(self.frame(robot), pose_rad);
         let position_m = (Vector3::from(self.position_m) - tip.translation.vector).norm();
         let turned_rad = self.orientation.map(|o| o.off_rad(&tip));
         TipError { position_m, turned_rad }

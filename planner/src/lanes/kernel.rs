@@ -94,6 +94,9 @@ impl<'a, S: Simd> Chunk<'a, S> {
             }
             let (angle, _) = S::as_simd_f32s(&angles);
             let [sin, cos] = ops.sin_cos_pi(angle[0]);
+            if joint.parent != j {
+                (columns, origin) = frames[joint.parent];
+            }
             origin = ops.moved(origin, &columns, joint.shift);
             let zero3 = [zero; 3];
             let fixed = [

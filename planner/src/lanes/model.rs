@@ -15,6 +15,8 @@ const TREE_MIN: usize = 24;
 
 /// From one joint to the next: a fixed motion, then a rotation about z.
 pub(super) struct Joint {
+    /// The frame that it stands in.
+    pub(super) parent: usize,
     /// Columns of the rotation.
     pub(super) columns: [[f32; 3]; 3],
     pub(super) shift: [f32; 3],
@@ -236,7 +238,9 @@ impl Model {
 
 /// A joint whose axis is z.
 struct Aligned {
-    /// From the axes of the joint before it.
+    /// The frame that it stands in.
+    parent: usize,
+    /// From the axes of that frame's joint, or from the base.
     before: Isometry3<f64>,
     offset_rad: f64,
     /// From the joint's axes, rotated, to the frame behind it.
@@ -245,7 +249,8 @@ struct Aligned {
 
 fn aligned(world: &World) -> Vec<Aligned> {
     let chain = &world.robot().chain;
-    let mut behind = Isometry3::identity();
+    // From the axes of each joint to the frame behind it; the base has none.
+    let mut behind = vec![Isometry3::identity()];
     (0..world.joints())
         .filter_map(|index| {
             let joint = chain.joint(index)?;
@@ -253,12 +258,15 @@ fn aligned(world: &World) -> Vec<Aligned> {
             let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
             let turn = UnitQuaternion::rotation_between(&Vector3::z(), &axis).unwrap_or_else(half_turn);
             let align = Isometry3::from_parts(Translation3::identity(), turn);
-            let before = behind * joint.pre * align;
-            behind = align.inverse() * joint.post;
+            let parent = chain.parent_frame(index);
+            let before = behind.get(parent)? * joint.pre * align;
+            let to_frame = align.inverse() * joint.post;
+            behind.push(to_frame);
             Some(Aligned {
+                parent,
                 before,
                 offset_rad: joint.offset_rad,
-                to_frame: taustream_arm::body::to_parry(&behind),
+                to_frame: taustream_arm::body::to_parry(&to_frame),
             })
         })
         .collect()
@@ -271,6 +279,7 @@ fn joints(world: &World, aligned: &[Aligned]) -> Vec<Joint> {
         let (turn, shift) = (a.before.rotation.to_rotation_matrix(), a.before.translation.vector);
         let entry = |row: usize, column: usize| turn[(row, column)] as f32;
         Joint {
+            parent: a.parent,
             columns: std::array::from_fn(|column| std::array::from_fn(|row| entry(row, column))),
             shift: [shift.x as f32, shift.y as f32, shift.z as f32],
             offset: a.offset_rad / PI,

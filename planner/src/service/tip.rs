@@ -20,7 +20,9 @@ fn target(tip: &TipGoal) -> TipTarget {
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         Orientation { rotation, tolerance_rad: o.tolerance_rad }
     });
-    TipTarget { position_m: tip.position_m, tolerance_m: tip.tolerance_m, orientation }
+    // A tip that is not there is refused like one of the library's callers.
+    let number = usize::try_from(tip.tip).unwrap_or(usize::MAX);
+    TipTarget { tip: number, position_m: tip.position_m, tolerance_m: tip.tolerance_m, orientation }
 }
 
 fn situation(revision: &SceneRevision, start_rad: JointArray) -> Situation<'_> {
