@@ -144,6 +144,7 @@ impl Chain {
         joint < self.count && self.movers.get(frame).is_some_and(|movers| movers & (1 << joint) != 0)
     }
     /// The joints that move a frame, base first.
+    #[must_use]
     pub fn movers(&self, frame: usize) -> impl DoubleEndedIterator<Item = usize> + '_ {
         (0..self.count).filter(move |joint| self.moves(*joint, frame))
     }

@@ -231,7 +231,7 @@ mod tests {
         }
         // Every other one is a tree.
         let mut parent = |joint: usize| {
-            if count % 2 == 0 || random.next() > 0.0 { joint } else { joint / 2 }
+            if count.is_multiple_of(2) || random.next() > 0.0 { joint } else { joint / 2 }
         };
         let parents: std::vec::Vec<usize> = (0..count).map(&mut parent).collect();
         let chain = Chain::tree(&joints, &parents, &[count]).unwrap();
