@@ -109,7 +109,7 @@ fn robot(template: &Robot, seed: u64) -> Robot {
         }
     }
     let parents: Vec<usize> =
-        (0..count).map(|joint| if seed % 2 == 0 { joint } else { rng.index(joint + 1) }).collect();
+        (0..count).map(|joint| if seed.is_multiple_of(2) { joint } else { rng.index(joint + 1) }).collect();
     let joint = template.joints[0].clone();
     let mut robot = template.clone();
     robot.joints = vec![joint; count];
