@@ -157,7 +157,11 @@ fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
     let tables = top.tables("joint");
     let count = tables.len();
     if !(1..=MAX_JOINTS).contains(&count) {
-        top.fault("joint", &format!("{count} tables"), "1 to 8 tables [[joint]], base to tip");
+        top.fault(
+            "joint",
+            &format!("{count} tables"),
+            &format!("1 to {MAX_JOINTS} tables [[joint]], base to tip"),
+        );
     }
     let mut read: Vec<Option<(Joint, Row)>> = Vec::new();
     for mut table in tables {

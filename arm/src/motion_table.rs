@@ -427,7 +427,7 @@ mod tests {
             ("t_s\n0\n1\n", "q1_rad = missing"),
             ("t_s,q2_rad\n0,0\n1,1\n", "q1_rad = missing"),
             ("t_s,q1_rad,t_s\n", "t_s = stands there twice"),
-            ("t_s,q1_rad,q9_rad\n", "\"q9_rad\" = too many joints: expected q1_rad to q8_rad"),
+            ("t_s,q1_rad,q17_rad\n", "\"q17_rad\" = too many joints: expected q1_rad to q16_rad"),
             ("t_s,q1_rad\n0,0\n", "1 row(s): expected at least two rows"),
             ("t_s,q1_rad\n0,0\n1,nan\n", "m.csv:3: q1_rad = \"nan\": expected a finite number"),
             ("t_s,q1_rad\n0,0\n1,1e999\n", "q1_rad = \"1e999\""),

@@ -47,7 +47,7 @@ pub struct Robot {
     pub name: String,
     /// The file that it was read from.
     pub file: PathBuf,
-    /// 1 to 8 joints, base to tip.
+    /// 1 to [`MAX_JOINTS`] joints, base to tip.
     pub joints: Vec<RobotJoint>,
     /// Kinematics. Frame 0 is the base; the last frame is the flange of the last row, or the tip link of a URDF.
     pub chain: Chain,
@@ -135,7 +135,12 @@ impl Robot {
     fn build(fault_list: &FaultList, description: &Description, touching: Touching) -> Option<Self> {
         let parts = Parts::of(description);
         let Some(chain) = Chain::new(&parts.chain) else {
-            fault_list.add(None, "joint", &format!("{} tables", parts.chain.len()), "1 to 8 joints");
+            fault_list.add(
+                None,
+                "joint",
+                &format!("{} tables", parts.chain.len()),
+                &format!("1 to {MAX_JOINTS} joints"),
+            );
             return None;
         };
         let limits: Vec<JointLimits> = description.joints.iter().map(|joint| joint.limits).collect();

@@ -267,8 +267,8 @@ const TRAJECTORY_CASES: &[Case] = &[
     (Trajectory, "\"digest\":\"0011", "\"digest\":\"00", "digest", "64 hexadecimal digits"),
     (Trajectory, "\"digest\":\"00", "\"digest\":\"0G", "digest", "64 hexadecimal digits"),
     (Trajectory, "\"digest\":\"", "\"digest\":7,\"x\":\"", "digest", "= 7"),
-    (Trajectory, "\"joints\":6", "\"joints\":9", "joints", "an integer from 1 to 8"),
-    (Trajectory, "\"joints\":6", "\"joints\":0", "joints", "an integer from 1 to 8"),
+    (Trajectory, "\"joints\":6", "\"joints\":17", "joints", "an integer from 1 to 16"),
+    (Trajectory, "\"joints\":6", "\"joints\":0", "joints", "an integer from 1 to 16"),
     // A seven-joint arm with six values, in every list.
     (Trajectory, "\"joints\":6", "\"joints\":7", "base_rad", "(6 values): expected a list of 7 numbers"),
     (
@@ -361,19 +361,22 @@ fn faults_of_robot_scene_and_settings_come_together() {
 }
 
 #[test]
-fn joint_count_beside_one_to_eight_is_refused() {
+fn joint_count_beside_one_to_sixteen_is_refused() {
     let text = Robot.good_text();
     let last = &text[text.rfind("[[joint]]").unwrap()..];
     // Pairs of links need their links.
     let head = text[..text.find("[[joint]]").unwrap()]
         .replace("allowed_contacts = [[\"link3\", \"link5\"], [\"link4\", \"link6\"]]", "");
-    for count in [0, 9, 40] {
+    for count in [0, 17, 40] {
         let tables: Vec<String> = (0..count).map(|i| last.replace("wrist_3", &format!("j{i}"))).collect();
         let faults = faults_of(Robot, &format!("{head}{}", tables.join("\n")));
         assert_eq!(faults.0.len(), 1, "{faults}");
-        assert!(faults.to_string().contains(&format!("joint = {count} tables: expected 1 to 8")), "{faults}");
+        assert!(
+            faults.to_string().contains(&format!("joint = {count} tables: expected 1 to 16")),
+            "{faults}"
+        );
     }
-    for count in [1, 8] {
+    for count in [1, 16] {
         let tables: Vec<String> = (0..count).map(|i| last.replace("wrist_3", &format!("j{i}"))).collect();
         assert_eq!(Robot.read(&format!("{head}{}", tables.join("\n"))), Ok(()));
     }

@@ -4,6 +4,7 @@ use proptest::prelude::{any, prop, proptest};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use taustream_arm::{Faults, Robot};
+use taustream_motion::MAX_JOINTS;
 
 /// An arm of two joints with every kind of element; small, because thousands of its edits are read.
 const URDF: &str = r#"<?xml version="1.0"?>
@@ -430,7 +431,7 @@ proptest! {
         }
         folder.write(name, text.as_bytes());
         if let Ok(robot) = Robot::load(&folder.0.join("two.toml")) {
-            let frames = robot.chain.frames(&[0.5; 8]);
+            let frames = robot.chain.frames(&[0.5; MAX_JOINTS]);
             assert!(frames.iter().all(|frame| frame.to_homogeneous().iter().all(|n| n.is_finite())));
             let sound = |shape: &taustream_arm::LinkShape| shape.frame <= 2 && shape.link < robot.links.len();
             assert!(robot.shapes.iter().all(sound) && robot.joints.len() == 2);

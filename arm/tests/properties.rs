@@ -98,7 +98,7 @@ fn angle() -> impl Strategy<Value = f64> {
 }
 
 fn stroke() -> impl Strategy<Value = Stroke> {
-    let delta_rad = prop::array::uniform8(angle());
+    let delta_rad = prop::array::uniform16(angle());
     (0.0..END_S_MAX / 2.0, DURATION_S_MIN..END_S_MAX / 2.0, 4_u32..=64, delta_rad)
         .prop_map(|(start_s, duration_s, n, delta_rad)| Stroke { start_s, duration_s, n, delta_rad })
 }
@@ -146,7 +146,7 @@ proptest! {
     #[test]
     fn trajectory_file_written_and_read_keeps_every_bit(
         joints in 1..=MAX_JOINTS,
-        base_rad in prop::array::uniform8(angle()),
+        base_rad in prop::array::uniform16(angle()),
         strokes in prop::collection::vec(stroke(), 0..20),
         digest in prop::option::of("[0-9a-f]{64}"),
     ) {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use taustream_arm::body::{Body, to_parry};
 use taustream_arm::{BusKind, Obstacle, Robot, Scene, Settings, Shape};
 use taustream_motion::chain::Pose;
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
 
 fn config() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config")
@@ -166,7 +166,7 @@ fn shipped_scene_leaves_common_poses_of_the_ur5_free_and_its_foot_always() {
 fn pillars_stand_in_the_way_of_the_straight_swing_between_their_gaps() {
     let robot = Robot::load(&config().join("robots/ur5.toml")).unwrap();
     let scene = Scene::load(&config().join("scenes/pillars.toml")).unwrap();
-    let reach = |pan_rad: f64| [pan_rad, -0.9, 0.9, -1.57, -1.57, 0.0, 0.0, 0.0];
+    let reach = |pan_rad: f64| joint_array([pan_rad, -0.9, 0.9, -1.57, -1.57, 0.0]);
     let least = |pose: &JointArray| {
         clearances_m(&robot, &scene, pose).into_iter().min_by(|a, b| a.2.total_cmp(&b.2)).unwrap()
     };
@@ -194,11 +194,11 @@ const GAPS_RAD: [f64; 4] = [-1.7, -0.65, 0.3, 1.5];
 
 /// Straight up; the usual working pose, straight and to each side; the help's example; folded; reaching up and forward.
 const COMMON_POSES: [JointArray; 7] = [
-    [0.0, -1.57, 0.0, -1.57, 0.0, 0.0, 0.0, 0.0],
-    [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
-    [0.8, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
-    [-0.8, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0],
-    [1.2, -1.3, 1.4, -1.6, -1.57, 0.0, 0.0, 0.0],
-    [0.0, -2.2, 2.2, -1.57, -1.57, 0.0, 0.0, 0.0],
-    [0.0, -1.2, 0.6, -1.57, -1.57, 0.0, 0.0, 0.0],
+    joint_array([0.0, -1.57, 0.0, -1.57, 0.0, 0.0]),
+    joint_array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]),
+    joint_array([0.8, -1.57, 1.57, -1.57, -1.57, 0.0]),
+    joint_array([-0.8, -1.57, 1.57, -1.57, -1.57, 0.0]),
+    joint_array([1.2, -1.3, 1.4, -1.6, -1.57, 0.0]),
+    joint_array([0.0, -2.2, 2.2, -1.57, -1.57, 0.0]),
+    joint_array([0.0, -1.2, 0.6, -1.57, -1.57, 0.0]),
 ];

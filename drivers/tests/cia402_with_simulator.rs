@@ -5,6 +5,7 @@ use taustream_arm::Settings;
 use taustream_drivers::codec::cia402::{Cia402Driver, CountScale, rad_from_counts};
 use taustream_drivers::sim::{Drive, ServoSimulator, settings::drives};
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
+use taustream_motion::MAX_JOINTS;
 
 const JOINTS: usize = 6;
 /// Where a UR5 stands free.
@@ -17,7 +18,7 @@ struct Arm {
     settings: Settings,
     now: Nanos,
     drive_target: DriveTarget,
-    commands: [JointCommand; 8],
+    commands: [JointCommand; MAX_JOINTS],
     /// Frames of the drives that arrive in the next cycle.
     arriving: Vec<CanFrame>,
 }
@@ -33,7 +34,7 @@ impl Arm {
             settings,
             now: Nanos(1_000_000_000),
             drive_target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             arriving: Vec::new(),
         }
     }

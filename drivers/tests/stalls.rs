@@ -17,6 +17,7 @@ use taustream_drivers::protocols::{self, BusDriver};
 use taustream_drivers::sim::ServoSimulator;
 use taustream_drivers::sim::settings::drives;
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
+use taustream_motion::MAX_JOINTS;
 
 const PERIOD_S: f64 = 1e-3;
 const START_RAD: [f64; 6] = [0.0, -1.2, 1.0, -0.5, 0.3, -0.2];
@@ -59,7 +60,7 @@ struct Arm {
     simulator: ServoSimulator,
     now: Nanos,
     drive_target: DriveTarget,
-    commands: [JointCommand; 8],
+    commands: [JointCommand; MAX_JOINTS],
     arriving: Vec<CanFrame>,
 }
 
@@ -86,7 +87,7 @@ impl Arm {
             simulator: ServoSimulator::new(setups, 1, 1),
             now: Nanos(1_000_000_000),
             drive_target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             arriving: Vec::new(),
         };
         arm.until(DriveState::Disabled);

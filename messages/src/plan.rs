@@ -92,7 +92,7 @@ pub enum PlanRequestError {
         /// The version in the message.
         got: u32,
     },
-    /// Not 1 to 8 joints.
+    /// Not 1 to [`MAX_JOINTS`] joints.
     #[error("{got} joint values; an arm has 1 to {MAX_JOINTS}")]
     Joints {
         /// The count in the message.
@@ -346,5 +346,5 @@ impl PlanReply {
     }
 }
 
-const _: () = assert!(size_of::<PlanRequest>() == 464 + 16 + 1024);
+const _: () = assert!(size_of::<PlanRequest>() == 528 + 16 + 2048);
 const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248);

@@ -69,7 +69,7 @@ pub enum TargetError {
         /// The version in the message.
         got: u32,
     },
-    /// Not 1 to 8 joints.
+    /// Not 1 to [`MAX_JOINTS`] joints.
     #[error("{got} joint values; an arm has 1 to {MAX_JOINTS}")]
     Joints {
         /// The count in the message.

@@ -258,5 +258,5 @@ fn count(what: &'static str, got: u32, most: usize) -> Result<usize, MessageErro
     usize::try_from(got).ok().filter(|n| *n <= most).ok_or(MessageError::Count { what, got, most })
 }
 
-const _: () = assert!(size_of::<StrokeMessage>() == 88);
-const _: () = assert!(size_of::<TrajectoryMessage>() == 152 + 88 * MAX_STROKES);
+const _: () = assert!(size_of::<StrokeMessage>() == 152);
+const _: () = assert!(size_of::<TrajectoryMessage>() == 216 + 152 * MAX_STROKES);

@@ -20,7 +20,7 @@ use taustream_messages::{
     LAYOUT_VERSION, Outcome, Phase, PlanReply, PlanRequest, Receipt, Rejection, Replaces, Report, SceneReply,
     SceneRequest, TargetReply, TargetRequest, Text, TrajectoryMessage,
 };
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory, joint_array};
 
 /// Makes a message of arbitrary bytes, as a hostile sender can.
 #[expect(unsafe_code, reason = "a test of arbitrary bits has to write arbitrary bits")]
@@ -149,9 +149,9 @@ fn trajectory_written_and_read_is_the_same() {
 #[test]
 fn trajectory_corrupted_in_one_field_is_refused_for_that_field() {
     let cases: [(Corrupted, &str); 10] = [
-        (Corrupted::Layout(LAYOUT_VERSION + 70), "layout version 7"),
+        (Corrupted::Layout(LAYOUT_VERSION + 70), "layout version 78"),
         (Corrupted::Joints(0), "0 joints"),
-        (Corrupted::Joints(9), "joint_count is 9"),
+        (Corrupted::Joints(17), "joint_count is 17"),
         (Corrupted::StrokeCount(600), "stroke_count is 600; at most 512"),
         (Corrupted::Exponent(3), "n is 3"),
         (Corrupted::Delta(f64::NAN), "delta_rad is not finite"),
@@ -379,7 +379,7 @@ fn text_too_long_is_cut_at_a_character() {
 fn targets(due_s: &[f64]) -> CheckedTargets {
     let each = due_s.iter().map(|&due_s| Target {
         due_s,
-        position_rad: [0.1, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        position_rad: joint_array([0.1, -0.2, 0.0, 0.0, 0.0, 0.0]),
         velocity_rad_s: None,
     });
     CheckedTargets { joints: 2, sequence: 5, sent_ns: 9, valid_s: 0.2, targets: each.collect() }
@@ -413,7 +413,7 @@ fn targets_that_make_no_sense_are_refused_with_their_place() {
         assert!(matches!(read(&wrong), Err(TargetError::Valid { .. })), "{valid_s}");
     }
     let mut partly = targets(&[0.0]);
-    partly.targets[0].velocity_rad_s = Some([0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    partly.targets[0].velocity_rad_s = Some(joint_array([0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0]));
     assert!(matches!(read(&partly), Err(TargetError::Value { target: 0, joint: 1, .. })));
 }
 

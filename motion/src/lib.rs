@@ -16,6 +16,7 @@ pub mod cut;
 pub mod digits;
 pub mod duration;
 pub mod dynamics;
+mod joint_array;
 pub mod limits;
 pub mod peaks;
 pub mod peaks_ahead;
@@ -32,12 +33,13 @@ pub mod stroke;
 pub mod time_scale;
 pub mod trajectory;
 
+pub use joint_array::joint_array;
 pub use limits::{JointLimits, LimitSet};
 pub use stroke::{Stroke, StrokeError};
 pub use trajectory::{Trajectory, TrajectoryError};
 
 /// Most joints an arm may have; unused slots of a [`JointArray`] are zero.
-pub const MAX_JOINTS: usize = 8;
+pub const MAX_JOINTS: usize = 16;
 
 /// Most strokes a trajectory may have.
 pub const MAX_STROKES: usize = 512;

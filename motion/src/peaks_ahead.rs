@@ -14,36 +14,43 @@ pub const CELLS_MAX: usize = 1024;
 /// Shortest cell, s.
 const CELL_S_MIN: f64 = 1e-3;
 
-/// Lowest and highest value of a quantity, one pair a joint.
-pub type Ranges = [[f64; 2]; MAX_JOINTS];
-
-/// What a motion does in one stretch of its time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stretch {
-    /// Velocities, rad/s.
-    pub velocity_rad_s: Ranges,
-    /// Accelerations, rad/s^2.
-    pub acceleration_rad_s2: Ranges,
-    /// Jerks, rad/s^3.
-    pub jerk_rad_s3: Ranges,
+/// Lowest and highest value of each quantity of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointRanges {
+    /// Velocity, rad/s.
+    pub velocity_rad_s: [f64; 2],
+    /// Acceleration, rad/s^2.
+    pub acceleration_rad_s2: [f64; 2],
+    /// Jerk, rad/s^3.
+    pub jerk_rad_s3: [f64; 2],
 }
 
-impl Stretch {
-    /// Extends every range to hold those of another stretch.
-    ///
-    /// Real time: three loops over the joints.
-    pub fn join(&mut self, other: &Self) {
-        let pairs = [
-            (&mut self.velocity_rad_s, &other.velocity_rad_s),
-            (&mut self.acceleration_rad_s2, &other.acceleration_rad_s2),
-            (&mut self.jerk_rad_s3, &other.jerk_rad_s3),
-        ];
-        for (ranges, others) in pairs {
-            for ([low, high], [other_low, other_high]) in ranges.iter_mut().zip(others) {
-                *low = low.min(*other_low);
-                *high = high.max(*other_high);
-            }
-        }
+impl JointRanges {
+    fn join(&mut self, other: &Self) {
+        let join = |[low, high]: &mut [f64; 2], [other_low, other_high]: &[f64; 2]| {
+            *low = low.min(*other_low);
+            *high = high.max(*other_high);
+        };
+        join(&mut self.velocity_rad_s, &other.velocity_rad_s);
+        join(&mut self.acceleration_rad_s2, &other.acceleration_rad_s2);
+        join(&mut self.jerk_rad_s3, &other.jerk_rad_s3);
+    }
+}
+
+/// What a motion does in one stretch of its time, joint by joint: an arm of few joints has its values side by side.
+pub type Stretch = [JointRanges; MAX_JOINTS];
+
+/// A stretch in which nothing moves.
+pub const AT_REST: Stretch =
+    [JointRanges { velocity_rad_s: [0.0; 2], acceleration_rad_s2: [0.0; 2], jerk_rad_s3: [0.0; 2] };
+        MAX_JOINTS];
+
+/// Extends the ranges of so many joints to hold those of another stretch.
+///
+/// Real time: one loop over the joints.
+pub fn join(stretch: &mut Stretch, other: &Stretch, joints: usize) {
+    for (ranges, other) in stretch.iter_mut().zip(other).take(joints) {
+        ranges.join(other);
     }
 }
 
@@ -86,27 +93,30 @@ pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimit
             }
             let to_s = cell_ends_s.min(piece_ends_s);
             let found = bounds(&mut proof, limits, [from_s, to_s]);
-            whole.get_or_insert(found).join(&found);
+            join(whole.get_or_insert(found), &found, trajectory.joints());
             from_s = to_s;
         }
-        *cell = whole.unwrap_or_default();
+        *cell = whole.unwrap_or(AT_REST);
     }
 }
 
 /// What one polynomial piece does between two of its instants. Motion limits that were proven bound it, too.
 fn bounds(proof: &mut Proof<'_>, limits: &[JointLimits; MAX_JOINTS], [from_s, to_s]: [f64; 2]) -> Stretch {
     let middle_s = 0.5 * (from_s + to_s);
-    let ranges = proof.ranges(middle_s, (to_s - middle_s).max(middle_s - from_s));
-    let mut stretch = Stretch::default();
-    let [velocity, acceleration, jerk] = ranges;
-    for (joint, JointLimits { motion, .. }) in limits.iter().enumerate() {
+    let found = proof.ranges(middle_s, (to_s - middle_s).max(middle_s - from_s));
+    let mut stretch = AT_REST;
+    for ((ranges, [velocity, acceleration, jerk]), JointLimits { motion, .. }) in
+        stretch.iter_mut().zip(found).zip(limits).take(proof.joints())
+    {
         let within = |[low, high]: [f64; 2], limit: f64| {
             let limit = limit * (1.0 + TOLERANCE);
             [low.max(-limit), high.min(limit)]
         };
-        stretch.velocity_rad_s[joint] = within(velocity[joint], motion.velocity_rad_s);
-        stretch.acceleration_rad_s2[joint] = within(acceleration[joint], motion.acceleration_rad_s2);
-        stretch.jerk_rad_s3[joint] = within(jerk[joint], motion.jerk_rad_s3);
+        *ranges = JointRanges {
+            velocity_rad_s: within(velocity, motion.velocity_rad_s),
+            acceleration_rad_s2: within(acceleration, motion.acceleration_rad_s2),
+            jerk_rad_s3: within(jerk, motion.jerk_rad_s3),
+        };
     }
     stretch
 }
@@ -144,22 +154,23 @@ impl<'a> PeaksAhead<'a> {
         Self { then: Some((from_s, Table::new(cells, span_s))), ..self }
     }
 
-    /// What the motion does between two of its instants, the earlier first; rest after its end.
+    /// Writes what so many joints do between two instants of the motion, the earlier first; rest after its end.
     ///
     /// Real time: looks at each cell between them once, at most [`CELLS_MAX`] of each motion.
-    #[must_use]
-    pub fn between(&self, from_s: f64, to_s: f64) -> Stretch {
+    pub fn between(&self, [from_s, to_s]: [f64; 2], joints: usize, stretch: &mut Stretch) {
         let cut_s = self.then.map_or(f64::INFINITY, |(cut_s, ..)| cut_s);
-        let mut stretch: Option<Stretch> = None;
+        let mut rests = true;
         if from_s < cut_s || self.then.is_none() {
-            self.table.join([from_s, to_s.min(cut_s)], &mut stretch);
+            rests &= !self.table.join([from_s, to_s.min(cut_s)], (joints, rests), stretch);
         }
         if let Some((cut_s, table)) = self.then
             && to_s >= cut_s
         {
-            table.join([from_s.max(cut_s), to_s], &mut stretch);
+            rests &= !table.join([from_s.max(cut_s), to_s], (joints, rests), stretch);
         }
-        stretch.unwrap_or_default()
+        if rests {
+            stretch.iter_mut().zip(AT_REST).take(joints).for_each(|(ranges, rest)| *ranges = rest);
+        }
     }
 }
 
@@ -169,17 +180,23 @@ impl<'a> Table<'a> {
         Self { cells, begin_s, cells_a_second }
     }
 
-    /// Joins the cells between two instants. Beyond the last cell the motion rests.
-    fn join(&self, [from_s, to_s]: [f64; 2], stretch: &mut Option<Stretch>) {
+    /// Joins the cells between two instants with the stretch, or begins it with the first of them; whether there are any.
+    /// Beyond the last cell the motion rests.
+    fn join(&self, [from_s, to_s]: [f64; 2], (joints, begins): (usize, bool), stretch: &mut Stretch) -> bool {
         // The cell in which an instant lies. A time before the first cell, or NaN, counts as in it.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at both ends")]
         let index = |s: f64| (((s - self.begin_s) * self.cells_a_second) as usize).min(self.cells.len());
         let (first, last) = (index(from_s), index(to_s));
-        for cell in self.cells.get(first..).unwrap_or(&[]).iter().take((last + 1).saturating_sub(first)) {
-            match stretch {
-                Some(stretch) => stretch.join(cell),
-                None => *stretch = Some(*cell),
+        let mut cells = self.cells.get(first..).unwrap_or(&[]).iter().take((last + 1).saturating_sub(first));
+        let Some(cell) = cells.next() else { return false };
+        if begins {
+            for (ranges, other) in stretch.iter_mut().zip(cell).take(joints) {
+                *ranges = *other;
             }
+        } else {
+            join(stretch, cell, joints);
         }
+        cells.for_each(|cell| join(stretch, cell, joints));
+        true
     }
 }

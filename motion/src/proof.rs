@@ -26,6 +26,7 @@
 //! leads outwards, and at the end, the range holds as for any other joint.
 mod pieces;
 
+use crate::joint_array::{add_magnitude, add_scaled};
 use crate::limits::{LimitViolation, Peaks, Quantity, TOLERANCE};
 use crate::polynomial::RESOLUTION;
 use crate::profile_derivatives::{ORDERS, bounds};
@@ -183,7 +184,8 @@ impl<'a> Proof<'a> {
             travelled_rad: zero,
             entries: core::array::from_fn(|joint| {
                 let entry = |limits| Entry::new(joint, limits, (trajectory, begin_s));
-                limits.get(joint).map_or_else(Entry::default, entry)
+                let limits = limits.get(joint).filter(|_| joint < trajectory.joints());
+                limits.map_or_else(Entry::default, entry)
             }),
             met: [zero; 3],
             bound: [zero; 3],
@@ -224,9 +226,10 @@ impl<'a> Proof<'a> {
 
     /// Collects what runs between two neighbouring edges; pieces come from left to right.
     pub(crate) fn enter(&mut self, from_s: f64, to_s: f64) {
+        let joints = self.trajectory.joints();
         while let Some(stroke) = self.trajectory.strokes().get(self.first).filter(|s| s.has_ended(from_s)) {
-            add_scaled(&mut self.ended_rad, &stroke.delta_rad, 1.0);
-            add_magnitude(&mut self.ended_size_rad, &stroke.delta_rad, 1.0);
+            add_scaled(&mut self.ended_rad, &stroke.delta_rad, 1.0, joints);
+            add_magnitude(&mut self.ended_size_rad, &stroke.delta_rad, 1.0, joints);
             self.first += 1;
         }
         (self.reached_rad, self.travelled_rad) = (self.ended_rad, self.ended_size_rad);
@@ -237,15 +240,15 @@ impl<'a> Proof<'a> {
                 break;
             }
             if stroke.has_ended(from_s) {
-                add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0);
-                add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0);
+                add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0, joints);
+                add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0, joints);
                 continue;
             }
             let Some(scales) = self.scales.get(index) else {
                 continue;
             };
             for (size, scale) in self.size.iter_mut().zip(scales) {
-                add_magnitude(size, &stroke.delta_rad, *scale);
+                add_magnitude(size, &stroke.delta_rad, *scale, joints);
             }
             if let (Some(slot), Ok(index)) = (self.running.get_mut(self.running_count), u16::try_from(index))
             {
@@ -257,6 +260,7 @@ impl<'a> Proof<'a> {
 
     /// Exact derivatives at an instant of the current piece.
     fn jet(&mut self, t_s: f64) -> Jet {
+        let joints = self.trajectory.joints();
         let mut jet = [[0.0; MAX_JOINTS]; 5];
         jet[0] = self.reached_rad;
         for index in self.running.iter().take(self.running_count) {
@@ -267,7 +271,7 @@ impl<'a> Proof<'a> {
             let phi = Phi::at(stroke.n, s);
             let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
             for (sum, phi) in jet.iter_mut().zip([phi.value, phi.d1, phi.d2, phi.d3, fourth(stroke.n, s)]) {
-                add_scaled(sum, &stroke.delta_rad, phi * rate_k);
+                add_scaled(sum, &stroke.delta_rad, phi * rate_k, joints);
                 rate_k *= rate;
             }
         }
@@ -391,18 +395,25 @@ impl<'a> Proof<'a> {
         sum + self.size[5][joint] * factor * half_s / order
     }
 
+    /// How many joints the arm has.
+    pub(crate) fn joints(&self) -> usize {
+        self.trajectory.joints()
+    }
+
     /// Proven lowest and highest velocity, acceleration and jerk of each joint within `half_s` of an instant, inside the
-    /// current piece.
-    pub(crate) fn ranges(&mut self, middle_s: f64, half_s: f64) -> [[[f64; 2]; MAX_JOINTS]; 3] {
+    /// current piece; zero for those that the arm does not have.
+    pub(crate) fn ranges(&mut self, middle_s: f64, half_s: f64) -> [[[f64; 2]; 3]; MAX_JOINTS] {
         let jet = self.jet(middle_s);
-        core::array::from_fn(|rate| {
-            core::array::from_fn(|joint| {
+        let mut ranges = [[[0.0; 2]; 3]; MAX_JOINTS];
+        for (joint, ranges) in ranges.iter_mut().enumerate().take(self.joints()) {
+            for (rate, range) in ranges.iter_mut().enumerate() {
                 let value = jet[rate + 1][joint];
                 let reach =
                     self.beyond(&jet, rate + 1, joint, half_s) + ROUNDING * self.size[rate + 1][joint];
-                [value - reach, value + reach]
-            })
-        })
+                *range = [value - reach, value + reach];
+            }
+        }
+        ranges
     }
 
     /// Walks uphill from the beginning of a violation to its worst instant, so that the evidence shows how bad it is.
@@ -464,7 +475,7 @@ fn beside(trajectory: &Trajectory, scales: &[[f64; ORDERS + 1]; MAX_STROKES]) ->
     let mut beside = [[0.0; MAX_JOINTS]; 4];
     for (stroke, scales) in trajectory.strokes().iter().zip(scales) {
         for (beside, scale) in beside.iter_mut().zip(scales.iter().skip(1)) {
-            add_magnitude(beside, &stroke.delta_rad, width_s * scale);
+            add_magnitude(beside, &stroke.delta_rad, width_s * scale, trajectory.joints());
         }
     }
     beside
@@ -508,18 +519,6 @@ fn fourth(n: u32, s: f64) -> f64 {
     let (a, b, c) = (m - 1.0, m - 2.0, m - 3.0);
     let inner = 24.0 * u * u * u - a * x * (816.0 * u * u - b * x * (1152.0 * u - 256.0 * c * x));
     m * power(u, n.saturating_sub(4)) * inner
-}
-
-fn add_scaled(sum: &mut JointArray, value: &JointArray, factor: f64) {
-    for (sum, value) in sum.iter_mut().zip(value) {
-        *sum += value * factor;
-    }
-}
-
-fn add_magnitude(sum: &mut JointArray, value: &JointArray, factor: f64) {
-    for (sum, value) in sum.iter_mut().zip(value) {
-        *sum += value.abs() * factor;
-    }
 }
 
 #[cfg(test)]

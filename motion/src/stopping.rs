@@ -13,7 +13,7 @@
 //!
 //! If no candidate is found, a duration in closed form serves. It holds for every motion inside the motion limits, with a
 //! change of speed running or not (docs/adr): hence a stop always exists.
-use crate::peaks_ahead::{PeaksAhead, Stretch};
+use crate::peaks_ahead::{AT_REST, JointRanges, PeaksAhead, Stretch, join};
 use crate::ramp::{RampShape, SHAPES};
 use crate::time_scale::{RAMP_S_MAX, Ramp, Scale, TimeScale};
 use crate::{JointLimits, MAX_JOINTS};
@@ -225,9 +225,10 @@ impl StopRules {
 
     /// What no change of sigma by `rise` can be shorter than, roughly, at the velocity of now.
     fn lower_bound_s(&self, rule: &Rule, rise: f64, situation: &Situation<'_>) -> f64 {
-        let here = situation.ahead.between(situation.s, situation.s);
-        let joints = here.velocity_rad_s.iter().zip(&rule.bounds).take(self.joints);
-        joints.fold(RAMP_S_MIN, |longest_s, ([low, high], bounds)| {
+        let mut here = AT_REST;
+        situation.ahead.between([situation.s; 2], self.joints, &mut here);
+        let joints = here.iter().zip(&rule.bounds).take(self.joints);
+        joints.fold(RAMP_S_MIN, |longest_s, (JointRanges { velocity_rad_s: [low, high], .. }, bounds)| {
             let change_rad_s = low.abs().max(high.abs()) * rise.abs();
             let acceleration_s = change_rad_s / bounds.acceleration_rad_s2;
             let jerk_s = 2.0 * libm::sqrt(change_rad_s / bounds.jerk_rad_s3);
@@ -246,14 +247,17 @@ impl StopRules {
         let step_s = duration_s / f64::from(STEPS);
         let mut s = situation.s;
         let mut from = at(situation.now_s);
-        let mut passed: Option<Stretch> = None;
+        let mut stretch = AT_REST;
+        let mut passed = stretch;
         for step in 1..=STEPS {
             let to = at(situation.now_s + f64::from(step) * step_s);
             let reached = s + 0.5 * (from.sigma + to.sigma) * step_s;
-            let mut stretch = situation.ahead.between(s, reached);
+            situation.ahead.between([s, reached], self.joints, &mut stretch);
             if rule.by_magnitude {
-                stretch.join(passed.get_or_insert(stretch));
-                passed = Some(stretch);
+                if step > 1 {
+                    join(&mut stretch, &passed, self.joints);
+                }
+                passed = stretch;
             }
             if !self.keeps(rule, &stretch, &[from, to], situation.approaching) {
                 return false;
@@ -265,9 +269,9 @@ impl StopRules {
 
     /// True when every joint keeps its bounds at each of the scales, whatever it does in the stretch.
     fn keeps(&self, rule: &Rule, stretch: &Stretch, scales: &[Scale], approaching: bool) -> bool {
-        let rates = stretch.velocity_rad_s.iter().zip(&stretch.acceleration_rad_s2).zip(&stretch.jerk_rad_s3);
         let bounds = rule.bounds.iter().zip(&self.approach);
-        rates.zip(bounds).take(self.joints).all(|(((v, a), j), (bounds, approach))| {
+        stretch.iter().zip(bounds).take(self.joints).all(|(ranges, (bounds, approach))| {
+            let JointRanges { velocity_rad_s: v, acceleration_rad_s2: a, jerk_rad_s3: j } = ranges;
             let kept = if approaching { *approach } else { JointBounds::default() };
             let acceleration_max = (bounds.acceleration_rad_s2 - kept.acceleration_rad_s2) * USE;
             let jerk_max = (bounds.jerk_rad_s3 - kept.jerk_rad_s3) * USE;

@@ -2,10 +2,11 @@
 //!
 //! `q(t) = base + sum of delta_i * phi_i(t)`, added in the order of the strokes, so that every reader of the
 //! same message computes the same bits.
+use crate::joint_array::{add_magnitude, add_scaled};
 use crate::stroke::{Stroke, StrokeError};
 use crate::{JointArray, MAX_JOINTS, MAX_STROKES, Setpoint};
 
-/// A checked trajectory: 1 to 8 joints, up to 512 strokes sorted by start. Fields are private so that an
+/// A checked trajectory: 1 to [`MAX_JOINTS`] joints, up to 512 strokes sorted by start. Fields are private so that an
 /// unchecked one cannot exist.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
@@ -18,7 +19,7 @@ pub struct Trajectory {
 /// Why numbers do not make a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TrajectoryError {
-    /// Not 1 to 8 joints.
+    /// Not 1 to [`MAX_JOINTS`] joints.
     #[error("{joints} joints; an arm has 1 to {MAX_JOINTS}")]
     JointCount {
         /// The count that was given.
@@ -109,7 +110,7 @@ impl Trajectory {
     pub fn end_rad(&self) -> JointArray {
         let mut end_rad = self.base_rad;
         for stroke in self.strokes() {
-            add_scaled(&mut end_rad, &stroke.delta_rad, 1.0);
+            add_scaled(&mut end_rad, &stroke.delta_rad, 1.0, self.joints);
         }
         end_rad
     }
@@ -145,9 +146,7 @@ impl Trajectory {
             }
             // |error of phi| <= about 4 n epsilon < 6e-14 for n <= 64, at each of the two ends.
             let part = (stroke.phi(to_s).value - stroke.phi(from_s).value + PHI_ROUNDING).clamp(0.0, 1.0);
-            for (bound_rad, delta_rad) in bound_rad.iter_mut().zip(&stroke.delta_rad) {
-                *bound_rad += delta_rad.abs() * part;
-            }
+            add_magnitude(&mut bound_rad, &stroke.delta_rad, part, self.joints);
         }
         bound_rad
     }
@@ -165,7 +164,7 @@ impl Trajectory {
             } else {
                 stroke.running_phi(t_s, 1.0 / stroke.duration_s).value
             };
-            add_scaled(&mut position_rad, &stroke.delta_rad, share);
+            add_scaled(&mut position_rad, &stroke.delta_rad, share, self.joints);
         }
         position_rad
     }
@@ -180,7 +179,7 @@ impl Trajectory {
             if !stroke.has_ended(t_s) {
                 break stroke;
             }
-            add_scaled(&mut reached_rad, &stroke.delta_rad, 1.0);
+            add_scaled(&mut reached_rad, &stroke.delta_rad, 1.0, self.joints);
         };
         if t_s <= stroke.start_s {
             return at_rest(&reached_rad); // Sorted by start: nothing behind it has begun.
@@ -191,7 +190,7 @@ impl Trajectory {
             return of_stroke(&reached_rad, stroke, t_s);
         }
         let mut setpoint = of_stroke(&reached_rad, stroke, t_s);
-        add_running(&mut setpoint, strokes, t_s);
+        add_running(&mut setpoint, (strokes, self.joints), t_s);
         setpoint
     }
 }
@@ -201,7 +200,7 @@ impl Trajectory {
 fn of_stroke(from_rad: &JointArray, stroke: &Stroke, t_s: f64) -> Setpoint {
     let [p, v, a, j] = stroke.shares(t_s);
     let mut position_rad = *from_rad;
-    add_scaled(&mut position_rad, &stroke.delta_rad, p);
+    add_scaled(&mut position_rad, &stroke.delta_rad, p, MAX_JOINTS);
     Setpoint {
         position_rad,
         velocity_rad_s: stroke.delta_rad.map(|delta| delta * v),
@@ -211,20 +210,20 @@ fn of_stroke(from_rad: &JointArray, stroke: &Stroke, t_s: f64) -> Setpoint {
 }
 
 /// Adds the strokes behind the first running one, in their order.
-fn add_running(setpoint: &mut Setpoint, strokes: &[Stroke], t_s: f64) {
+fn add_running(setpoint: &mut Setpoint, (strokes, joints): (&[Stroke], usize), t_s: f64) {
     for stroke in strokes {
         if t_s <= stroke.start_s {
             break;
         }
         if stroke.has_ended(t_s) {
-            add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, 1.0);
+            add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, 1.0, joints);
             continue;
         }
         let [p, v, a, j] = stroke.shares(t_s);
-        add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, p);
-        add_scaled(&mut setpoint.velocity_rad_s, &stroke.delta_rad, v);
-        add_scaled(&mut setpoint.acceleration_rad_s2, &stroke.delta_rad, a);
-        add_scaled(&mut setpoint.jerk_rad_s3, &stroke.delta_rad, j);
+        add_scaled(&mut setpoint.position_rad, &stroke.delta_rad, p, joints);
+        add_scaled(&mut setpoint.velocity_rad_s, &stroke.delta_rad, v, joints);
+        add_scaled(&mut setpoint.acceleration_rad_s2, &stroke.delta_rad, a, joints);
+        add_scaled(&mut setpoint.jerk_rad_s3, &stroke.delta_rad, j, joints);
     }
 }
 
@@ -234,13 +233,6 @@ fn at_rest(position_rad: &JointArray) -> Setpoint {
 
 /// What rounding can take from a difference of two values of phi.
 const PHI_ROUNDING: f64 = 2e-13;
-
-/// sum += value * factor, joint by joint.
-fn add_scaled(sum: &mut JointArray, value: &JointArray, factor: f64) {
-    for (sum, value) in sum.iter_mut().zip(value) {
-        *sum += value * factor;
-    }
-}
 
 /// Samples one trajectory at times that seldom fall; skips strokes that have ended, with the same bits as
 /// [`Trajectory::sample`]. A cursor belongs to one trajectory: another one needs [`Cursor::at_start`].
@@ -275,7 +267,7 @@ impl Cursor {
             if !stroke.has_ended(t_s) {
                 break;
             }
-            add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0);
+            add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0, trajectory.joints);
             self.first += 1;
         }
         trajectory.sample_from(self.first, &self.reached_rad, t_s)

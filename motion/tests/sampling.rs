@@ -156,7 +156,7 @@ proptest! {
     ) {
         let base_rad: JointArray = base.try_into().unwrap();
         let strokes: Vec<Stroke> = raw.into_iter()
-            .map(|(start_s, duration_s, n, delta)| Stroke { start_s, duration_s, n, delta_rad: [delta; 8] })
+            .map(|(start_s, duration_s, n, delta)| Stroke { start_s, duration_s, n, delta_rad: [delta; MAX_JOINTS] })
             .collect();
         if let Ok(trajectory) = Trajectory::new(joints, base_rad, &strokes) {
             let _ = trajectory.sample(t_s);

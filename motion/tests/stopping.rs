@@ -8,7 +8,7 @@ use rsruckig::prelude::{
     Trajectory as RuckigTrajectory,
 };
 use taustream_motion::limits::check_motion;
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
+use taustream_motion::peaks_ahead::{AT_REST, PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules, stop_duration_s};
 use taustream_motion::time_scale::TimeScale;
 use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory};
@@ -47,7 +47,7 @@ fn motion(rng: &mut SeededRng, limits: &Limits) -> Trajectory {
 }
 
 fn table(trajectory: &Trajectory, limits: &Limits) -> Vec<Stretch> {
-    let mut cells = vec![Stretch::default(); cell_count(trajectory)];
+    let mut cells = vec![AT_REST; cell_count(trajectory)];
     fill(&mut cells, trajectory, limits);
     cells
 }
@@ -221,14 +221,15 @@ fn tables_hold_what_the_motion_does_in_each_stretch() {
         for _ in 0..300 {
             let from_s = rng.within(0.0, end_s * 1.05);
             let to_s = from_s + rng.within(0.0, 0.02);
-            let stretch = ahead.between(from_s, to_s);
+            let mut stretch = AT_REST;
+            ahead.between([from_s, to_s], trajectory.joints(), &mut stretch);
             for step in 0..=20 {
                 let at = trajectory.sample(from_s + (to_s - from_s) * f64::from(step) / 20.0);
-                for joint in 0..4 {
+                for (joint, ranges) in stretch.iter().enumerate().take(4) {
                     let pairs = [
-                        (stretch.velocity_rad_s[joint], at.velocity_rad_s[joint]),
-                        (stretch.acceleration_rad_s2[joint], at.acceleration_rad_s2[joint]),
-                        (stretch.jerk_rad_s3[joint], at.jerk_rad_s3[joint]),
+                        (ranges.velocity_rad_s, at.velocity_rad_s[joint]),
+                        (ranges.acceleration_rad_s2, at.acceleration_rad_s2[joint]),
+                        (ranges.jerk_rad_s3, at.jerk_rad_s3[joint]),
                     ];
                     for (index, ([low, high], value)) in pairs.into_iter().enumerate() {
                         let slack = 1e-9;
@@ -241,7 +242,7 @@ fn tables_hold_what_the_motion_does_in_each_stretch() {
             }
         }
         let narrow = cells.iter().filter(|cell| {
-            let [low, high] = cell.acceleration_rad_s2[0];
+            let [low, high] = cell[0].acceleration_rad_s2;
             high - low < 0.2 * limits[0].motion.acceleration_rad_s2
         });
         assert!(narrow.count() * 10 > cells.len() * 9, "seed {seed}: cells say little");

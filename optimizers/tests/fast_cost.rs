@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 use taustream_arm::rng::SeededRng;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::cost::{ControlPointCost, CostError, CostModel, Level, PaperCost};
 use taustream_optimizers::papers::control_points::{CONTROL_POINTS, Case};
 use taustream_optimizers::{Problem, Progress, Reading, Run, Setup, by_name};
@@ -86,12 +86,12 @@ fn fast_cost_of_what_makes_no_sense_is_refused_or_infinite() {
     let robot = ur5();
     let scene =
         Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: vec![sphere("a", [0.4, 0.3, 0.5], 0.1)] };
-    let ends: [JointArray; 2] = [[0.1; 8], [1.0; 8]];
+    let ends: [JointArray; 2] = [[0.1; MAX_JOINTS], [1.0; MAX_JOINTS]];
     let new = |ends, points| ControlPointCost::new(&robot, &scene, ends, points, CostModel::default());
     for points in [0, 101, usize::MAX] {
         assert!(matches!(new(ends, points), Err(CostError::Model { .. })), "{points} control points");
     }
-    assert!(matches!(new([[f64::NAN; 8], ends[1]], 1), Err(CostError::Model { .. })));
+    assert!(matches!(new([[f64::NAN; MAX_JOINTS], ends[1]], 1), Err(CostError::Model { .. })));
     let problem = new(ends, 2).expect("fits");
     for bad in [vec![], vec![0.0; 11], vec![0.0; 13], vec![f64::NAN; 12], vec![f64::INFINITY; 12]] {
         assert!(problem.rate(&bad).is_none() && problem.cost(&bad).is_infinite(), "{bad:?}");

@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::World;
 use taustream_planner::{Improvement, Objective, Plan, PlanOptions, plan};
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn ends(world: &World, seed: u64) -> [JointArray; 2] {
     let mut rng = SeededRng::new(seed, 90);
     let mut clear = || loop {
-        let mut q = [0.0; 8];
+        let mut q = [0.0; MAX_JOINTS];
         for (q, joint) in q.iter_mut().zip(&world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
             *q = rng.within(0.5 * low, 0.5 * high);

@@ -7,7 +7,7 @@
 //! time at full speed of the clear poses from a common start.
 use std::path::Path;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_optimizers::METHODS;
 use taustream_planner::goals::{Finder, TipTarget, one_try};
 use taustream_planner::margin_exit::is_clear;
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// A random clear pose.
 fn clear(world: &World, rng: &mut SeededRng) -> JointArray {
     loop {
-        let mut q = [0.0; 8];
+        let mut q = [0.0; MAX_JOINTS];
         for (q, joint) in q.iter_mut().zip(&world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
             *q = rng.within(low, high);

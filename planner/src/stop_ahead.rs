@@ -1,5 +1,5 @@
 //! Where on its path an arm comes to rest when it is stopped now: computed as the streamer stops it.
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
+use taustream_motion::peaks_ahead::{AT_REST, PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
 use taustream_motion::time_scale::TimeScale;
 use taustream_motion::{JointLimits, MAX_JOINTS, Trajectory};
@@ -27,7 +27,7 @@ impl<'a> StopAhead<'a> {
     #[must_use]
     pub fn new(limits: &[JointLimits; MAX_JOINTS], joints: usize, pieces: &[(&'a Trajectory, f64)]) -> Self {
         let table = |(trajectory, from_s): &(&'a Trajectory, f64)| {
-            let mut cells = vec![Stretch::default(); cell_count(trajectory)];
+            let mut cells = vec![AT_REST; cell_count(trajectory)];
             fill(&mut cells, trajectory, limits);
             (*trajectory, *from_s, cells)
         };

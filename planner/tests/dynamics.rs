@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{LinkMass, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint};
-use taustream_motion::{JointArray, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory, joint_array};
 use taustream_optimizers::papers::two_link::{Moving, TwoLink};
 use taustream_planner::energy::Energy;
 use taustream_planner::margin_exit::is_clear;
@@ -80,7 +80,7 @@ fn torques_and_energy_of_the_papers_two_link_arm_are_its_closed_forms() {
         let mut rng = SeededRng::new(seed, 70);
         let mut two = |size: f64| [rng.within(-size, size), rng.within(-size, size)];
         let moving = Moving { angle_rad: two(1.5), speed_rad_s: two(2.0), acceleration_rad_s2: two(5.0) };
-        let joints = |[theta, phi]: [f64; 2]| [theta, theta, phi, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let joints = |[theta, phi]: [f64; 2]| joint_array([theta, theta, phi, 0.0, 0.0, 0.0]);
         let (q, v, a) =
             (joints(moving.angle_rad), joints(moving.speed_rad_s), joints(moving.acceleration_rad_s2));
         let (ours, theirs) = (dynamics.torques_nm(&q, &v, &a), arm.torques(&moving));
@@ -207,9 +207,9 @@ fn spent_energy_of_one_joint_is_its_closed_form() {
     robot.masses = vec![rod(1, mass_kg, length_m, Vector3::x())];
     // Without gravity all energy is that of the fastest instant: given once, and braked away once.
     robot.gravity_m_s2 = Vector3::zeros();
-    let mut distance = [0.0; 8];
+    let mut distance = [0.0; MAX_JOINTS];
     distance[0] = turn_rad;
-    let motion = one_stroke([0.0; 8], distance, 1, duration_s);
+    let motion = one_stroke([0.0; MAX_JOINTS], distance, 1, duration_s);
     // c_v of n = 6: s^4 = 3 / 23.
     let s = (3.0_f64 / 23.0).powf(0.25);
     let fastest_rad_s = 24.0 * s.powi(3) * (1.0 - s.powi(4)).powi(5) * turn_rad / duration_s;
@@ -218,7 +218,7 @@ fn spent_energy_of_one_joint_is_its_closed_form() {
     close("kinetic energy twice", spent_j, 2.0 * kinetic_j, 1e-5);
     // So slowly that only the weight counts: lifted from hanging to upright, and past it down again.
     robot.gravity_m_s2 = Vector3::new(0.0, -9.806_65, 0.0);
-    let mut base = [0.0; 8];
+    let mut base = [0.0; MAX_JOINTS];
     (base[0], distance[0]) = (-FRAC_PI_2, 3.0 * FRAC_PI_2);
     let spent_j = Energy::of(&robot).expect("masses").spent_j(&one_stroke(base, distance, 1, 400.0));
     // Centre from -0.5 m to 0.5 m, and back to 0 m.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
 use taustream_planner::budget::Budget;
 use taustream_planner::goals::{
     ERROR_M_MAX, ERROR_RAD_MAX, Inverse, LineError, Orientation, TipSpeed, plan_line,
@@ -158,7 +158,7 @@ fn position_on_the_axis_of_the_base_is_reached_although_the_arm_is_singular_ther
 #[test]
 fn position_out_of_reach_is_refused_with_how_far_it_is() {
     let (robot, empty) = (two_joints(), scene(Vec::new()));
-    let error = reach(&robot, &empty, [0.0; 8], [0.9, 0.0, 0.1], 1).unwrap_err();
+    let error = reach(&robot, &empty, [0.0; MAX_JOINTS], [0.9, 0.0, 0.1], 1).unwrap_err();
     // The bound counts the first joint's height, which does not help; it never says too little.
     let GoalError::TooFar { distance_m, reach_m } = error.clone() else { panic!("{error}") };
     assert!(distance_m > reach_m && reach_m >= 0.7, "{error}");
@@ -166,18 +166,18 @@ fn position_out_of_reach_is_refused_with_how_far_it_is() {
     // In the hole round the base, whose rim is where the second joint ends at two radians; and above the arm's plane.
     let rim_m = (0.25 + 0.04 + 2.0 * 0.5 * 0.2 * 2.0_f64.cos()).sqrt();
     for (target_m, off_m) in [([0.1, 0.0, 0.1], rim_m - 0.1), ([0.6, 0.0, 0.25], 0.15)] {
-        let error = reach(&robot, &empty, [0.0; 8], target_m, 1).unwrap_err();
+        let error = reach(&robot, &empty, [0.0; MAX_JOINTS], target_m, 1).unwrap_err();
         let GoalError::Missed { tries, by_m, .. } = error.clone() else { panic!("{error}") };
         assert!(tries >= 4 && (by_m - off_m).abs() < 1e-6, "{error}, not {off_m}");
     }
     for (axis, bad) in [('x', f64::NAN), ('y', f64::INFINITY), ('z', f64::NEG_INFINITY)] {
         let mut target_m = [0.4, 0.0, 0.1];
         target_m[usize::from(axis as u8 - b'x')] = bad;
-        let error = reach(&robot, &empty, [0.0; 8], target_m, 1).unwrap_err();
+        let error = reach(&robot, &empty, [0.0; MAX_JOINTS], target_m, 1).unwrap_err();
         assert!(matches!(error, GoalError::BadPosition { axis: a, .. } if a == axis), "{error}");
     }
     let error =
-        reach(&robot, &empty, [9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.4, 0.0, 0.1], 1).unwrap_err();
+        reach(&robot, &empty, joint_array([9.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [0.4, 0.0, 0.1], 1).unwrap_err();
     assert!(error.to_string().contains("start outside limits"), "{error}");
 }
 
@@ -213,8 +213,8 @@ fn polishing_ends_on_the_target_from_nearby_and_never_makes_worse() {
     for (robot, slack_rad) in [(ur5(), 0.1), (piper(), 0.1), (eight_joints(), 0.1), (two_joints(), 0.05)] {
         for seed in 0..100 {
             let mut rng = SeededRng::new(seed, 61);
-            let mut q = [0.0; 8];
-            let mut near = [0.0; 8];
+            let mut q = [0.0; MAX_JOINTS];
+            let mut near = [0.0; MAX_JOINTS];
             for (j, joint) in robot.joints.iter().enumerate() {
                 let [low, high] = joint.limits.position_rad;
                 q[j] = rng.within(low, high);
@@ -236,7 +236,7 @@ fn polishing_ends_on_the_target_from_nearby_and_never_makes_worse() {
 }
 
 fn random_pose(robot: &Robot, rng: &mut SeededRng) -> JointArray {
-    let mut q = [0.0; 8];
+    let mut q = [0.0; MAX_JOINTS];
     for (slot, joint) in q.iter_mut().zip(&robot.joints) {
         let [low, high] = joint.limits.position_rad;
         *slot = rng.within(low, high);
@@ -320,8 +320,8 @@ fn tolerances_let_a_five_joint_arm_reach_what_it_cannot_reach_exactly() {
         [0.0, quarter, 0.05],
         [0.0, 0.0, 0.1],
     ]);
-    let there = [0.4, 0.5, -0.8, 0.6, 0.7, 0.0, 0.0, 0.0];
-    let start_rad = [0.0, 0.3, -0.3, 0.2, 0.0, 0.0, 0.0, 0.0];
+    let there = joint_array([0.4, 0.5, -0.8, 0.6, 0.7, 0.0]);
+    let start_rad = joint_array([0.0, 0.3, -0.3, 0.2, 0.0, 0.0]);
     let exact = tip_target(&robot, &there, [0.0; 3]);
     let turned = |tolerance_rad: [f64; 3]| {
         let orientation = exact.orientation.map(|o| {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use taustream_arm::rng::SeededRng;
 use taustream_arm::{MotionTable, PathFile, PathPoint, Robot, Scene};
 use taustream_motion::limits::check_motion;
-use taustream_motion::{JointArray, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
 use taustream_planner::import::{
     ImportError, Imported, Reference, TOLERANCE_RAD_DEFAULT, TimedBy, Via, ViaProfile, fitted_durations_s,
     import, import_strokes, optimised_durations_s, poses_of,
@@ -227,7 +227,7 @@ fn velocities_that_do_not_fit_their_rows_are_not_used() {
             q
         });
         let velocity = |t: &f64| {
-            let mut v = [0.0; 8];
+            let mut v = [0.0; MAX_JOINTS];
             v[0] = factor * 1.2 * (3.0 * t).sin();
             v
         };

@@ -5,6 +5,7 @@ use common::{pose, scene, ur5};
 use std::path::PathBuf;
 use std::time::Duration;
 use taustream_arm::Scene;
+use taustream_motion::MAX_JOINTS;
 use taustream_planner::{Blend, PlanOptions, plan, plan_through, verify};
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -37,7 +38,7 @@ fn poses_on_the_way_are_passed_within_the_blend() {
                 .min_by(|a, b| distance(&a.position_rad, via).total_cmp(&distance(&b.position_rad, via)))
                 .expect("samples");
             let (off_rad, speed_rad_s) =
-                (distance(&nearest.position_rad, via), distance(&nearest.velocity_rad_s, &[0.0; 8]));
+                (distance(&nearest.position_rad, via), distance(&nearest.velocity_rad_s, &[0.0; MAX_JOINTS]));
             match blend {
                 Blend::Radians(most_rad) if most_rad > 0.0 => {
                     // The lines are kept within the blend; the corner itself may be cut by more.

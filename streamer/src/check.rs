@@ -134,9 +134,9 @@ mod tests {
     use super::*;
     use std::path::Path;
     use taustream_messages::trajectory::Corrupted;
-    use taustream_motion::{Stroke, Trajectory};
+    use taustream_motion::{Stroke, Trajectory, joint_array};
 
-    const BASE_RAD: [f64; MAX_JOINTS] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0];
+    const BASE_RAD: [f64; MAX_JOINTS] = joint_array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
 
     fn robot() -> Robot {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/robots/ur5.toml");
@@ -144,7 +144,7 @@ mod tests {
     }
 
     fn message(duration_s: f64, replaces: Replaces) -> Box<TrajectoryMessage> {
-        let delta_rad = [0.5, 0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0];
+        let delta_rad = joint_array([0.5, 0.1, -0.2, 0.0, 0.0, 0.3]);
         let stroke = Stroke { start_s: 0.0, duration_s, n: 6, delta_rad };
         let trajectory = Trajectory::new(6, BASE_RAD, &[stroke]).unwrap();
         let robot_digest = robot().digest;
@@ -164,7 +164,7 @@ mod tests {
         let rules = Rules::of(&robot());
         let table: [(Corrupted, &str); 12] = [
             (Corrupted::Layout(99), "layout version 99"),
-            (Corrupted::Joints(9), "joint_count is 9"),
+            (Corrupted::Joints(17), "joint_count is 17"),
             (Corrupted::Joints(7), "wrong joint count: 7 for an arm of 6"),
             (Corrupted::StrokeCount(600), "stroke_count is 600"),
             (Corrupted::Exponent(3), "n is 3"),
@@ -196,7 +196,7 @@ mod tests {
         let mut base_rad = BASE_RAD;
         (base_rad[0], base_rad[5]) = (-3.25, 3.1600);
         let led = |by_rad: [f64; 2]| {
-            let delta_rad = [by_rad[0], 0.0, 0.0, 0.0, 0.0, by_rad[1], 0.0, 0.0];
+            let delta_rad = joint_array([by_rad[0], 0.0, 0.0, 0.0, 0.0, by_rad[1]]);
             let stroke = Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad };
             let trajectory = Trajectory::new(6, base_rad, &[stroke]).unwrap();
             let (robot_digest, replaces) = (robot().digest, Replaces::Rest);

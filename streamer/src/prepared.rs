@@ -3,7 +3,7 @@
 //! A stop is chosen from this table in the cycle that asks for it (`taustream_motion::stopping`).
 use std::ops::Deref;
 use taustream_messages::CheckedTrajectory;
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
+use taustream_motion::peaks_ahead::{AT_REST, PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::{JointLimits, MAX_JOINTS};
 
 /// A trajectory that the cycle can run and stop.
@@ -17,7 +17,7 @@ impl PreparedTrajectory {
     /// Makes the table of a trajectory that keeps the motion limits of an arm. Allocates.
     #[must_use]
     pub fn new(checked: CheckedTrajectory, limits: &[JointLimits; MAX_JOINTS]) -> Self {
-        let mut cells = vec![Stretch::default(); cell_count(&checked.trajectory)];
+        let mut cells = vec![AT_REST; cell_count(&checked.trajectory)];
         fill(&mut cells, &checked.trajectory, limits);
         Self { checked, cells }
     }

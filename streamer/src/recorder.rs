@@ -200,7 +200,7 @@ mod tests {
     use std::sync::mpsc::channel;
     use taustream_messages::{FaultReason, Phase};
     use taustream_motion::axis::AXES_MAX;
-    use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
+    use taustream_motion::{MAX_JOINTS, Stroke, Trajectory, joint_array};
 
     fn settings() -> Settings {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/settings/vcan6.toml");
@@ -234,9 +234,9 @@ mod tests {
         let (mut queue, records) = rtrb::RingBuffer::new(64);
         let (sender, candidates) = channel();
         let recorder = Recorder::start(&path, &settings, records, candidates).unwrap();
-        let base_rad = [0.1 + 0.2, -1.57, 1.57, -1.57, 1e-17, 1.0 / 3.0, 0.0, 0.0];
+        let base_rad = joint_array([0.1 + 0.2, -1.57, 1.57, -1.57, 1e-17, 1.0 / 3.0]);
         let stroke = Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad: [0.7; MAX_JOINTS] };
-        let stroke = Stroke { delta_rad: [0.7, 0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 0.0], ..stroke };
+        let stroke = Stroke { delta_rad: joint_array([0.7, 0.1, 0.2, 0.3, 0.4, 0.5]), ..stroke };
         let trajectory = Trajectory::new(6, base_rad, &[stroke]).unwrap();
         let digest = Some(settings.robot.digest_hex());
         let file = TrajectoryFile { robot: "ur5".into(), digest, trajectory: trajectory.clone() };

@@ -20,7 +20,7 @@ use taustream_drivers::sim::FaultRequest;
 use taustream_messages::{AxisGoal, AxisState, Command, Phase, Replaces};
 use taustream_motion::cut::kept;
 use taustream_motion::limits::check_motion_from;
-use taustream_motion::{Stroke, Trajectory};
+use taustream_motion::{Stroke, Trajectory, joint_array};
 use taustream_streamer::cycle::{Probe, Stage};
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::successor::CutRefusal;
@@ -169,7 +169,7 @@ fn replace(arm: &mut Arm, running: &Trajectory, (ahead_s, by_rad): (f64, f64)) -
         start_s: at_s,
         duration_s: 1.5,
         n: 6,
-        delta_rad: [by_rad, 0.0, by_rad, 0.0, 0.0, by_rad, 0.0, 0.0],
+        delta_rad: joint_array([by_rad, 0.0, by_rad, 0.0, 0.0, by_rad]),
     };
     let mut strokes = kept.strokes.to_vec();
     strokes.push(stroke);

@@ -8,7 +8,7 @@ use taustream_messages::trajectory::Corrupted;
 use taustream_messages::{
     CheckedTrajectory, FaultReason, Outcome, Phase, Receipt, Rejection, Replaces, Report, TrajectoryMessage,
 };
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory, joint_array};
 
 /// How far a servo may be from the goal when the arm holds: the simulated servos' sag and quantisation.
 const AT_GOAL_RAD: f64 = 5e-3;
@@ -347,7 +347,7 @@ fn hostile_messages(bench: &mut TestBench, goals: &Goals) -> Result<()> {
         start_s: 0.0,
         duration_s: 0.01,
         n: 6,
-        delta_rad: [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        delta_rad: joint_array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0]),
     }];
     fast.trajectory = Trajectory::new(good.trajectory.joints(), *good.trajectory.base_rad(), &strokes)?;
     let fast = sender.rejection(&TrajectoryMessage::new(&fast))?;

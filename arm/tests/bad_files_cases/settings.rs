@@ -17,7 +17,7 @@ pub(crate) const CASES: &[Case] = &[
         "\"../robots/ur5.toml\"",
         "\"../scenes/open.toml\"",
         "joint",
-        "0 tables: expected 1 to 8 tables [[joint]]",
+        "0 tables: expected 1 to 16 tables [[joint]]",
     ),
     (Settings, "\"../robots/ur5.toml\"", "\"../robots\"", "", "not a regular file"),
     (Settings, "\"../scenes/pillars.toml\"", "7", "scene", "= 7: expected the path of a scene file"),

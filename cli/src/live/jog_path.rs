@@ -123,8 +123,9 @@ impl<'a> JogPath<'a> {
 mod tests {
     use super::*;
     use std::path::Path;
+    use taustream_motion::joint_array;
 
-    const HOME: JointArray = [0.3, -1.3, 1.4, -1.6, -1.57, 0.2, 0.0, 0.0];
+    const HOME: JointArray = joint_array([0.3, -1.3, 1.4, -1.6, -1.57, 0.2]);
 
     fn ur5() -> Robot {
         crate::arm::robot(Path::new("ur5")).expect("shipped")

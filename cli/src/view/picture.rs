@@ -220,6 +220,7 @@ pub(crate) fn line(r: &Report, phase: Phase, arm: &ArmName) -> String {
 mod tests {
     use super::*;
     use taustream_messages::{BusFault, Cause, FaultReason};
+    use taustream_motion::MAX_JOINTS;
 
     fn arm() -> ArmName {
         ArmName { name: "a".into(), joints: vec!["pan".into(), "lift".into()], ..ArmName::default() }
@@ -241,9 +242,9 @@ mod tests {
             trajectory_id: 7,
             trajectory_s: 1.0,
             trajectory_duration_s: 4.0,
-            measured_rad: [0.5; 8],
-            tracking_error_rad: [0.06; 8],
-            command_velocity_rad_s: [1.0; 8],
+            measured_rad: [0.5; MAX_JOINTS],
+            tracking_error_rad: [0.06; MAX_JOINTS],
+            command_velocity_rad_s: [1.0; MAX_JOINTS],
             frames_sent: 1_000,
             time_ns: 2_000_000_000,
             bus_count: 2,
@@ -285,8 +286,8 @@ mod tests {
     #[test]
     fn picture_fits_any_width_and_takes_any_number() {
         let mut odd = report();
-        odd.measured_rad = [f64::NAN; 8];
-        odd.command_velocity_rad_s = [f64::INFINITY; 8];
+        odd.measured_rad = [f64::NAN; MAX_JOINTS];
+        odd.command_velocity_rad_s = [f64::INFINITY; MAX_JOINTS];
         (odd.joint_count, odd.trajectory_duration_s, odd.frames_sent) = (u32::MAX, f64::NAN, u64::MAX);
         for columns in 0..220 {
             for r in [report(), odd] {
@@ -311,7 +312,7 @@ mod tests {
         );
         assert!(line(&fault, Phase::Fault, &arm()).contains("FAULT: tracking error"));
         assert_eq!(line(&fault, Phase::Fault, &arm()).lines().count(), 1);
-        let before_feedback = Report { measured_rad: [f64::NAN; 8], ..report() };
+        let before_feedback = Report { measured_rad: [f64::NAN; MAX_JOINTS], ..report() };
         assert!(
             line(&before_feedback, Phase::Configuring, &arm()).contains("q - - rad"),
             "no NaN for people"

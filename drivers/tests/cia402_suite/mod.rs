@@ -8,6 +8,7 @@ use taustream_drivers::codec::cia402::Cia402Driver;
 use taustream_drivers::{
     CanFrame, CanId, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
+use taustream_motion::MAX_JOINTS;
 
 mod as_they_are;
 mod bring_up;
@@ -33,7 +34,7 @@ pub(crate) struct Bench {
     pub(crate) now: Nanos,
     pub(crate) ms: u64,
     pub(crate) drive_target: DriveTarget,
-    pub(crate) commands: [JointCommand; 8],
+    pub(crate) commands: [JointCommand; MAX_JOINTS],
     /// Frames of the newest cycle.
     pub(crate) sent: Vec<CanFrame>,
     /// Statusword and position of the newest TPDO that the master was given, by drive.
@@ -67,7 +68,7 @@ impl Bench {
             now: Nanos(7_000_000_000),
             ms: 0,
             drive_target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             sent: Vec::new(),
             last_received: vec![None; servos],
         }

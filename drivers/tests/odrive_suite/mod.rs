@@ -9,6 +9,7 @@ use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{
     CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
+use taustream_motion::MAX_JOINTS;
 
 mod bring_up;
 mod faults;
@@ -31,7 +32,7 @@ pub(crate) struct Bench {
     pub(crate) drives: Vec<Odrive>,
     pub(crate) now: Nanos,
     pub(crate) target: DriveTarget,
-    pub(crate) commands: [JointCommand; 8],
+    pub(crate) commands: [JointCommand; MAX_JOINTS],
     /// Frames of the newest cycle.
     pub(crate) sent: Vec<CanFrame>,
     /// Frames of the drives that arrive in the next cycle.
@@ -122,7 +123,7 @@ impl Bench {
             drives,
             now: Nanos(1_000_000_000),
             target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             sent: Vec::new(),
             arriving: Vec::new(),
             silent: [false; JOINTS],

@@ -10,6 +10,7 @@ use taustream_drivers::words::explain_refusal;
 use taustream_drivers::{
     CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
+use taustream_motion::MAX_JOINTS;
 
 mod bring_up;
 mod faults;
@@ -30,7 +31,7 @@ pub(crate) struct Bench {
     pub(crate) arm: Vec<PiperJoint>,
     pub(crate) now: Nanos,
     pub(crate) target: DriveTarget,
-    pub(crate) commands: [JointCommand; 8],
+    pub(crate) commands: [JointCommand; MAX_JOINTS],
     /// Frames of the newest cycle.
     pub(crate) sent: Vec<CanFrame>,
     /// Frames of the arm that arrive in the next cycle.
@@ -111,7 +112,7 @@ impl Bench {
             arm: arm.collect(),
             now: Nanos(1_000_000_000),
             target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             sent: Vec::new(),
             arriving: Vec::new(),
             silent: [false; JOINTS],

@@ -7,6 +7,7 @@ use taustream_drivers::sim::{Drive, FaultRequest, ServoSimulator};
 use taustream_drivers::{
     CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver, ServoStatus,
 };
+use taustream_motion::MAX_JOINTS;
 
 const PERIOD_NS: u64 = 1_000_000;
 const START_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
@@ -17,7 +18,7 @@ pub(super) struct Arm {
     pub(super) simulator: ServoSimulator,
     pub(super) driver: Cia402Driver,
     pub(super) now: Nanos,
-    pub(super) commands: [JointCommand; 8],
+    pub(super) commands: [JointCommand; MAX_JOINTS],
     out: Vec<Vec<CanFrame>>,
     /// What the master sent in the newest cycle.
     pub(super) sent: Vec<CanFrame>,
@@ -39,7 +40,7 @@ impl Arm {
         let simulator = ServoSimulator::new(setups, 1, 1);
         let driver = Cia402Driver::new(&settings, 0).unwrap();
         let out = vec![Vec::new()];
-        let mut commands = [JointCommand::default(); 8];
+        let mut commands = [JointCommand::default(); MAX_JOINTS];
         for (command, start_rad) in commands.iter_mut().zip(START_RAD) {
             command.position_rad = start_rad;
         }

@@ -6,6 +6,7 @@ use taustream_arm::Settings;
 use taustream_drivers::sim::settings::{drives, masses, queue_frames};
 use taustream_drivers::sim::{DriveParameters, FaultRequest, ServoSimulator, SimulatorCommand};
 use taustream_drivers::{CanFrame, CanId, Nanos};
+use taustream_motion::MAX_JOINTS;
 
 fn joints() -> Vec<String> {
     ["base", "elbow", "wrist"].map(str::to_owned).to_vec()
@@ -192,7 +193,7 @@ fn limp_arm_that_feels_its_masses_falls_by_their_weight() {
         .map(|setup| setup.parameters.get::<DriveParameters>().unwrap().plant.inertia_kg_m2)
         .collect();
     let dynamics = masses(&settings).unwrap().unwrap();
-    let mut pose_rad = [0.0; 8];
+    let mut pose_rad = [0.0; MAX_JOINTS];
     pose_rad[..6].copy_from_slice(&start_rad);
     let holding_nm = dynamics.holding_nm(&pose_rad);
     let mut simulator = ServoSimulator::new(setups, 1, 1).with_masses(dynamics).unwrap();

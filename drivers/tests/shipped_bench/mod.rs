@@ -5,6 +5,7 @@ use taustream_drivers::protocols::{self, BusDriver};
 use taustream_drivers::sim::ServoSimulator;
 use taustream_drivers::sim::settings::drives;
 use taustream_drivers::{CanFrame, DriveState, DriveTarget, FrameBatch, JointCommand, Nanos, ServoDriver};
+use taustream_motion::MAX_JOINTS;
 
 /// An arm in memory, at the period of its settings.
 pub(crate) struct Arm {
@@ -13,7 +14,7 @@ pub(crate) struct Arm {
     pub(crate) period_ns: u64,
     pub(crate) now: Nanos,
     pub(crate) target: DriveTarget,
-    pub(crate) commands: [JointCommand; 8],
+    pub(crate) commands: [JointCommand; MAX_JOINTS],
     pub(crate) arriving: Vec<CanFrame>,
 }
 
@@ -36,7 +37,7 @@ impl Arm {
             period_ns: u64::from(settings.cycle.period_us) * 1000,
             now: Nanos(1_000_000_000),
             target: DriveTarget::Disabled,
-            commands: [JointCommand::default(); 8],
+            commands: [JointCommand::default(); MAX_JOINTS],
             arriving: Vec::new(),
         }
     }

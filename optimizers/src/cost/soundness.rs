@@ -9,7 +9,7 @@ use std::path::Path;
 use taustream_arm::Robot;
 use taustream_arm::rng::SeededRng;
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
 
 /// A chain of any axes and shifts, some of them of nothing, some parallel or opposite.
 pub(super) fn any_chain(rng: &mut SeededRng, count: usize) -> Chain {
@@ -32,7 +32,7 @@ pub(super) fn any_chain(rng: &mut SeededRng, count: usize) -> Chain {
             ChainJoint { pre, axis, offset_rad: rng.within(-1.0, 1.0), post }
         })
         .collect();
-    Chain::new(&joints).expect("1 to 8 joints")
+    Chain::new(&joints).expect("1 to 16 joints")
 }
 
 /// Denavit-Hartenberg rows as arms have them: axes parallel or crossed, shifts along the axis or off it.
@@ -49,7 +49,7 @@ fn any_rows(rng: &mut SeededRng, count: usize) -> Chain {
             }
         })
         .collect();
-    Chain::new(&joints).expect("1 to 8 joints")
+    Chain::new(&joints).expect("1 to 16 joints")
 }
 
 fn shipped(name: &str) -> Chain {
@@ -192,7 +192,8 @@ fn fast_cost_looks_at_every_pose_once_for_any_number_of_waypoints() {
         let phases = phases(10, steps);
         // A sphere that holds the whole arm: every pose is a contact.
         let spheres = [(Point::new(0.1, 0.0, 0.3), 3.0)];
-        let corners = [[0.0, -1.57, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [1.0, -1.2, 0.3, 0.0, 1.0, 0.0, 0.0, 0.0]];
+        let corners =
+            [joint_array([0.0, -1.57, 0.0, 0.0, 0.0, 0.0]), joint_array([1.0, -1.2, 0.3, 0.0, 1.0, 0.0])];
         let corners = [corners[0], corners[1], corners[0], corners[1]];
         for level in Level::available() {
             let fast = Fast::new(&chain, &spheres, &CostModel::default(), &phases).expect("fits").on(level);

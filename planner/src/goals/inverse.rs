@@ -1,7 +1,7 @@
 //! Inverse kinematics: damped least squares on the chain's Jacobian, inside the joint ranges.
 //!
 //! From a guess, steps of Levenberg and Marquardt lead to the nearest pose whose tip is at the target. A step is taken
-//! only when it makes the error smaller, so the result is never worse than the guess. Any chain of one to eight joints,
+//! only when it makes the error smaller, so the result is never worse than the guess. Any chain of one to sixteen joints,
 //! with the orientation or without.
 //!
 //! Source: Wampler, "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares

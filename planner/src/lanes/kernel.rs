@@ -9,6 +9,8 @@ use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Most lanes of any machine.
 const LANES_MAX: usize = 16;
+/// Frames of most arms; those with more joints take arrays of twice the size.
+const FRAMES_OF_MOST: usize = MAX_JOINTS / 2 + 1;
 /// Adding and subtracting it leaves a number's whole part: 1.5 * 2^52.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
@@ -43,13 +45,25 @@ impl WithSimd for Pass<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> bool {
+        if self.model.joints.len() < FRAMES_OF_MOST {
+            self.search::<S, FRAMES_OF_MOST>(simd)
+        } else {
+            self.search::<S, { MAX_JOINTS + 1 }>(simd)
+        }
+    }
+}
+
+impl Pass<'_> {
+    /// For arms with at most so many frames.
+    #[inline(always)]
+    fn search<S: Simd, const FRAMES: usize>(self, simd: S) -> bool {
         let Self { model, poses_rad, extra_m, scratch } = self;
         let lanes = S::F32_LANES.min(LANES_MAX);
         let strides = poses_rad.len().div_ceil(lanes);
         scratch.centres.resize(model.spheres.len() * 3 * S::F32_LANES, 0.0);
         // Lanes are spread over the poses: what blocks an edge is met in its first chunk.
         for first in 0..strides {
-            let mut chunk = Chunk::new(Ops(simd), (model, extra_m), (poses_rad, first, strides));
+            let mut chunk = Chunk::<S, FRAMES>::new(Ops(simd), (model, extra_m), (poses_rad, first, strides));
             if chunk.is_blocked(scratch) {
                 return false;
             }
@@ -59,19 +73,19 @@ impl WithSimd for Pass<'_> {
 }
 
 /// The arm in as many poses as there are lanes.
-struct Chunk<'a, S: Simd> {
+struct Chunk<'a, S: Simd, const FRAMES: usize> {
     ops: Ops<S>,
     model: &'a Model,
     extra: f32,
     /// Index of the first lane's pose, from one lane's to the next, and how many poses there are.
     poses: [usize; 3],
     /// Columns and origin of each frame.
-    frames: [([Vector3<S>; 3], Vector3<S>); MAX_JOINTS + 1],
+    frames: [([Vector3<S>; 3], Vector3<S>); FRAMES],
     /// Groups whose spheres are placed, a bit each.
     placed: u64,
 }
 
-impl<'a, S: Simd> Chunk<'a, S> {
+impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
     #[inline(always)]
     fn new(
         ops: Ops<S>,
@@ -81,7 +95,7 @@ impl<'a, S: Simd> Chunk<'a, S> {
         let (one, zero) = (ops.all(1.0), ops.all(0.0));
         let mut columns = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
         let mut origin = [zero; 3];
-        let mut frames = [(columns, origin); MAX_JOINTS + 1];
+        let mut frames = [(columns, origin); FRAMES];
         for (j, joint) in model.joints.iter().enumerate() {
             let mut angles = [0.0_f32; LANES_MAX];
             for (lane, angle) in angles.iter_mut().enumerate().take(S::F32_LANES) {
@@ -120,7 +134,7 @@ impl<'a, S: Simd> Chunk<'a, S> {
     /// True when some pose is surely not free; writes down the pairs that f32 leaves open.
     #[inline(always)]
     fn is_blocked(&mut self, scratch: &mut Scratch) -> bool {
-        let mut middles = [[self.ops.all(0.0); 3]; MAX_JOINTS + 1];
+        let mut middles = [[self.ops.all(0.0); 3]; FRAMES];
         for (group, middle) in self.model.groups.iter().zip(&mut middles) {
             let (columns, origin) = &self.frames[group.frame];
             *middle = self.ops.moved(*origin, columns, group.centre);
@@ -299,7 +313,7 @@ impl<'a, S: Simd> Chunk<'a, S> {
     }
 
     #[inline(always)]
-    fn meets_itself(&mut self, middles: &[Vector3<S>; MAX_JOINTS + 1], scratch: &mut Scratch) -> bool {
+    fn meets_itself(&mut self, middles: &[Vector3<S>; FRAMES], scratch: &mut Scratch) -> bool {
         let model = self.model;
         for pair in &model.group_pairs {
             let [a, b] = pair.groups;

@@ -4,7 +4,7 @@
 //! third part is added around the corner, which moves nothing in all: strokes of one kernel, fitted ([`super::fit`]) so that
 //! the sum keeps the limits and stays in a tube around both paths. The earliest start of the second motion is taken for which
 //! such a fit is found. The strokes of both motions stay as they are, so the first one may be under way.
-use super::fit::{Bounds, Fit, Fitter, Grid, Lane, PerJoint, Vectorized, vectorized};
+use super::fit::{Bounds, Fit, Fitter, Grid, HALF, Lane, PerJoint, Vectorized, vectorized};
 use super::tube::Tube;
 use super::{Timed, distance};
 use pulp::{Scalar, Simd};
@@ -75,6 +75,14 @@ impl Onward<'_> {
     /// Both motions as one that stays within a distance of their paths; `None` where the arm has to stop between them.
     #[must_use]
     pub fn rounded(&self, blend_rad: f64) -> Option<Timed> {
+        if self.first.joints() <= HALF {
+            self.earliest::<HALF>(blend_rad)
+        } else {
+            self.earliest::<MAX_JOINTS>(blend_rad)
+        }
+    }
+
+    fn earliest<const JOINTS: usize>(&self, blend_rad: f64) -> Option<Timed> {
         let ramps = [self.slowing(), self.rising()];
         let left_s = self.first.duration_s() - self.from_s;
         let longest_s = ramps.iter().fold(0.0, |most: f64, ramp| most.max(ramp.duration_s));
@@ -89,7 +97,9 @@ impl Onward<'_> {
             let start = fits.midpoint(fails);
             let share = f64::from(start) / f64::from(STARTS);
             let overlap_s = LEAST * longest_s + share * (most_s - LEAST * longest_s);
-            if let Some(timed) = Corner::new(self, overlap_s, (&ramps, blend_rad)).and_then(|c| c.fit()) {
+            if let Some(timed) =
+                Corner::<JOINTS>::new(self, overlap_s, (&ramps, blend_rad)).and_then(|c| c.fit())
+            {
                 (found, fits) = (Some(timed), start);
             } else {
                 fails = start;
@@ -134,7 +144,7 @@ fn shortest(motion: &Trajectory, [from_s, to_s]: [f64; 2]) -> f64 {
 }
 
 /// Both motions with one start of the second, and what is added to them.
-struct Corner<'a> {
+struct Corner<'a, const JOINTS: usize> {
     onward: &'a Onward<'a>,
     /// When the second one begins.
     then_s: f64,
@@ -152,7 +162,7 @@ struct Corner<'a> {
     segments: Vec<usize>,
 }
 
-impl<'a> Corner<'a> {
+impl<'a, const JOINTS: usize> Corner<'a, JOINTS> {
     fn new(
         onward: &'a Onward<'a>,
         overlap_s: f64,
@@ -173,8 +183,10 @@ impl<'a> Corner<'a> {
         }
         let before = looks(from_s, end_s).into_iter().map(|t_s| onward.first.sample(t_s).position_rad);
         let after = looks(0.0, until_s - then_s).into_iter().map(|t_s| onward.then.sample(t_s).position_rad);
-        let mut path_rad = simplified(&before.collect::<Vec<_>>(), SIMPLER * radius_rad);
-        path_rad.extend(simplified(&after.collect::<Vec<_>>(), SIMPLER * radius_rad).into_iter().skip(1));
+        let mut path_rad = simplified::<JOINTS>(&before.collect::<Vec<_>>(), SIMPLER * radius_rad);
+        path_rad.extend(
+            simplified::<JOINTS>(&after.collect::<Vec<_>>(), SIMPLER * radius_rad).into_iter().skip(1),
+        );
         let (instants, sum, segments) = (Vec::new(), Vec::new(), Vec::new());
         let mut corner =
             Self { onward, then_s, from_s, spacing_s, grid, path_rad, radius_rad, instants, sum, segments };
@@ -213,7 +225,7 @@ impl<'a> Corner<'a> {
         even.chain(kinks.filter(|at| (0.0..spacings as f64).contains(at))).collect()
     }
 
-    fn tube(&self) -> Tube {
+    fn tube(&self) -> Tube<JOINTS> {
         Tube::new(&self.path_rad, &vec![self.radius_rad; self.path_rad.len()])
     }
 
@@ -231,7 +243,7 @@ impl<'a> Corner<'a> {
     }
 
     /// What is left for the added strokes, from velocity to jerk. Lanes beyond the last joint stand still.
-    fn bounds(&self) -> [Bounds<PerJoint>; 3] {
+    fn bounds(&self) -> [Bounds<PerJoint<JOINTS>>; 3] {
         std::array::from_fn(|order| {
             let mut most = PerJoint::all(1.0);
             for joint in 0..self.onward.first.joints() {
@@ -246,7 +258,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Takes what both motions use of a joint from its bounds.
-    fn leave(&self, bounds: &mut Bounds<PerJoint>, joint: usize) {
+    fn leave(&self, bounds: &mut Bounds<PerJoint<JOINTS>>, joint: usize) {
         let (order, limit) = (bounds.order - 1, self.limits(joint)[bounds.order - 1]);
         let both = bounds.low.iter_mut().zip(&mut bounds.high);
         for (sample, ((low, high), at)) in both.zip(&self.sum).enumerate() {
@@ -290,11 +302,11 @@ impl<'a> Corner<'a> {
 
     /// Projects all samples into the tube: the last part of the fit is the position.
     #[inline(always)]
-    fn keep_in<S: Simd>(&self, simd: S, tube: &Tube, fit: &mut Fit<PerJoint>) {
+    fn keep_in<S: Simd>(&self, simd: S, tube: &Tube<JOINTS>, fit: &mut Fit<PerJoint<JOINTS>>) {
         let Some(part) = fit.parts.last_mut() else { return };
         let samples = part.target.iter_mut().zip(&mut part.excess);
         for ((target, excess), (at, segment)) in samples.zip(self.sum.iter().zip(&self.segments)) {
-            let at_rad = PerJoint(at.position_rad);
+            let at_rad = PerJoint::of(&at.position_rad);
             let pose_rad = at_rad.plus(simd, *excess);
             let inside_rad = tube.project(simd, *segment, &pose_rad);
             (*target, *excess) = (inside_rad.minus(simd, at_rad), pose_rad.minus(simd, inside_rad));
@@ -302,7 +314,12 @@ impl<'a> Corner<'a> {
     }
 
     /// The whole motion, if it keeps the limits and the tube at closely spaced instants. Otherwise bounds are lowered next to what does not.
-    fn checked(&self, tube: &Tube, deltas: &[PerJoint], bounds: &mut [Bounds<PerJoint>; 3]) -> Option<Timed> {
+    fn checked(
+        &self,
+        tube: &Tube<JOINTS>,
+        deltas: &[PerJoint<JOINTS>],
+        bounds: &mut [Bounds<PerJoint<JOINTS>>; 3],
+    ) -> Option<Timed> {
         let trajectory = self.trajectory(deltas)?;
         // Share of its ceiling that each joint uses most in each spacing, from velocity to jerk.
         let mut used = vec![vec![[0.0; 3]; self.grid.spacings()]; trajectory.joints()];
@@ -319,7 +336,7 @@ impl<'a> Corner<'a> {
                 }
             }
             let segment = tube.nearest_segment(&at.position_rad);
-            let [off_rad, share] = tube.off(Scalar::new(), segment, &PerJoint(at.position_rad));
+            let [off_rad, share] = tube.off(Scalar::new(), segment, &PerJoint::of(&at.position_rad));
             (deviation_rad, of_tube) = (deviation_rad.max(off_rad), of_tube.max(share));
         }
         let mut holds = of_tube <= CEILING;
@@ -335,7 +352,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Lowers what a joint may do in a spacing to a share of it.
-    fn lower(&self, bounds: &mut Bounds<PerJoint>, (joint, spacing): (usize, usize), share: f64) {
+    fn lower(&self, bounds: &mut Bounds<PerJoint<JOINTS>>, (joint, spacing): (usize, usize), share: f64) {
         for sample in (spacing..self.sum.len()).step_by(self.grid.spacings()) {
             let taken = self.taken(&self.sum[sample], joint)[bounds.order - 1];
             for bound in [&mut bounds.low[sample].0[joint], &mut bounds.high[sample].0[joint]] {
@@ -344,14 +361,14 @@ impl<'a> Corner<'a> {
         }
     }
 
-    fn trajectory(&self, deltas: &[PerJoint]) -> Option<Trajectory> {
+    fn trajectory(&self, deltas: &[PerJoint<JOINTS>]) -> Option<Trajectory> {
         let (first, then) = (self.onward.first, self.onward.then);
         let duration_s = (self.spacing_s * OVERLAP as f64).max(DURATION_S_MIN);
         let added = deltas.iter().enumerate().map(|(i, delta_rad)| Stroke {
             start_s: self.from_s + self.spacing_s * i as f64,
             duration_s,
             n: EXPONENT,
-            delta_rad: delta_rad.0,
+            delta_rad: delta_rad.joints(),
         });
         let later = then.strokes().iter().map(|s| Stroke { start_s: s.start_s + self.then_s, ..*s });
         let mut strokes: Vec<Stroke> = first.strokes().iter().copied().chain(later).chain(added).collect();
@@ -364,15 +381,15 @@ impl<'a> Corner<'a> {
 }
 
 /// One round of a fit; which share of the limits it uses most.
-struct Round<'r, 'a, 'f> {
-    of: &'r Corner<'a>,
+struct Round<'r, 'a, 'f, const JOINTS: usize> {
+    of: &'r Corner<'a, JOINTS>,
     advances: bool,
-    fit: &'r mut Fit<'f, PerJoint>,
-    bounds: &'r [Bounds<PerJoint>; 3],
-    tube: &'r Tube,
+    fit: &'r mut Fit<'f, PerJoint<JOINTS>>,
+    bounds: &'r [Bounds<PerJoint<JOINTS>>; 3],
+    tube: &'r Tube<JOINTS>,
 }
 
-impl Vectorized for Round<'_, '_, '_> {
+impl<const JOINTS: usize> Vectorized for Round<'_, '_, '_, JOINTS> {
     type Output = f64;
 
     #[inline(always)]
@@ -391,15 +408,15 @@ impl Vectorized for Round<'_, '_, '_> {
 }
 
 /// Points of a path that leave none of the others farther off than a distance (Douglas and Peucker).
-fn simplified(path_rad: &[JointArray], most_rad: f64) -> Vec<JointArray> {
+fn simplified<const JOINTS: usize>(path_rad: &[JointArray], most_rad: f64) -> Vec<JointArray> {
     let mut keeps = vec![false; path_rad.len()];
     let mut spans = vec![(0, path_rad.len().saturating_sub(1))];
     while let Some((from, to)) = spans.pop() {
         keeps[from] = true;
         keeps[to] = true;
         let chord = [path_rad[from], path_rad[to]];
-        let tube = Tube::new(&chord, &[1.0; 2]);
-        let off = |i: &usize| tube.off(Scalar::new(), 0, &PerJoint(path_rad[*i]))[0];
+        let tube = Tube::<JOINTS>::new(&chord, &[1.0; 2]);
+        let off = |i: &usize| tube.off(Scalar::new(), 0, &PerJoint::of(&path_rad[*i]))[0];
         let farthest = (from + 1..to).max_by(|a, b| off(a).total_cmp(&off(b)));
         if let Some(farthest) = farthest.filter(|i| off(i) > most_rad) {
             spans.extend([(from, farthest), (farthest, to)]);

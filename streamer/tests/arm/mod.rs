@@ -8,7 +8,7 @@ use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
-use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory, joint_array};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
 use taustream_streamer::cycle_state::Decision;
@@ -179,7 +179,7 @@ impl Arm {
 
     pub(crate) fn move_it(&mut self, size: f64) -> Trajectory {
         // Towards the middle, so that motions that were cut short do not add up to the end of a range.
-        let mut hold_position_rad = self.newest.map_or([0.0; 8], |cycle| cycle.position_rad);
+        let mut hold_position_rad = self.newest.map_or([0.0; MAX_JOINTS], |cycle| cycle.position_rad);
         // Behind the joints stand axes that are no joints of the path.
         hold_position_rad[JOINTS..].fill(0.0);
         let size = if hold_position_rad[0] > 0.0 { -size } else { size };
@@ -187,7 +187,7 @@ impl Arm {
             start_s,
             duration_s: 1.2,
             n: 6,
-            delta_rad: [0.9, 0.2, -0.4, 0.3, 0.2, 0.5, 0.0, 0.0].map(|d| d * size * sign),
+            delta_rad: joint_array([0.9, 0.2, -0.4, 0.3, 0.2, 0.5]).map(|d| d * size * sign),
         };
         let strokes = [stroke(0.0, 1.0), stroke(0.8, -0.5), stroke(1.9, 0.5), stroke(2.6, -1.0)];
         let trajectory = Trajectory::new(JOINTS, hold_position_rad, &strokes).unwrap();

@@ -5,7 +5,7 @@ use taustream_drivers::LinkFault;
 use taustream_messages::{Command, Phase};
 use taustream_motion::cut::{KeptDifference, kept};
 use taustream_motion::limits::check_motion_from;
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory};
+use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory, joint_array};
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::successor::CutRefusal;
 
@@ -15,7 +15,7 @@ const SIZE: f64 = 0.3;
 /// The strokes that a cut keeps, folded by `folded_s`, and one more stroke from the cut on.
 fn replacement(cut: &Trajectory, (at_s, folded_s): (f64, f64), by_rad: f64) -> Trajectory {
     let kept = kept(cut, at_s, folded_s);
-    let delta_rad = [1.0, -0.4, 0.2, -0.3, 0.6, 0.1, 0.0, 0.0].map(|part| part * by_rad);
+    let delta_rad = joint_array([1.0, -0.4, 0.2, -0.3, 0.6, 0.1]).map(|part| part * by_rad);
     let mut strokes = kept.strokes.to_vec();
     strokes.push(Stroke { start_s: at_s, duration_s: 1.1, n: 6, delta_rad });
     Trajectory::new(JOINTS, kept.base_rad, &strokes).unwrap()

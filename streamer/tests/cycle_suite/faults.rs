@@ -4,7 +4,7 @@ use crate::{arrived, assert_on_path, assert_within_stop_limits};
 use taustream_arm::AfterStall;
 use taustream_drivers::{DriveState, DriveTarget, LinkFault};
 use taustream_messages::{Command, FaultReason, PauseReason, Phase};
-use taustream_motion::{Stroke, Trajectory};
+use taustream_motion::{Stroke, Trajectory, joint_array};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::names::Names;
@@ -244,8 +244,12 @@ fn stall_longer_than_the_drives_watchdog_is_a_fault() {
 #[test]
 fn guard_trips_on_a_corrupted_trajectory_and_every_joint_brakes_within_stop_limits() {
     let fast = |duration_s: f64, delta: f64| {
-        let stroke =
-            Stroke { start_s: 0.0, duration_s, n: 6, delta_rad: [0.2, 0.0, 0.0, delta, 0.0, 0.1, 0.0, 0.0] };
+        let stroke = Stroke {
+            start_s: 0.0,
+            duration_s,
+            n: 6,
+            delta_rad: joint_array([0.2, 0.0, 0.0, delta, 0.0, 0.1]),
+        };
         Trajectory::new(JOINTS, HOME_RAD, &[stroke]).unwrap()
     };
     // Too fast; jerk far beyond; out of the position range at legal rates.
@@ -280,7 +284,8 @@ fn guard_trips_on_a_corrupted_trajectory_and_every_joint_brakes_within_stop_limi
 fn guard_trip_can_be_cleared_and_the_arm_moves_again_from_where_it_braked() {
     let mut harness = CycleHarness::new();
     harness.enable();
-    let stroke = Stroke { start_s: 0.0, duration_s: 0.3, n: 6, delta_rad: [1.5, 0., 0., 0., 0., 0., 0., 0.] };
+    let stroke =
+        Stroke { start_s: 0.0, duration_s: 0.3, n: 6, delta_rad: joint_array([1.5, 0., 0., 0., 0., 0.]) };
     harness.offer(Trajectory::new(JOINTS, HOME_RAD, &[stroke]).unwrap());
     harness.run_until(Phase::Fault, 2_000);
     harness.run(5);

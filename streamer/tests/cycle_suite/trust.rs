@@ -4,14 +4,14 @@ use crate::{arrived, assert_on_path};
 use taustream_arm::{Feedback, Settings};
 use taustream_drivers::{DriveState, DriveTarget};
 use taustream_messages::{Command, FaultReason, Phase, ReferenceState};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle_state::Decision;
 use taustream_streamer::names::Names;
 use taustream_streamer::referencing::{LastPoses, Recorded};
 
 /// Where the drives hold: beside the measured pose by a sag.
-const HOLD_POSITION_RAD: JointArray = [0.001, -1.568, 1.571, -1.57, -1.569, 0.002, 0.0, 0.0];
+const HOLD_POSITION_RAD: JointArray = joint_array([0.001, -1.568, 1.571, -1.57, -1.569, 0.002]);
 
 /// An arm whose drives hold from before, but for those of `off`.
 fn adopted(off: &[usize]) -> CycleHarness {

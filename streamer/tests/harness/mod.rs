@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use taustream_arm::Settings;
 use taustream_drivers::Nanos;
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces, Report};
-use taustream_motion::{JointArray, Stroke, Trajectory};
+use taustream_motion::{JointArray, Stroke, Trajectory, joint_array};
 use taustream_streamer::answer::CommandAnswer;
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, Next, NoProbe, run_cycle};
@@ -24,7 +24,7 @@ use taustream_streamer::write_ahead::Requester;
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const JOINTS: usize = 6;
 /// Where the scripted arm stands at first.
-pub const HOME_RAD: JointArray = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0, 0.0, 0.0];
+pub const HOME_RAD: JointArray = joint_array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
 
 /// The streamer's cycle with its scripted surroundings.
 pub struct CycleHarness {
@@ -352,7 +352,7 @@ pub fn swing(base_rad: &JointArray, size: f64) -> Trajectory {
         start_s,
         duration_s: 1.05,
         n: 6,
-        delta_rad: [1.0, 0.3, -0.5, 0.4, -0.2, 0.6, 0.0, 0.0].map(|d| d * size * sign),
+        delta_rad: joint_array([1.0, 0.3, -0.5, 0.4, -0.2, 0.6]).map(|d| d * size * sign),
     };
     Trajectory::new(JOINTS, *base_rad, &[stroke(0.0, 1.0), stroke(0.7, -0.8), stroke(1.65, 0.7)]).unwrap()
 }

@@ -21,7 +21,7 @@ use taustream_messages::{
     CheckedTrajectory, Command, CommandReply, CommandRequest, Outcome, Phase, Replaces, Report,
     TrajectoryMessage,
 };
-use taustream_motion::{Stroke, Trajectory};
+use taustream_motion::{MAX_JOINTS, Stroke, Trajectory};
 
 const HOME_RAD: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 /// Whatever hangs is found out by this; nothing is measured by it.
@@ -263,10 +263,10 @@ impl Operator {
 
     /// What became of a motion under a generation, sent by somebody who waits for so long.
     pub(crate) fn send(&self, arm: &Arm, generation: u64, valid_for: Duration) -> Outcome {
-        let mut base_rad = [0.0; 8];
+        let mut base_rad = [0.0; MAX_JOINTS];
         base_rad[..6].copy_from_slice(&self.report().command_rad[..6]);
         let size = if base_rad[0] > 0.5 { -1.2 } else { 1.2 };
-        let mut delta_rad = [0.0; 8];
+        let mut delta_rad = [0.0; MAX_JOINTS];
         delta_rad[0] = size;
         let stroke = Stroke { start_s: 0.0, duration_s: 20.0, n: 6, delta_rad };
         let message = TrajectoryMessage::new(&CheckedTrajectory {

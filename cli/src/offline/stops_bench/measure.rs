@@ -7,7 +7,7 @@ use rsruckig::prelude::{
 use std::path::Path;
 use std::time::Instant;
 use taustream_arm::{Robot, Scene};
-use taustream_motion::peaks_ahead::{PeaksAhead, Stretch, cell_count, fill, span_s};
+use taustream_motion::peaks_ahead::{AT_REST, PeaksAhead, Stretch, cell_count, fill, span_s};
 use taustream_motion::stopping::{Situation, SpeedRequest, StopRules};
 use taustream_motion::time_scale::TimeScale;
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Trajectory};
@@ -48,7 +48,7 @@ pub(super) fn cases(robot: &Robot, instants: u32) -> Result<Vec<Case>, Failure> 
     let mut cases = Vec::new();
     for travel_rad in MOVES_RAD {
         let trajectory = straight(robot, travel_rad)?;
-        let mut cells = vec![Stretch::default(); cell_count(&trajectory)];
+        let mut cells = vec![AT_REST; cell_count(&trajectory)];
         fill(&mut cells, &trajectory, &limits);
         let motion = Motion { trajectory, cells, rules };
         for speed in SPEEDS {

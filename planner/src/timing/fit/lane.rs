@@ -4,7 +4,7 @@
 //! into the function that the instructions are switched on for ([`vectorized`]): loops, since closures in iterators become functions
 //! of their own. Products and sums stay apart, so every machine computes the same bits.
 use pulp::{Arch, Simd, WithSimd};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
 
 /// A loop that is compiled for each set of instructions. Its `run` must be `inline(always)`, like all that it calls.
 pub(in crate::timing) trait Vectorized {
@@ -122,16 +122,36 @@ impl Lane for f64 {
     }
 }
 
-/// One number a joint.
+/// Joints of an arm that is fitted in vectors of half the length: most arms have no more.
+pub const HALF: usize = MAX_JOINTS / 2;
+
+/// One number a joint, for arms of at most so many joints: [`HALF`] or [`MAX_JOINTS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
-pub struct PerJoint(pub JointArray);
+pub struct PerJoint<const JOINTS: usize>(pub [f64; JOINTS]);
 
-impl PerJoint {
+impl<const JOINTS: usize> PerJoint<JOINTS> {
     /// The same for every joint.
     #[must_use]
     pub fn all(value: f64) -> Self {
-        Self([value; MAX_JOINTS])
+        Self([value; JOINTS])
+    }
+
+    /// Values of an arm that has no more joints.
+    #[must_use]
+    #[inline(always)]
+    pub fn of(values: &JointArray) -> Self {
+        let mut some = [0.0; JOINTS];
+        for (some, value) in some.iter_mut().zip(values) {
+            *some = *value;
+        }
+        Self(some)
+    }
+
+    /// With zeros for the joints that the arm does not have.
+    #[must_use]
+    pub fn joints(self) -> JointArray {
+        joint_array(self.0)
     }
 
     /// The sum over the joints, by halves.
@@ -139,7 +159,7 @@ impl PerJoint {
     #[inline(always)]
     pub fn sum(self) -> f64 {
         let mut sums = self.0;
-        let mut half = MAX_JOINTS / 2;
+        let mut half = JOINTS / 2;
         while half > 0 {
             for i in 0..half {
                 sums[i] += sums[i + half];
@@ -150,7 +170,10 @@ impl PerJoint {
     }
 }
 
-const _: () = assert!(MAX_JOINTS.is_power_of_two(), "sums go by halves, and vectors hold no rest");
+const _: () = assert!(
+    HALF.is_multiple_of(8) && MAX_JOINTS.is_power_of_two(),
+    "sums go by halves, and vectors hold no rest"
+);
 
 /// An operation on each two lanes.
 macro_rules! lanewise {
@@ -167,8 +190,8 @@ macro_rules! lanewise {
     };
 }
 
-impl Lane for PerJoint {
-    const ZERO: Self = Self([0.0; MAX_JOINTS]);
+impl<const JOINTS: usize> Lane for PerJoint<JOINTS> {
+    const ZERO: Self = Self([0.0; JOINTS]);
 
     lanewise!(plus, add_f64s);
     lanewise!(minus, sub_f64s);
