@@ -2,10 +2,7 @@
 //!
 //! An array has slots for [`MAX_JOINTS`] joints, and most arms use at most half of them. Loops of a constant length become
 //! vector instructions, so what an arm does not use costs one comparison.
-use crate::{JointArray, MAX_JOINTS};
-
-/// Joints that are summed at a time.
-const HALF: usize = MAX_JOINTS / 2;
+use crate::{JointArray, MAX_JOINTS, USUAL_JOINTS};
 
 /// `sum + value * factor` of each joint of an arm with so many.
 #[inline(always)]
@@ -21,8 +18,8 @@ pub(crate) fn add_magnitude(sum: &mut JointArray, value: &JointArray, factor: f6
 
 #[inline(always)]
 fn each(sum: &mut JointArray, value: &JointArray, joints: usize, add: impl Fn(&mut f64, f64)) {
-    let (sums, values) = (sum.as_chunks_mut::<HALF>().0, value.as_chunks::<HALF>().0);
-    for (sums, values) in sums.iter_mut().zip(values).take(joints.div_ceil(HALF)) {
+    let (sums, values) = (sum.as_chunks_mut::<USUAL_JOINTS>().0, value.as_chunks::<USUAL_JOINTS>().0);
+    for (sums, values) in sums.iter_mut().zip(values).take(joints.div_ceil(USUAL_JOINTS)) {
         for (sum, value) in sums.iter_mut().zip(values) {
             add(sum, *value);
         }

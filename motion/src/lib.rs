@@ -41,6 +41,9 @@ pub use trajectory::{Trajectory, TrajectoryError};
 /// Most joints an arm may have; unused slots of a [`JointArray`] are zero.
 pub const MAX_JOINTS: usize = 16;
 
+/// Most arms have no more joints: what is computed in vectors takes arrays of this length for them.
+pub const USUAL_JOINTS: usize = MAX_JOINTS / 2;
+
 /// Most strokes a trajectory may have.
 pub const MAX_STROKES: usize = 512;
 

@@ -7,7 +7,7 @@
 //! folded, so its cells are as fine after minutes of replacements as at first.
 use crate::limits::TOLERANCE;
 use crate::proof::Proof;
-use crate::{JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
+use crate::{JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory, USUAL_JOINTS};
 
 /// Most cells of a table.
 pub const CELLS_MAX: usize = 1024;
@@ -72,6 +72,18 @@ pub fn cell_count(trajectory: &Trajectory) -> usize {
 
 /// Fills `cells`, as many as [`cell_count`] says, with the bounds of a motion that keeps the motion limits.
 pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimits; MAX_JOINTS]) {
+    if trajectory.joints() <= USUAL_JOINTS {
+        fill_in::<USUAL_JOINTS>(cells, trajectory, limits);
+    } else {
+        fill_in::<MAX_JOINTS>(cells, trajectory, limits);
+    }
+}
+
+fn fill_in<const WIDTH: usize>(
+    cells: &mut [Stretch],
+    trajectory: &Trajectory,
+    limits: &[JointLimits; MAX_JOINTS],
+) {
     let [begin_s, end_s] = span_s(trajectory);
     let width_s = (end_s - begin_s) / to_f64(cells.len().max(1));
     let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
@@ -81,7 +93,7 @@ pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimit
     edges.sort_unstable_by(f64::total_cmp);
     // Between two of these the motion is one polynomial.
     let mut edges = edges.iter().copied().filter(|edge_s| *edge_s > begin_s && *edge_s < end_s);
-    let mut proof = Proof::new(trajectory, limits, 0.0);
+    let mut proof = Proof::<WIDTH>::new(trajectory, limits, 0.0);
     let (mut from_s, mut piece_ends_s) = (begin_s, begin_s);
     for (index, cell) in cells.iter_mut().enumerate() {
         let mut whole: Option<Stretch> = None;
@@ -101,7 +113,11 @@ pub fn fill(cells: &mut [Stretch], trajectory: &Trajectory, limits: &[JointLimit
 }
 
 /// What one polynomial piece does between two of its instants. Motion limits that were proven bound it, too.
-fn bounds(proof: &mut Proof<'_>, limits: &[JointLimits; MAX_JOINTS], [from_s, to_s]: [f64; 2]) -> Stretch {
+fn bounds<const WIDTH: usize>(
+    proof: &mut Proof<'_, WIDTH>,
+    limits: &[JointLimits; MAX_JOINTS],
+    [from_s, to_s]: [f64; 2],
+) -> Stretch {
     let middle_s = 0.5 * (from_s + to_s);
     let found = proof.ranges(middle_s, (to_s - middle_s).max(middle_s - from_s));
     let mut stretch = AT_REST;

@@ -26,13 +26,12 @@
 //! leads outwards, and at the end, the range holds as for any other joint.
 mod pieces;
 
-use crate::joint_array::{add_magnitude, add_scaled};
 use crate::limits::{LimitViolation, Peaks, Quantity, TOLERANCE};
 use crate::polynomial::RESOLUTION;
 use crate::profile_derivatives::{ORDERS, bounds};
 use crate::range::PermittedRange;
 use crate::stroke::{Phi, power};
-use crate::{JointArray, JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory};
+use crate::{JointLimits, MAX_JOINTS, MAX_STROKES, Trajectory, USUAL_JOINTS, joint_array};
 
 /// Most evaluations that a proof may take, of one stroke each; an interval counts as [`INTERVAL_BUDGET`] more. The densest
 /// messages, at their limits, need about half.
@@ -60,7 +59,19 @@ pub(crate) fn check(
     limits: &[JointLimits; MAX_JOINTS],
     begin_s: f64,
 ) -> Result<Peaks, LimitViolation> {
-    let mut proof = Proof::new(trajectory, limits, begin_s);
+    if trajectory.joints() <= USUAL_JOINTS {
+        check_in::<USUAL_JOINTS>(trajectory, limits, begin_s)
+    } else {
+        check_in::<MAX_JOINTS>(trajectory, limits, begin_s)
+    }
+}
+
+fn check_in<const WIDTH: usize>(
+    trajectory: &Trajectory,
+    limits: &[JointLimits; MAX_JOINTS],
+    begin_s: f64,
+) -> Result<Peaks, LimitViolation> {
+    let mut proof = Proof::<WIDTH>::new(trajectory, limits, begin_s);
     proof.check_ends(begin_s)?;
     let mut edges = [f64::INFINITY; 2 * MAX_STROKES];
     for (pair, stroke) in edges.chunks_exact_mut(2).zip(trajectory.strokes()) {
@@ -81,32 +92,32 @@ pub(crate) fn check(
 }
 
 /// q and its first four derivatives by time at one instant, all joints.
-type Jet = [JointArray; 5];
+type Jet<const WIDTH: usize> = [[f64; WIDTH]; 5];
 
-pub(crate) struct Proof<'a> {
+pub(crate) struct Proof<'a, const WIDTH: usize> {
     trajectory: &'a Trajectory,
     limits: &'a [JointLimits; MAX_JOINTS],
     /// Of each stroke `c_k/T^k`, the bounds of its derivatives.
     scales: [[f64; ORDERS + 1]; MAX_STROKES],
     /// Sums of them over the strokes that run in the current piece, times `|delta|`.
-    size: [JointArray; ORDERS + 1],
+    size: [[f64; WIDTH]; ORDERS + 1],
     /// What can happen to position, velocity, acceleration and jerk between edges that differ by rounding.
-    beside: [JointArray; 4],
+    beside: [[f64; WIDTH]; 4],
     /// Indices of the strokes that run in the current piece.
     running: [u16; MAX_STROKES],
     running_count: usize,
     /// Strokes before this one have ended before it; the pose after them, and the sum of their |delta|.
     first: usize,
-    ended_rad: JointArray,
-    ended_size_rad: JointArray,
+    ended_rad: [f64; WIDTH],
+    ended_size_rad: [f64; WIDTH],
     /// The same with those that have ended behind one that runs.
-    reached_rad: JointArray,
-    travelled_rad: JointArray,
+    reached_rad: [f64; WIDTH],
+    travelled_rad: [f64; WIDTH],
     /// Until when each joint comes in from outside its range, and the side; 0 for a joint that begins inside.
-    entries: [Entry; MAX_JOINTS],
+    entries: [Entry; WIDTH],
     /// Highest values met so far, and highest bounds proven: velocity, acceleration, jerk.
-    met: [JointArray; 3],
-    bound: [JointArray; 3],
+    met: [[f64; WIDTH]; 3],
+    bound: [[f64; WIDTH]; 3],
     budget: usize,
 }
 
@@ -161,13 +172,15 @@ enum IntervalResult {
     Fails(LimitViolation),
 }
 
-impl<'a> Proof<'a> {
+impl<'a, const WIDTH: usize> Proof<'a, WIDTH> {
     pub(crate) fn new(
         trajectory: &'a Trajectory,
         limits: &'a [JointLimits; MAX_JOINTS],
         begin_s: f64,
     ) -> Self {
-        let zero = [0.0; MAX_JOINTS];
+        let zero = [0.0; WIDTH];
+        let mut base_rad = zero;
+        add_scaled(&mut base_rad, trajectory.base_rad(), 1.0);
         let scales = scales(trajectory);
         Self {
             trajectory,
@@ -178,9 +191,9 @@ impl<'a> Proof<'a> {
             running: [0; MAX_STROKES],
             running_count: 0,
             first: 0,
-            ended_rad: *trajectory.base_rad(),
+            ended_rad: base_rad,
             ended_size_rad: zero,
-            reached_rad: *trajectory.base_rad(),
+            reached_rad: base_rad,
             travelled_rad: zero,
             entries: core::array::from_fn(|joint| {
                 let entry = |limits| Entry::new(joint, limits, (trajectory, begin_s));
@@ -193,7 +206,7 @@ impl<'a> Proof<'a> {
         }
     }
 
-    fn joint_limits(&self) -> impl Iterator<Item = (usize, &'a JointLimits)> + use<'a> {
+    fn joint_limits(&self) -> impl Iterator<Item = (usize, &'a JointLimits)> + use<'a, WIDTH> {
         self.limits.iter().enumerate().take(self.trajectory.joints())
     }
 
@@ -226,29 +239,28 @@ impl<'a> Proof<'a> {
 
     /// Collects what runs between two neighbouring edges; pieces come from left to right.
     pub(crate) fn enter(&mut self, from_s: f64, to_s: f64) {
-        let joints = self.trajectory.joints();
         while let Some(stroke) = self.trajectory.strokes().get(self.first).filter(|s| s.has_ended(from_s)) {
-            add_scaled(&mut self.ended_rad, &stroke.delta_rad, 1.0, joints);
-            add_magnitude(&mut self.ended_size_rad, &stroke.delta_rad, 1.0, joints);
+            add_scaled(&mut self.ended_rad, &stroke.delta_rad, 1.0);
+            add_magnitude(&mut self.ended_size_rad, &stroke.delta_rad, 1.0);
             self.first += 1;
         }
         (self.reached_rad, self.travelled_rad) = (self.ended_rad, self.ended_size_rad);
-        self.size = [[0.0; MAX_JOINTS]; ORDERS + 1];
+        self.size = [[0.0; WIDTH]; ORDERS + 1];
         self.running_count = 0;
         for (index, stroke) in self.trajectory.strokes().iter().enumerate().skip(self.first) {
             if stroke.start_s >= to_s {
                 break;
             }
             if stroke.has_ended(from_s) {
-                add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0, joints);
-                add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0, joints);
+                add_scaled(&mut self.reached_rad, &stroke.delta_rad, 1.0);
+                add_magnitude(&mut self.travelled_rad, &stroke.delta_rad, 1.0);
                 continue;
             }
             let Some(scales) = self.scales.get(index) else {
                 continue;
             };
             for (size, scale) in self.size.iter_mut().zip(scales) {
-                add_magnitude(size, &stroke.delta_rad, *scale, joints);
+                add_magnitude(size, &stroke.delta_rad, *scale);
             }
             if let (Some(slot), Ok(index)) = (self.running.get_mut(self.running_count), u16::try_from(index))
             {
@@ -259,9 +271,8 @@ impl<'a> Proof<'a> {
     }
 
     /// Exact derivatives at an instant of the current piece.
-    fn jet(&mut self, t_s: f64) -> Jet {
-        let joints = self.trajectory.joints();
-        let mut jet = [[0.0; MAX_JOINTS]; 5];
+    fn jet(&mut self, t_s: f64) -> Jet<WIDTH> {
+        let mut jet = [[0.0; WIDTH]; 5];
         jet[0] = self.reached_rad;
         for index in self.running.iter().take(self.running_count) {
             let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else {
@@ -271,7 +282,7 @@ impl<'a> Proof<'a> {
             let phi = Phi::at(stroke.n, s);
             let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
             for (sum, phi) in jet.iter_mut().zip([phi.value, phi.d1, phi.d2, phi.d3, fourth(stroke.n, s)]) {
-                add_scaled(sum, &stroke.delta_rad, phi * rate_k, joints);
+                add_scaled(sum, &stroke.delta_rad, phi * rate_k);
                 rate_k *= rate;
             }
         }
@@ -280,7 +291,7 @@ impl<'a> Proof<'a> {
     }
 
     /// Notes what is reached at one instant.
-    fn note(&mut self, jet: &Jet) {
+    fn note(&mut self, jet: &Jet<WIDTH>) {
         for (met, values) in self.met.iter_mut().zip(jet.iter().skip(1)) {
             for (met, value) in met.iter_mut().zip(values) {
                 *met = met.max(value.abs());
@@ -339,7 +350,7 @@ impl<'a> Proof<'a> {
         self.note(&jet);
         let mut fails = None;
         let mut coarse = false;
-        let mut bounds = [[0.0; MAX_JOINTS]; 3];
+        let mut bounds = [[0.0; WIDTH]; 3];
         for (joint, limits) in self.joint_limits() {
             let position_rad = jet[0][joint];
             let rounding = ROUNDING * (position_rad.abs() + self.travelled_rad[joint] + self.size[0][joint]);
@@ -385,7 +396,7 @@ impl<'a> Proof<'a> {
     }
 
     /// How far the k-th derivative can go from its value at the middle, without rounding.
-    fn beyond(&self, jet: &Jet, k: usize, joint: usize, half_s: f64) -> f64 {
+    fn beyond(&self, jet: &Jet<WIDTH>, k: usize, joint: usize, half_s: f64) -> f64 {
         let (mut sum, mut factor, mut order) = (0.0, 1.0, 1.0);
         for derivative in jet.iter().skip(k + 1) {
             factor *= half_s / order;
@@ -402,9 +413,9 @@ impl<'a> Proof<'a> {
 
     /// Proven lowest and highest velocity, acceleration and jerk of each joint within `half_s` of an instant, inside the
     /// current piece; zero for those that the arm does not have.
-    pub(crate) fn ranges(&mut self, middle_s: f64, half_s: f64) -> [[[f64; 2]; 3]; MAX_JOINTS] {
+    pub(crate) fn ranges(&mut self, middle_s: f64, half_s: f64) -> [[[f64; 2]; 3]; WIDTH] {
         let jet = self.jet(middle_s);
-        let mut ranges = [[[0.0; 2]; 3]; MAX_JOINTS];
+        let mut ranges = [[[0.0; 2]; 3]; WIDTH];
         for (joint, ranges) in ranges.iter_mut().enumerate().take(self.joints()) {
             for (rate, range) in ranges.iter_mut().enumerate() {
                 let value = jet[rate + 1][joint];
@@ -443,7 +454,7 @@ impl<'a> Proof<'a> {
     }
 
     fn peaks(&self) -> Peaks {
-        let [velocity_rad_s, acceleration_rad_s2, jerk_rad_s3] = self.bound;
+        let [velocity_rad_s, acceleration_rad_s2, jerk_rad_s3] = self.bound.map(joint_array);
         Peaks { velocity_rad_s, acceleration_rad_s2, jerk_rad_s3 }
     }
 }
@@ -470,12 +481,15 @@ fn scales(trajectory: &Trajectory) -> [[f64; ORDERS + 1]; MAX_STROKES] {
 }
 
 /// What can happen to position, velocity, acceleration and jerk between two edges that differ by rounding.
-fn beside(trajectory: &Trajectory, scales: &[[f64; ORDERS + 1]; MAX_STROKES]) -> [JointArray; 4] {
+fn beside<const WIDTH: usize>(
+    trajectory: &Trajectory,
+    scales: &[[f64; ORDERS + 1]; MAX_STROKES],
+) -> [[f64; WIDTH]; 4] {
     let width_s = EDGE_ROUNDING * trajectory.duration_s();
-    let mut beside = [[0.0; MAX_JOINTS]; 4];
+    let mut beside = [[0.0; WIDTH]; 4];
     for (stroke, scales) in trajectory.strokes().iter().zip(scales) {
         for (beside, scale) in beside.iter_mut().zip(scales.iter().skip(1)) {
-            add_magnitude(beside, &stroke.delta_rad, width_s * scale, trajectory.joints());
+            add_magnitude(beside, &stroke.delta_rad, width_s * scale);
         }
     }
     beside
@@ -521,6 +535,30 @@ fn fourth(n: u32, s: f64) -> f64 {
     m * power(u, n.saturating_sub(4)) * inner
 }
 
+/// Joints of the arm that both arrays have slots for.
+#[inline(always)]
+fn add_scaled<const WIDTH: usize, const SLOTS: usize>(
+    sum: &mut [f64; WIDTH],
+    value: &[f64; SLOTS],
+    factor: f64,
+) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += value * factor;
+    }
+}
+
+/// The same with magnitudes.
+#[inline(always)]
+fn add_magnitude<const WIDTH: usize, const SLOTS: usize>(
+    sum: &mut [f64; WIDTH],
+    value: &[f64; SLOTS],
+    factor: f64,
+) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += value.abs() * factor;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -544,7 +582,7 @@ mod tests {
             delta_rad[0] = 1.0;
             let stroke = Stroke { start_s: 0.0, duration_s: 1.0, n, delta_rad };
             let trajectory = Trajectory::new(1, [0.0; MAX_JOINTS], &[stroke]).unwrap();
-            let mut proof = Proof::new(&trajectory, &limits, 0.0);
+            let mut proof = Proof::<USUAL_JOINTS>::new(&trajectory, &limits, 0.0);
             proof.enter(0.0, 1.0);
             for place in 1..200 {
                 let middle_s = f64::from(place) / 200.0;

@@ -10,9 +10,9 @@
 //! So sigma is continuous with its first three derivatives, stays in [0, 1] for any sequence of changes of any durations, and
 //! is exactly r when the newest change has ended; what came before it is then forgotten without changing a bit. Which
 //! duration a change needs is chosen by `stopping`.
+use crate::Setpoint;
 use crate::ramp::RampShape;
 use crate::stroke::DURATION_S_MIN;
-use crate::{MAX_JOINTS, Setpoint};
 
 /// Most changes that may overlap.
 pub const RAMPS_MAX: usize = 8;
@@ -233,18 +233,16 @@ fn unit(sigma: f64) -> f64 {
 /// Derivatives by real time of a motion that is run at a scale: v sigma, a sigma^2 + v sigma', and
 /// j sigma^3 + 3 a sigma sigma' + v sigma''. Positions stay.
 ///
-/// Real time: no allocation.
+/// Real time: no allocation; one pass over so many joints.
 #[must_use]
-pub fn scaled(setpoint: &Setpoint, scale: Scale) -> Setpoint {
+pub fn scaled(mut setpoint: Setpoint, scale: Scale, joints: usize) -> Setpoint {
     let Scale { sigma, sigma_d1_s, sigma_d2_s2 } = scale;
-    let mut out = *setpoint;
-    for joint in 0..MAX_JOINTS {
-        let v = setpoint.velocity_rad_s[joint];
-        let a = setpoint.acceleration_rad_s2[joint];
-        let j = setpoint.jerk_rad_s3[joint];
-        out.velocity_rad_s[joint] = v * sigma;
-        out.acceleration_rad_s2[joint] = a * sigma * sigma + v * sigma_d1_s;
-        out.jerk_rad_s3[joint] = j * sigma * sigma * sigma + 3.0 * a * sigma * sigma_d1_s + v * sigma_d2_s2;
+    let rates = setpoint.velocity_rad_s.iter_mut().zip(&mut setpoint.acceleration_rad_s2);
+    for ((velocity, acceleration), jerk) in rates.zip(&mut setpoint.jerk_rad_s3).take(joints) {
+        let (v, a, j) = (*velocity, *acceleration, *jerk);
+        *velocity = v * sigma;
+        *acceleration = a * sigma * sigma + v * sigma_d1_s;
+        *jerk = j * sigma * sigma * sigma + 3.0 * a * sigma * sigma_d1_s + v * sigma_d2_s2;
     }
-    out
+    setpoint
 }

@@ -2,9 +2,9 @@
 mod common;
 use common::{SeededRng, slope};
 use proptest::prelude::*;
-use taustream_motion::Setpoint;
 use taustream_motion::ramp::SHAPES;
 use taustream_motion::time_scale::{RAMP_S_MAX, RAMPS_MAX, Ramp, Scale, TimeScale, scaled};
+use taustream_motion::{MAX_JOINTS, Setpoint};
 
 fn ramp(start_s: f64, duration_s: f64, shape: usize) -> Ramp {
     Ramp { start_s, duration_s, shape: &SHAPES[shape % SHAPES.len()] }
@@ -181,7 +181,7 @@ fn scaled_at_full_speed_and_at_a_standstill_is_the_motion_and_nothing() {
     setpoint.velocity_rad_s[0] = 2.0;
     setpoint.acceleration_rad_s2[0] = 3.0;
     setpoint.jerk_rad_s3[0] = 4.0;
-    assert_eq!(scaled(&setpoint, Scale { sigma: 1.0, ..Scale::default() }), setpoint);
+    assert_eq!(scaled(setpoint, Scale { sigma: 1.0, ..Scale::default() }, MAX_JOINTS), setpoint);
     let still = Setpoint { position_rad: setpoint.position_rad, ..Setpoint::default() };
-    assert_eq!(scaled(&setpoint, Scale::default()), still);
+    assert_eq!(scaled(setpoint, Scale::default(), MAX_JOINTS), still);
 }

@@ -73,7 +73,9 @@ impl Field for Sampled<'_, '_> {
     /// The end that the edge comes from is known.
     fn is_edge_free(&self, a: &JointArray, b: &JointArray) -> bool {
         let reach = self.space.world.reach_m();
-        let moves_m: f64 = reach.iter().zip(a.iter().zip(b)).map(|(r, (a, b))| r * (a - b).abs()).sum();
+        let joints = self.space.world.joints();
+        let moves = reach.iter().zip(a.iter().zip(b)).take(joints).map(|(r, (a, b))| r * (a - b).abs());
+        let moves_m: f64 = moves.sum();
         let count = (moves_m / self.sampling.spacing_m).ceil().max(1.0);
         let poses = &mut *self.poses_rad.borrow_mut();
         poses.clear();

@@ -168,21 +168,14 @@ impl Guard {
         cycle_state: &mut CycleState,
     ) -> GuardedCommand {
         let tick = cycle_state.tick.number;
-        let mut past = *ledger.joints();
-        self.permit(requested, &past);
-        if requested.restart && self.brake.is_none() {
-            for (last, position_rad) in past.iter_mut().zip(&requested.setpoint.position_rad) {
-                // A pose that is not finite is none; the check of the setpoint itself will refuse it.
-                let at_rad = if position_rad.is_finite() { *position_rad } else { last.position_rad[0] };
-                *last = last.at_rest(at_rad, tick.saturating_sub(1));
+        self.permit(requested, ledger.joints());
+        if requested.live && self.brake.is_none() {
+            let restarted = requested.restart.then(|| at_rest(ledger.joints(), requested, tick));
+            let past = restarted.as_ref().unwrap_or(ledger.joints());
+            if let Some(trip) = self.find_trip(requested, past, tick) {
+                cycle_state.trip = Some(trip);
+                self.brake = Some(self.begin_brake(past));
             }
-        }
-        if requested.live
-            && self.brake.is_none()
-            && let Some(trip) = self.find_trip(requested, &past, tick)
-        {
-            cycle_state.trip = Some(trip);
-            self.brake = Some(self.begin_brake(&past));
         }
         GuardedCommand::new(match self.brake {
             None => requested.setpoint,
@@ -203,7 +196,8 @@ impl Guard {
     fn permit(&mut self, requested: &RequestedSetpoint, past: &[LastSent; MAX_JOINTS]) {
         let energised_now = !(requested.live && self.was_live);
         let joints = self.permitted.iter_mut().zip(&self.limits).zip(past);
-        for (((permitted, limits), last), requested_rad) in joints.zip(&requested.setpoint.position_rad) {
+        let joints = joints.zip(&requested.setpoint.position_rad).take(self.joints);
+        for (((permitted, limits), last), requested_rad) in joints {
             *permitted = if energised_now {
                 PermittedRange::around(limits, *requested_rad)
             } else if self.released {
@@ -279,6 +273,21 @@ impl Guard {
         cycle_state.trajectory_id = 0;
         setpoint
     }
+}
+
+/// The joints as if each had stood where it is requested since before a cycle.
+fn at_rest(
+    past: &[LastSent; MAX_JOINTS],
+    requested: &RequestedSetpoint,
+    tick: u64,
+) -> [LastSent; MAX_JOINTS] {
+    let mut past = *past;
+    for (last, position_rad) in past.iter_mut().zip(&requested.setpoint.position_rad) {
+        // A pose that is not finite is none; the check of the setpoint itself will refuse it.
+        let at_rad = if position_rad.is_finite() { *position_rad } else { last.position_rad[0] };
+        *last = last.at_rest(at_rad, tick.saturating_sub(1));
+    }
+    past
 }
 
 type Refusal = (TripKind, f64, f64);

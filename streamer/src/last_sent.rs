@@ -193,7 +193,7 @@ impl Ledger {
     pub fn record(&mut self, command: &GuardedCommand, restart: bool, cycle_state: &mut CycleState) {
         let tick = cycle_state.tick.number;
         let left = cycle_state.setpoints_sent();
-        let (command, torques) = (command.setpoint(), command.joints().map(|joint| joint.torque_nm));
+        let (joints, command) = (command.joints(), command.setpoint());
         let lost_max = self.lost_max;
         for (joint, last) in self.last.iter_mut().enumerate().take(self.joints) {
             let (due, taken) = (cycle_state.due.contains(joint), cycle_state.taken.contains(joint));
@@ -215,7 +215,7 @@ impl Ledger {
                 last.take([position_rad, rates[0], rates[1]], tick);
             }
             if taken || !cycle_state.live {
-                last.torque_nm = torques[joint];
+                last.torque_nm = joints[joint].torque_nm;
             }
             let waits = !due && !cycle_state.unreachable[joint];
             if left {

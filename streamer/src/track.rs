@@ -213,7 +213,7 @@ impl Track {
                     if self.next.took_over { self.successor.sample(self.next.s) } else { None };
                 let sampled =
                     of_successor.unwrap_or_else(|| self.cursor.sample(&running.trajectory, self.next.s));
-                setpoint = scaled(&sampled, cycle_state.scale);
+                setpoint = scaled(sampled, cycle_state.scale, self.joints);
                 cycle_state.off_path_rad = self.approach.add_to(&mut setpoint, approach_s);
                 cycle_state.end_reached = self.next.s >= end_s && self.approach.has_ended(approach_s);
                 keep_stopped(ledger, &mut setpoint, &mut cycle_state.off_path_rad);

@@ -3,13 +3,14 @@
 //! Between two edges a trajectory is one polynomial of high degree. Its derivatives at one instant, up to the eighth, make a polynomial
 //! that leaves out at most M9 H^(9-k)/(9-k)! of the k-th derivative, where M9 bounds the ninth. What it does is bounded in Bernstein form,
 //! without another look at the strokes. Parts that a limit or a peak needs more sharply are halved.
-use super::{INTERVAL_BUDGET, PEAK_BUDGET, PEAK_FLOOR, Proof, RATES, ROUNDING, limit_of};
-use crate::joint_array::{add_magnitude, add_scaled};
+use super::{
+    INTERVAL_BUDGET, PEAK_BUDGET, PEAK_FLOOR, Proof, RATES, ROUNDING, add_magnitude, add_scaled, limit_of,
+};
+use crate::JointLimits;
 use crate::limits::TOLERANCE;
 use crate::polynomial::{CONVERSION, Polynomial, RESOLUTION};
 use crate::profile_derivatives::{ORDER, ORDERS, derivatives};
 use crate::range::PermittedRange;
-use crate::{JointArray, JointLimits, MAX_JOINTS};
 
 /// What a Taylor polynomial may leave out, as a part of each limit: where it is tried first ..
 const LEFT_OUT: f64 = 0.1;
@@ -29,7 +30,7 @@ enum PartResult {
     Fails,
 }
 
-impl Proof<'_> {
+impl<const WIDTH: usize> Proof<'_, WIDTH> {
     /// Proves one piece by Taylor polynomials; false when they do not suffice.
     pub(super) fn holds_by_polynomials(&mut self, from_s: f64, to_s: f64) -> bool {
         if self.entries.iter().any(|entry| entry.until_s.is_some()) {
@@ -105,20 +106,19 @@ impl Proof<'_> {
         let half_s = (to_s - middle_s).max(middle_s - from_s);
         let powers = powers(half_s);
         let jets = self.high_jets(middle_s);
-        let joints = self.trajectory.joints();
-        let mut bounds = [[0.0; MAX_JOINTS]; 3];
+        let mut bounds = [[0.0; WIDTH]; 3];
         for order in (0..4).rev() {
-            let mut taylor = [[0.0; MAX_JOINTS]; ORDERS];
+            let mut taylor = [[0.0; WIDTH]; ORDERS];
             let mut beyond = self.beside[order];
             if order == 0 {
-                add_magnitude(&mut beyond, &jets[0], ROUNDING, joints);
-                add_scaled(&mut beyond, &self.travelled_rad, ROUNDING, joints);
+                add_magnitude(&mut beyond, &jets[0], ROUNDING);
+                add_scaled(&mut beyond, &self.travelled_rad, ROUNDING);
             }
             let derivatives = jets.iter().zip(&self.size).skip(order);
             for ((coefficients, (jet, size)), power) in taylor.iter_mut().zip(derivatives).zip(powers) {
-                add_scaled(coefficients, jet, power, joints);
-                add_scaled(&mut beyond, size, ROUNDING * power, joints);
-                add_magnitude(&mut beyond, coefficients, CONVERSION, joints);
+                add_scaled(coefficients, jet, power);
+                add_scaled(&mut beyond, size, ROUNDING * power);
+                add_magnitude(&mut beyond, coefficients, CONVERSION);
             }
             for (joint, limits) in self.joint_limits() {
                 let taylor = taylor.map(|coefficients| coefficients[joint]);
@@ -180,9 +180,8 @@ impl Proof<'_> {
     }
 
     /// q and its derivatives up to the eighth at an instant of the current piece.
-    fn high_jets(&mut self, t_s: f64) -> [JointArray; ORDERS] {
-        let joints = self.trajectory.joints();
-        let mut jets = [[0.0; MAX_JOINTS]; ORDERS];
+    fn high_jets(&mut self, t_s: f64) -> [[f64; WIDTH]; ORDERS] {
+        let mut jets = [[0.0; WIDTH]; ORDERS];
         jets[0] = self.reached_rad;
         for index in self.running.iter().take(self.running_count) {
             let Some(stroke) = self.trajectory.strokes().get(usize::from(*index)) else {
@@ -191,7 +190,7 @@ impl Proof<'_> {
             let s = ((t_s - stroke.start_s) / stroke.duration_s).clamp(0.0, 1.0);
             let (rate, mut rate_k) = (1.0 / stroke.duration_s, 1.0);
             for (sum, phi) in jets.iter_mut().zip(derivatives(stroke.n, s)) {
-                add_scaled(sum, &stroke.delta_rad, phi * rate_k, joints);
+                add_scaled(sum, &stroke.delta_rad, phi * rate_k);
                 rate_k *= rate;
             }
         }

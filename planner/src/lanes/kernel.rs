@@ -5,12 +5,10 @@ use super::grid::Bounds;
 use super::model::{Form, Group, GroupPair, Model, Obstacle};
 use pulp::{Simd, WithSimd};
 use std::f64::consts::PI;
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, MAX_JOINTS, USUAL_JOINTS};
 
 /// Most lanes of any machine.
 const LANES_MAX: usize = 16;
-/// Frames of most arms; those with more joints take arrays of twice the size.
-const FRAMES_OF_MOST: usize = MAX_JOINTS / 2 + 1;
 /// Adding and subtracting it leaves a number's whole part: 1.5 * 2^52.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
@@ -45,8 +43,8 @@ impl WithSimd for Pass<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> bool {
-        if self.model.joints.len() < FRAMES_OF_MOST {
-            self.search::<S, FRAMES_OF_MOST>(simd)
+        if self.model.joints.len() <= USUAL_JOINTS {
+            self.search::<S, { USUAL_JOINTS + 1 }>(simd)
         } else {
             self.search::<S, { MAX_JOINTS + 1 }>(simd)
         }

@@ -18,7 +18,7 @@ mod factor;
 mod lane;
 mod row;
 
-pub use lane::{HALF, Lane, PerJoint};
+pub use lane::{Lane, PerJoint};
 
 use factor::{Factor, Factoring};
 pub(super) use lane::{Vectorized, vectorized};

@@ -4,12 +4,12 @@
 //! third part is added around the corner, which moves nothing in all: strokes of one kernel, fitted ([`super::fit`]) so that
 //! the sum keeps the limits and stays in a tube around both paths. The earliest start of the second motion is taken for which
 //! such a fit is found. The strokes of both motions stay as they are, so the first one may be under way.
-use super::fit::{Bounds, Fit, Fitter, Grid, HALF, Lane, PerJoint, Vectorized, vectorized};
+use super::fit::{Bounds, Fit, Fitter, Grid, Lane, PerJoint, Vectorized, vectorized};
 use super::tube::Tube;
 use super::{Timed, distance};
 use pulp::{Scalar, Simd};
 use taustream_motion::stroke::DURATION_S_MIN;
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint, Stroke, Trajectory};
+use taustream_motion::{JointArray, JointLimits, MAX_JOINTS, Setpoint, Stroke, Trajectory, USUAL_JOINTS};
 
 /// Starts of the second motion that are tried.
 const STARTS: u32 = 16;
@@ -75,8 +75,8 @@ impl Onward<'_> {
     /// Both motions as one that stays within a distance of their paths; `None` where the arm has to stop between them.
     #[must_use]
     pub fn rounded(&self, blend_rad: f64) -> Option<Timed> {
-        if self.first.joints() <= HALF {
-            self.earliest::<HALF>(blend_rad)
+        if self.first.joints() <= USUAL_JOINTS {
+            self.earliest::<USUAL_JOINTS>(blend_rad)
         } else {
             self.earliest::<MAX_JOINTS>(blend_rad)
         }

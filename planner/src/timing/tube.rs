@@ -5,12 +5,12 @@
 //! accelerations and the shape of the corners come from the fit; [`Law`] only says where it begins and how long the motion
 //! shall take. The tube is a little narrower than what is allowed, as a fit ends near its bounds; what comes out is measured,
 //! and made slower until it keeps to the path.
-use super::fit::{Bounds, Fit, Fitter, Grid, HALF, Lane, PerJoint, Vectorized, vectorized};
+use super::fit::{Bounds, Fit, Fitter, Grid, Lane, PerJoint, Vectorized, vectorized};
 use super::law::Law;
 use super::{Path, SLACK};
 use pulp::{Scalar, Simd};
 use taustream_motion::stroke::DURATION_S_MIN;
-use taustream_motion::{JointArray, MAX_JOINTS, MAX_STROKES, Stroke};
+use taustream_motion::{JointArray, MAX_JOINTS, MAX_STROKES, Stroke, USUAL_JOINTS};
 
 /// Strokes of a path, and of each segment more.
 const STROKES: [usize; 2] = [32, 16];
@@ -41,8 +41,8 @@ pub(super) struct Rounded {
 
 /// The shortest of the fits that keep within the deviation of each inner corner; `None` when none does in less than `most_s`.
 pub(super) fn through(path: &Path, deviations_rad: &[f64], most_s: f64) -> Option<Rounded> {
-    if path.joints <= HALF {
-        shortest::<HALF>(path, deviations_rad, most_s)
+    if path.joints <= USUAL_JOINTS {
+        shortest::<USUAL_JOINTS>(path, deviations_rad, most_s)
     } else {
         shortest::<MAX_JOINTS>(path, deviations_rad, most_s)
     }

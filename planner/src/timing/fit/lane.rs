@@ -4,7 +4,7 @@
 //! into the function that the instructions are switched on for ([`vectorized`]): loops, since closures in iterators become functions
 //! of their own. Products and sums stay apart, so every machine computes the same bits.
 use pulp::{Arch, Simd, WithSimd};
-use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
+use taustream_motion::{JointArray, MAX_JOINTS, USUAL_JOINTS, joint_array};
 
 /// A loop that is compiled for each set of instructions. Its `run` must be `inline(always)`, like all that it calls.
 pub(in crate::timing) trait Vectorized {
@@ -122,10 +122,7 @@ impl Lane for f64 {
     }
 }
 
-/// Joints of an arm that is fitted in vectors of half the length: most arms have no more.
-pub const HALF: usize = MAX_JOINTS / 2;
-
-/// One number a joint, for arms of at most so many joints: [`HALF`] or [`MAX_JOINTS`].
+/// One number a joint, for arms of at most so many joints: [`USUAL_JOINTS`] or [`MAX_JOINTS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct PerJoint<const JOINTS: usize>(pub [f64; JOINTS]);
@@ -171,7 +168,7 @@ impl<const JOINTS: usize> PerJoint<JOINTS> {
 }
 
 const _: () = assert!(
-    HALF.is_multiple_of(8) && MAX_JOINTS.is_power_of_two(),
+    USUAL_JOINTS.is_multiple_of(8) && MAX_JOINTS.is_power_of_two(),
     "sums go by halves, and vectors hold no rest"
 );
 
