@@ -150,7 +150,7 @@ proptest! {
     /// Numbers of any kind make a trajectory or an error, never a panic.
     #[test]
     fn trajectory_of_any_bits_is_made_or_refused(
-        joints in 0_usize..12, base in prop::collection::vec(any::<f64>(), 8),
+        joints in 0_usize..20, base in prop::collection::vec(any::<f64>(), MAX_JOINTS),
         raw in prop::collection::vec((any::<f64>(), any::<f64>(), any::<u32>(), any::<f64>()), 0..6),
         t_s in any::<f64>(),
     ) {
@@ -218,7 +218,7 @@ fn trajectory_of_bad_numbers_is_refused_with_the_offender() {
         assert!(sentence.contains(part), "{sentence} lacks {part}");
     }
     assert!(matches!(Trajectory::new(0, base, &[]), Err(TrajectoryError::JointCount { joints: 0 })));
-    assert!(matches!(Trajectory::new(9, base, &[]), Err(TrajectoryError::JointCount { joints: 9 })));
+    assert!(matches!(Trajectory::new(17, base, &[]), Err(TrajectoryError::JointCount { joints: 17 })));
     let mut bad_base = base;
     bad_base[6] = 1.0;
     assert!(matches!(Trajectory::new(6, bad_base, &[]), Err(TrajectoryError::Base { joint: 6, .. })));

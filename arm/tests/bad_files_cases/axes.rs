@@ -64,8 +64,8 @@ pub(crate) const CASES: &[Case] = &[
     (
         Gripper,
         "[[axis]]",
-        "[[axis]]\nname = \"a\"\n[[axis]]\nname = \"b\"\n[[axis]]",
+        "[[axis]]\nname = \"a\"\n[[axis]]\nname = \"b\"\n[[axis]]\nname = \"c\"\n[[axis]]\nname = \"d\"\n[[axis]]",
         "axis",
-        "at most 2 beside 6 joints",
+        "at most 4 beside 6 joints",
     ),
 ];

@@ -72,9 +72,9 @@ pub(crate) fn ur5_limits() -> [JointLimits; MAX_JOINTS] {
     [JointLimits { position_rad: [-20.0, 20.0], motion, stop }; MAX_JOINTS]
 }
 
-/// Limits that differ from joint to joint and from seed to seed.
+/// Limits that differ from joint to joint and from seed to seed; those of an arm's second eight joints are those of the first.
 pub(crate) fn random_limits(rng: &mut SeededRng) -> [JointLimits; MAX_JOINTS] {
-    [(); MAX_JOINTS].map(|()| {
+    let eight = [(); MAX_JOINTS / 2].map(|()| {
         let motion = LimitSet {
             velocity_rad_s: rng.within(0.5, 3.5),
             acceleration_rad_s2: rng.within(1.0, 20.0),
@@ -86,5 +86,6 @@ pub(crate) fn random_limits(rng: &mut SeededRng) -> [JointLimits; MAX_JOINTS] {
             jerk_rad_s3: motion.jerk_rad_s3 * rng.within(1.5, 6.0),
         };
         JointLimits { position_rad: [-20.0, 20.0], motion, stop }
-    })
+    });
+    std::array::from_fn(|joint| eight[joint % eight.len()])
 }
