@@ -88,8 +88,9 @@ impl ProblemSet {
             let mut drawn = None;
             for _ in 0..RETRIES_MAX {
                 match random_one(robot, surroundings, &mut rng)? {
-                    One::Blocked(scene, [start_rad, goal_rad]) => {
-                        drawn = Some(Problem { id, scene: *scene, start_rad, goal_rad });
+                    One::Blocked(blocked) => {
+                        let (scene, [start_rad, goal_rad]) = *blocked;
+                        drawn = Some(Problem { id, scene, start_rad, goal_rad });
                         break;
                     }
                     One::FreeLine => set.free_lines += 1,
@@ -110,7 +111,7 @@ impl ProblemSet {
 enum One {
     Unclear,
     FreeLine,
-    Blocked(Box<Scene>, [JointArray; 2]),
+    Blocked(Box<(Scene, [JointArray; 2])>),
 }
 
 fn random_one(robot: &Robot, surroundings: &Surroundings, rng: &mut SeededRng) -> Result<One, String> {
@@ -140,7 +141,7 @@ fn random_one(robot: &Robot, surroundings: &Surroundings, rng: &mut SeededRng) -
         return Ok(One::Unclear);
     }
     let is_line_free = space.is_edge_free(&start_rad, &goal_rad);
-    Ok(if is_line_free { One::FreeLine } else { One::Blocked(Box::new(scene), [start_rad, goal_rad]) })
+    Ok(if is_line_free { One::FreeLine } else { One::Blocked(Box::new((scene, [start_rad, goal_rad]))) })
 }
 
 /// Goes straight towards random poses, a step at a time, and turns where it is blocked; the poses in order.
