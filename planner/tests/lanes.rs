@@ -1,4 +1,5 @@
 //! The lanes answer as the exact model does.
+#![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
