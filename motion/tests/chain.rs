@@ -217,9 +217,9 @@ fn joints_of_a_tree_move_their_own_branches_and_nothing_else() {
             let gap = (expected.to_homogeneous() - frames[joint + 1].to_homogeneous()).amax();
             assert!(gap < 1e-12, "seed {seed}, joint {joint}: {gap:e}");
         }
-        for frame in 0..=count {
+        for (frame, expected) in frames.iter().enumerate().take(count + 1) {
             let (tip, columns) = chain.jacobian(frame, &position_rad);
-            assert_eq!(tip, frames[frame]);
+            assert_eq!(tip, *expected);
             for (joint, column) in columns.iter().enumerate() {
                 let at = |by: f64| {
                     let mut moved_rad = position_rad;
