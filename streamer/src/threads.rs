@@ -90,7 +90,7 @@ impl Threads {
             let stop = Arc::clone(&threads.stop);
             threads.spawn("commands", 1 << 20, move || commands.serve(&first, &stop))?;
             let stop = Arc::clone(&threads.stop);
-            threads.spawn("publisher", 2 << 20, move || publisher.serve(&second, &stop))?;
+            threads.spawn("publisher", 4 << 20, move || publisher.serve(&second, &stop))?;
         }
         if let Err(e) = watch.open_first() {
             // Not joined: one of them may be what hangs.

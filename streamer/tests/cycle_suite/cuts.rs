@@ -214,7 +214,7 @@ fn chain_of_replacements_stays_short_and_exact() {
 }
 
 /// A message, what it cuts and when, and the reason that it is refused for.
-type Row<'a> = (Trajectory, u64, f64, &'a dyn Fn(CutRefusal) -> bool);
+type Row<'a> = (Box<Trajectory>, u64, f64, &'a dyn Fn(CutRefusal) -> bool);
 
 #[test]
 fn hostile_replacements_are_refused_with_their_reason_and_change_nothing() {
@@ -228,7 +228,7 @@ fn hostile_replacements_are_refused_with_their_reason_and_change_nothing() {
     let spoiled = |change: &dyn Fn(&mut JointArray, &mut Vec<Stroke>)| {
         let (mut base_rad, mut strokes) = (*good.base_rad(), good.strokes().to_vec());
         change(&mut base_rad, &mut strokes);
-        Trajectory::new(JOINTS, base_rad, &strokes).unwrap()
+        Box::new(Trajectory::new(JOINTS, base_rad, &strokes).unwrap())
     };
     let up = |value: &mut f64| *value = f64::from_bits(value.to_bits() + 1);
     let stroke = |index| CutRefusal::Kept(KeptDifference::Stroke(index));
@@ -247,18 +247,20 @@ fn hostile_replacements_are_refused_with_their_reason_and_change_nothing() {
             at_s,
             &|r| matches!(r, CutRefusal::Kept(KeptDifference::Base { joint: 5, by_rad }) if by_rad > 0.0),
         ),
-        (good.clone(), id + 7, at_s, &|r| matches!(r, CutRefusal::OtherTrajectory { .. })),
+        (Box::new(good.clone()), id + 7, at_s, &|r| matches!(r, CutRefusal::OtherTrajectory { .. })),
         (
-            replacement(&running, (passed_s, passed_s), 0.1),
+            Box::new(replacement(&running, (passed_s, passed_s), 0.1)),
             id,
             passed_s,
             &|r| matches!(r, CutRefusal::Passed { by_s, .. } if (0.25..0.45).contains(&by_s)),
         ),
-        (good.clone(), id, f64::NAN, &|r| matches!(r, CutRefusal::Outside { .. })),
-        (good.clone(), id, running.duration_s() + 0.1, &|r| matches!(r, CutRefusal::Outside { .. })),
+        (Box::new(good.clone()), id, f64::NAN, &|r| matches!(r, CutRefusal::Outside { .. })),
+        (Box::new(good.clone()), id, running.duration_s() + 0.1, &|r| {
+            matches!(r, CutRefusal::Outside { .. })
+        }),
     ];
     for (row, (trajectory, cut, at_s, is_reason)) in table.into_iter().enumerate() {
-        let decision = moving.harness.offer_cut(trajectory, (cut, at_s));
+        let decision = moving.harness.offer_cut(*trajectory, (cut, at_s));
         let Decision::Cut(refusal) = decision else { panic!("row {row}: {decision:?}") };
         assert!(is_reason(refusal), "row {row}: {refusal:?}");
         assert!(!refusal.rejection().to_string().is_empty());
