@@ -17,6 +17,14 @@ pub enum OptionalObject {
     AbortConnection = 0x6007,
     /// Quick stop option: how a quick stop ends.
     QuickStopOption = 0x605A,
+    /// Home offset.
+    HomeOffset = 0x607C,
+    /// Homing method.
+    HomingMethod = 0x6098,
+    /// Homing speeds.
+    HomingSpeeds = 0x6099,
+    /// Homing acceleration.
+    HomingAcceleration = 0x609A,
     /// Interpolation time period.
     InterpolationPeriod = 0x60C2,
     /// Supported drive modes.
@@ -25,11 +33,15 @@ pub enum OptionalObject {
 
 impl OptionalObject {
     /// Every object.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 10] = [
         Self::SyncPeriod,
         Self::ProducerHeartbeat,
         Self::AbortConnection,
         Self::QuickStopOption,
+        Self::HomeOffset,
+        Self::HomingMethod,
+        Self::HomingSpeeds,
+        Self::HomingAcceleration,
         Self::InterpolationPeriod,
         Self::SupportedModes,
     ];
@@ -52,6 +64,10 @@ impl OptionalObject {
             Self::ProducerHeartbeat => "producer heartbeat time",
             Self::AbortConnection => "abort connection option",
             Self::QuickStopOption => "quick stop option",
+            Self::HomeOffset => "home offset",
+            Self::HomingMethod => "homing method",
+            Self::HomingSpeeds => "homing speeds",
+            Self::HomingAcceleration => "homing acceleration",
             Self::InterpolationPeriod => "interpolation time period",
             Self::SupportedModes => "supported drive modes",
         }
@@ -64,11 +80,15 @@ impl OptionalObject {
             Self::ProducerHeartbeat => "only missing feedback shows that the drive is gone",
             Self::AbortConnection => "what the drive does when its master is lost is the drive's own setting",
             Self::QuickStopOption => "whether the drive holds after a quick stop is the drive's own setting",
+            Self::HomeOffset => "the position that homing gives the home position is the drive's own setting",
+            Self::HomingMethod => "how the drive homes is the drive's own setting",
+            Self::HomingSpeeds => "how fast the drive homes is the drive's own setting",
+            Self::HomingAcceleration => "how the drive accelerates in homing is the drive's own setting",
             Self::InterpolationPeriod => "the drive does not know the time between two setpoints",
             Self::SupportedModes => "only its modes display (0x6061) confirms the mode",
         }
     }
-    const fn bit(self) -> u8 {
+    const fn bit(self) -> u16 {
         match self {
             Self::SyncPeriod => 1,
             Self::ProducerHeartbeat => 2,
@@ -76,13 +96,17 @@ impl OptionalObject {
             Self::QuickStopOption => 8,
             Self::InterpolationPeriod => 16,
             Self::SupportedModes => 32,
+            Self::HomeOffset => 64,
+            Self::HomingMethod => 128,
+            Self::HomingSpeeds => 256,
+            Self::HomingAcceleration => 512,
         }
     }
 }
 
 /// Objects that are neither read nor written, because the drive does not have them or they are fixed in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AbsentObjects(u8);
+pub struct AbsentObjects(u16);
 
 impl AbsentObjects {
     /// Every object is there.

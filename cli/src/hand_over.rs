@@ -206,6 +206,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::TorqueOff(_)
         | Action::ClearFault(_)
         | Action::Axis(_)
+        | Action::Home(_)
         | Action::Reference(_)
         | Action::Status
         | Action::Watch(_) => true,

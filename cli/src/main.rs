@@ -93,6 +93,7 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
         Action::Axis(args) => {
             interrupt::watch().and_then(|()| live::axis::run(form, &ArmName::read(settings)?, args))
         }
+        Action::Home(args) => interrupt::watch().and_then(|()| live::home::run(form, settings, args)),
         Action::Reference(args) => live::reference::run(form, settings, args),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Watch(args) => live::watch::run(form, settings, args),

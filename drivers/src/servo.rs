@@ -66,6 +66,8 @@ pub enum DriveState {
     Enabling,
     /// Energised and following the commands.
     Enabled,
+    /// Energised, and moved by its own homing, not by the commands; see [`ServoStatus::homing`].
+    Homing,
     /// On its way to de-energised.
     Disabling,
     /// In its fault state (or reacting to a fault).
@@ -84,11 +86,37 @@ impl DriveState {
             | Self::Adopted
             | Self::Enabling
             | Self::Enabled
+            | Self::Homing
             | Self::Disabling
             | Self::Fault => true,
             Self::Absent | Self::Configuring | Self::EnergisedUnowned | Self::Refused => false,
         }
     }
+}
+
+/// What is known of the homing of a drive in [`DriveState::Homing`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HomingState {
+    /// It does not home itself.
+    #[default]
+    None,
+    /// It still holds, and is on its way to its homing mode.
+    Preparing,
+    /// In its homing mode, in motion or coming to rest: it is where it is measured.
+    Running,
+    /// On its way back to the mode in which it follows commands; it holds [`ServoStatus::hold_position_rad`].
+    Returning,
+    /// Homed: its position counts from its home position. It holds, until the command is there and homing is not asked for.
+    Attained,
+    /// Ended because it was not asked for any more; it holds likewise.
+    Aborted,
+    /// Failed, and why, as [`ServoStatus::error_code`] and [`ServoStatus::refused_object`]; it holds likewise.
+    Failed {
+        /// The code.
+        code: u32,
+        /// The object; 0 when none is to blame.
+        object: u32,
+    },
 }
 
 /// What is known of one joint's drive.
@@ -102,8 +130,10 @@ pub struct ServoStatus {
     pub velocity_rad_s: f64,
     /// Measured torque at the link; NaN when the drive does not send it.
     pub torque_nm: f64,
-    /// Link angle that an adopted drive holds; NaN in every other state.
+    /// Link angle that an adopted drive holds, or one that has been homing; NaN otherwise.
     pub hold_position_rad: f64,
+    /// What is known of its homing.
+    pub homing: HomingState,
     /// When the newest feedback arrived; `None` before the first.
     pub received: Option<Nanos>,
     /// The protocol's status word.
@@ -141,6 +171,7 @@ impl ServoStatus {
         velocity_rad_s: f64::NAN,
         torque_nm: f64::NAN,
         hold_position_rad: f64::NAN,
+        homing: HomingState::None,
         received: None,
         status_word: 0,
         error_code: 0,
@@ -213,6 +244,14 @@ pub trait ServoDriver: Send {
     fn set_zero(&mut self, joint: usize) -> Result<(), ZeroRefused> {
         let _ = joint;
         Err(ZeroRefused::NotOffered)
+    }
+
+    /// Says, before each [`Self::encode`], which joint's servo is to home itself, of all that there are: only while it is
+    /// said the homing goes on. Servos without homing ignore it.
+    ///
+    /// Real time: no allocation.
+    fn set_homing(&mut self, joint: Option<usize>) {
+        let _ = joint;
     }
 
     /// The newest frame by which another master commands these drives, when it came less than half a second ago.

@@ -78,6 +78,7 @@ fn kinds() -> Vec<Kind> {
             about: "`config/settings`: one arm's robot, scene, buses and servos. Keys that affect motion have no default.",
             samples: vec![
                 shipped("config/settings/vcan6.toml", &[]),
+                shipped("config/settings/vcan6.toml", &[("limp_is_safe = true\n\n[[servo]]", HOMING)]),
                 shipped("config/settings/damiao6.toml", &[]),
                 shipped("config/settings/robstride6.toml", &[]),
                 shipped("config/settings/ak6.toml", &[]),
@@ -103,6 +104,10 @@ fn kinds() -> Vec<Kind> {
 /// A section of torques, before `[cycle]`.
 const FEED_FORWARD: &str = "[feed_forward]\ngravity = true\ninertia = true\nshare = 1.0\n[[feed_forward.joint]]\njoint = \"elbow\"\n\
     torque_nm_max = 20.0\nrate_nm_s_max = 50.0\n[cycle]";
+
+/// The homing of the first servo, behind its other keys.
+const HOMING: &str = "limp_is_safe = true\n[servo.homing]\nmethod = 18\nvelocity_unit = \"rpm\"\nswitch_speed_rad_s = 0.1\n\
+    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n\n[[servo]]";
 
 /// The shipped axis in rad.
 const AXIS_IN_RAD: &[(&str, &str)] = &[

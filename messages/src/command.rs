@@ -43,6 +43,11 @@ pub enum Command {
         /// The force that is contact, N or Nm; `None`: the one of the settings.
         force: Option<f64>,
     },
+    /// The drive of a joint finds its zero by itself, moving the joint; the others hold.
+    Home {
+        /// Zero-based joint; axes follow the joints.
+        joint: u32,
+    },
 }
 
 /// A command on the wire.
@@ -145,6 +150,7 @@ impl From<Command> for CommandRequest {
             Command::Axis { axis, goal: AxisGoal::Closed, .. } => (12, axis, 0.0),
             Command::Axis { axis, goal: AxisGoal::At(position), .. } => (13, axis, position),
             Command::Axis { axis, goal: AxisGoal::Stop, .. } => (14, axis, 0.0),
+            Command::Home { joint } => (15, joint, 0.0),
         };
         let force = if let Command::Axis { force, .. } = command { force } else { None };
         Self {
@@ -184,6 +190,7 @@ impl TryFrom<&CommandRequest> for Command {
             13 if r.value.is_finite() => r.axis(AxisGoal::At(r.value))?,
             13 => return Err(CommandError::Axis { what: "position", value: r.value }),
             14 => r.axis(AxisGoal::Stop)?,
+            15 => Self::Home { joint: r.joint },
             got => return Err(CommandError::Unknown { got }),
         })
     }

@@ -36,11 +36,13 @@ pub enum FaultReason {
     ConfigurationRefused = 13,
     /// A drive has no fault, but warns; code = statusword.
     DriveWarning = 14,
+    /// The homing of a joint has failed; code = its error code, object = what is to blame.
+    HomingFailed = 15,
 }
 
 impl FaultReason {
     /// Every reason.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::DriveFault,
         Self::FeedbackLate,
         Self::TrackingError,
@@ -55,6 +57,7 @@ impl FaultReason {
         Self::Operator,
         Self::ConfigurationRefused,
         Self::DriveWarning,
+        Self::HomingFailed,
     ];
     /// The code in messages; 0 means none.
     #[must_use]
@@ -84,6 +87,7 @@ impl FaultReason {
             Self::TorqueOff => "torque switched off by the operator",
             Self::Operator => "fast stop by the operator",
             Self::ConfigurationRefused => "drive refused its configuration",
+            Self::HomingFailed => "homing failed",
         }
     }
 }
@@ -289,7 +293,7 @@ impl Cause {
             FaultReason::DriveFault => {
                 Evidence::DriveError { code: self.code, status_word: self.status_word() }
             }
-            FaultReason::ConfigurationRefused | FaultReason::EnergisedUnowned => {
+            FaultReason::ConfigurationRefused | FaultReason::EnergisedUnowned | FaultReason::HomingFailed => {
                 Evidence::Refusal { code: self.code, object: self.object, numbers: [self.value, self.limit] }
             }
             FaultReason::DriveDropped | FaultReason::DriveWarning => Evidence::Statusword(self.code),

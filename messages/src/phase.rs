@@ -26,15 +26,17 @@ pub enum Phase {
     Braking = 10,
     /// Stopped by a fault. The report says whether the drives are energised and hold.
     Fault = 11,
-    /// The fault is cleared and the drives hold; `enable` makes the arm ready again.
+    /// The drives hold, after a fault was cleared or a joint has homed; `enable` makes the arm ready again.
     Locked = 12,
     /// Drives are being de-energised.
     Disabling = 13,
+    /// The drive of one joint moves it by its own homing; the others hold. Then `Locked`.
+    Homing = 14,
 }
 
 impl Phase {
     /// Every phase.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Configuring,
         Self::Disabled,
         Self::Enabling,
@@ -48,6 +50,7 @@ impl Phase {
         Self::Fault,
         Self::Locked,
         Self::Disabling,
+        Self::Homing,
     ];
 
     /// The code in messages.
@@ -77,6 +80,7 @@ impl Phase {
             Self::Fault => "fault",
             Self::Locked => "locked",
             Self::Disabling => "disabling",
+            Self::Homing => "homing",
         }
     }
 }

@@ -25,11 +25,15 @@ pub enum ReferenceState {
     OutOfRange = 8,
     /// The feedback knows nothing after power-up.
     Incremental = 9,
+    /// Its homing runs, or ended before its end.
+    Homing = 10,
+    /// Its drive has found its home position.
+    Homed = 11,
 }
 
 impl ReferenceState {
     /// Every standing.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::NoFeedback,
         Self::Encoder,
         Self::Record,
@@ -40,6 +44,8 @@ impl ReferenceState {
         Self::RecordFar,
         Self::OutOfRange,
         Self::Incremental,
+        Self::Homing,
+        Self::Homed,
     ];
 
     /// The code in messages.
@@ -55,7 +61,7 @@ impl ReferenceState {
     /// True when the joint's multi-turn offset is known.
     #[must_use]
     pub fn is_referenced(self) -> bool {
-        matches!(self, Self::Encoder | Self::Record | Self::Adoption | Self::Operator)
+        matches!(self, Self::Encoder | Self::Record | Self::Adoption | Self::Operator | Self::Homed)
     }
     /// What is known, for people.
     #[must_use]
@@ -75,6 +81,8 @@ impl ReferenceState {
             }
             Self::OutOfRange => "no multi-turn offset of its feedback lies inside its range",
             Self::Incremental => "its feedback is incremental and has no reference after power-up",
+            Self::Homing => "its homing runs, or has not come to its end",
+            Self::Homed => "homed since its drive was switched on",
         }
     }
 }

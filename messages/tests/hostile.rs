@@ -230,6 +230,7 @@ fn command_survives_the_wire_and_bad_ones_are_named() {
         Command::Axis { axis: 0, goal: AxisGoal::Closed, force: Some(12.5) },
         Command::Axis { axis: 3, goal: AxisGoal::At(-0.25), force: Some(1.0) },
         Command::Axis { axis: 0, goal: AxisGoal::Stop, force: None },
+        Command::Home { joint: 5 },
     ];
     for command in commands {
         assert_eq!(Command::try_from(&CommandRequest::from(command)), Ok(command));

@@ -508,6 +508,7 @@ fn not_ready(phase: Phase) -> String {
         | Phase::Stopping
         | Phase::FastStopping
         | Phase::Braking
+        | Phase::Homing
         | Phase::Disabling => "wait until that has ended and try again",
     };
     format!("the arm is {}; {hint}", phase.word())

@@ -76,6 +76,11 @@ pub enum AnswerReason {
     AxisFeelsNoForce { axis: usize },
     AxisTakesLong { axis: usize, stroke_s: f64 },
     AxisInMotion { axis: usize },
+    Homing { joint: usize },
+    HomingStops,
+    NoHoming { joint: usize },
+    NotHomed { joint: usize },
+    AdoptFirst,
     Wait,
     ShuttingDown,
     TooLate { late_s: f64 },
@@ -128,6 +133,7 @@ impl AnswerReason {
                 "the bus is open again and the state of its drives is being read; when `status` shows disabled, `enable`"
             }
             Self::Already => "the arm is in this state already",
+            Self::HomingStops => "the homing is being stopped; its joint holds then, and is not referenced",
             Self::AxesStop => "the axes beside the path come to rest and hold there",
             Self::NothingMoves => "nothing moves",
             _ => return None,
@@ -181,6 +187,15 @@ impl AnswerReason {
                 (reading_rad - at_rad).abs()
             ),
             Self::NoSuchJoint { joint } => format!("there is no joint {}", joint + 1),
+            Self::Homing { joint } => format!(
+                "{} homes itself; the other joints hold, and what `enable` makes ready is the arm after that",
+                names.joint(joint)
+            ),
+            Self::NoHoming { joint } => names.no_homing(joint),
+            Self::NotHomed { joint } => format!(
+                "{} is not referenced: its homing has not come to its end; `taustream home` it again",
+                names.joint(joint)
+            ),
             Self::Energised { joint, state } => format!(
                 "{} can be referenced only while nothing is energised (its drive is {}); support the arm and `disable` first",
                 names.joint(joint),
@@ -329,6 +344,7 @@ impl AnswerReason {
                 "too little feedback to know that the arm is at rest; try again in a second"
             }
             Self::StopFirst => "the arm moves; `stop` first",
+            Self::AdoptFirst => "the drives hold from before this start; `enable` or `disable` first",
             Self::EnableFirst => "the drives are not energised; `enable` first",
             Self::NothingToResume => "nothing is paused; send a trajectory",
             Self::NoFault => "there is no fault",
@@ -361,6 +377,7 @@ pub fn state_word(state: DriveState) -> &'static str {
         DriveState::Disabled => "de-energised",
         DriveState::Enabling => "being energised",
         DriveState::Enabled => "energised",
+        DriveState::Homing => "homing",
         DriveState::Disabling => "being de-energised",
         DriveState::Fault => "in fault",
         DriveState::Refused => "refused its configuration",

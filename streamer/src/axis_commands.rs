@@ -55,7 +55,7 @@ impl Supervisor {
             Phase::Fault | Phase::FastStopping | Phase::Braking => {
                 return Err(AnswerReason::ClearFirst { cause: self.cause() });
             }
-            Phase::Enabling | Phase::Disabling => return Err(AnswerReason::Wait),
+            Phase::Enabling | Phase::Disabling | Phase::Homing => return Err(AnswerReason::Wait),
             Phase::Configuring | Phase::Disabled | Phase::Locked => return Err(AnswerReason::EnableFirst),
         }
         let joint = self.joints + index;

@@ -111,6 +111,15 @@ impl Buses {
         }
     }
 
+    /// Says which joint's servo is to home itself in the next cycle's frames, of all that there are.
+    ///
+    /// Real time: no allocation.
+    pub fn set_homing(&mut self, joint: Option<usize>) {
+        for bus in &mut self.all {
+            bus.driver.set_homing(joint);
+        }
+    }
+
     /// Hands every bus's frames over, all of them before anything is read.
     ///
     /// Real time: one system call a bus, one more while own frames are overdue; never waits.

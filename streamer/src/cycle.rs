@@ -168,6 +168,7 @@ impl Core {
             self.ledger.set_pose(pose_rad, tick.number);
             self.axes.set_pose(pose_rad, tick.number);
             self.track.restart();
+            self.guard.permit_anew();
         }
         self.axes.apply(&actions.axes);
         if actions.clear_faults {
@@ -221,6 +222,7 @@ pub fn run_cycle<P: Probe>(core: &mut Core, tick: Tick, probe: &mut P) -> Next {
     probe.ended(Stage::FeedForward);
 
     let drive_commands = core.supervisor.referencing().to_drives(command.joints());
+    core.buses.set_homing(core.supervisor.homing_joint());
     core.buses.encode(tick.wake_time, drive_target, &drive_commands);
     probe.ended(Stage::Encode);
     core.buses.send(&mut cycle_state);

@@ -191,6 +191,13 @@ impl Guard {
         self.brake = None;
     }
 
+    /// The commanded pose was set from outside: each joint is permitted from there as when it was energised.
+    ///
+    /// Real time: stores a flag.
+    pub fn permit_anew(&mut self) {
+        self.released = true;
+    }
+
     /// What each joint is permitted: up to where it was energised, or where a brake has left it, outside its range; from
     /// there on no further outside than it was commanded last.
     fn permit(&mut self, requested: &RequestedSetpoint, past: &[LastSent; MAX_JOINTS]) {

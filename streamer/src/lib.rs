@@ -25,6 +25,7 @@ pub mod ending;
 pub mod feed_forward;
 pub mod guard;
 mod health;
+mod homing;
 pub mod intake;
 pub mod last_sent;
 pub mod log;

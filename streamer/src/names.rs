@@ -138,6 +138,23 @@ impl Names {
         explain_status(self.servos.get(joint).map(|servo| servo.protocol), word)
     }
 
+    /// Why a joint cannot home itself, and what references it instead.
+    #[must_use]
+    pub fn no_homing(&self, joint: usize) -> String {
+        let name = self.joint(joint);
+        match self.servos.get(joint).map(|servo| servo.protocol) {
+            Some("cia402") => format!(
+                "{name} has no [servo.homing] in its settings; state how its drive homes, or use `taustream reference`"
+            ),
+            Some(protocol) => {
+                format!(
+                    "{name}: motors of this protocol ({protocol}) have no homing; use `taustream reference`"
+                )
+            }
+            None => format!("there is no {name}"),
+        }
+    }
+
     /// The name behind a slot: of a joint, or of an axis behind the joints.
     fn slot_name(&self, slot: usize) -> Option<&str> {
         let axis = || self.axes.get(slot.checked_sub(self.joints.len())?).map(|axis| axis.name.as_str());

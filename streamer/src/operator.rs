@@ -8,7 +8,7 @@ use crate::phases::Event;
 use crate::supervise::{Actions, Supervisor, is_energised};
 use crate::watch::REST_RAD_S;
 use taustream_drivers::{DriveState, ServoStatus};
-use taustream_messages::{AxisGoal, Command, FaultReason, Phase};
+use taustream_messages::{AxisGoal, Command, FaultReason, Phase, ReferenceState};
 use taustream_motion::stopping::SpeedRequest;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -46,7 +46,7 @@ impl Supervisor {
             None => {}
         }
         let result = match pending.command {
-            Command::Enable | Command::Resume | Command::Axis { .. }
+            Command::Enable | Command::Resume | Command::Axis { .. } | Command::Home { .. }
                 if self.shutting_down != Shutdown::No =>
             {
                 Err(AnswerReason::ShuttingDown)
@@ -64,6 +64,7 @@ impl Supervisor {
             Command::Speed { percent } => self.set_speed(percent, cycle_state, actions),
             Command::ClearFault => self.clear_fault(cycle_state, actions),
             Command::Reference { joint, at_rad } => self.reference(joint, at_rad, cycle_state),
+            Command::Home { joint } => self.home(joint, cycle_state, actions),
             Command::Axis { axis, goal, force } => self.axis((axis, goal, force), cycle_state, actions),
         };
         let (accepted, why) = match result {
@@ -106,6 +107,7 @@ impl Supervisor {
                 Ok(AnswerReason::TakingOver)
             }
             Phase::Locked => {
+                self.all_referenced(cycle_state)?;
                 self.step(Event::EnableRequested, cycle_state, actions);
                 Ok(AnswerReason::Unlocked)
             }
@@ -134,7 +136,7 @@ impl Supervisor {
             Phase::Fault | Phase::FastStopping | Phase::Braking => {
                 Err(AnswerReason::ClearFirst { cause: self.cause() })
             }
-            Phase::Disabling => Err(AnswerReason::Wait),
+            Phase::Disabling | Phase::Homing => Err(AnswerReason::Wait),
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -156,11 +158,7 @@ impl Supervisor {
             if servo.warning {
                 return Err(AnswerReason::Warns { joint, status_word: servo.status_word });
             }
-            let resolved = self.referencing.resolved(joint);
-            if !resolved.reference_state.is_referenced() {
-                let (reference_state, by_rad) = (resolved.reference_state, resolved.by_rad);
-                return Err(AnswerReason::NotReferenced { joint, reference_state, by_rad });
-            }
+            self.check_referenced(joint)?;
             let holds = servo.state == DriveState::Adopted;
             let position_rad = if holds { servo.hold_position_rad } else { servo.position_rad };
             let (error_rad, limit_rad) =
@@ -175,6 +173,23 @@ impl Supervisor {
             return Err(AnswerReason::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
         }
         Ok(pose_rad)
+    }
+
+    fn check_referenced(&self, joint: usize) -> Result<(), AnswerReason> {
+        let resolved = self.referencing.resolved(joint);
+        let (reference_state, by_rad) = (resolved.reference_state, resolved.by_rad);
+        if reference_state.is_referenced() {
+            Ok(())
+        } else if reference_state == ReferenceState::Homing {
+            Err(AnswerReason::NotHomed { joint })
+        } else {
+            Err(AnswerReason::NotReferenced { joint, reference_state, by_rad })
+        }
+    }
+
+    /// After a homing drives hold, of which some may not be referenced yet.
+    fn all_referenced(&self, cycle_state: &CycleState) -> Result<(), AnswerReason> {
+        self.servos(cycle_state).try_for_each(|(joint, _)| self.check_referenced(joint))
     }
 
     fn disable(
@@ -203,9 +218,12 @@ impl Supervisor {
                 self.step(Event::DisableRequested, cycle_state, actions);
                 Ok(AnswerReason::Disabling)
             }
-            Phase::Moving | Phase::Pausing | Phase::Stopping | Phase::FastStopping | Phase::Braking => {
-                Err(AnswerReason::StopFirst)
-            }
+            Phase::Moving
+            | Phase::Pausing
+            | Phase::Stopping
+            | Phase::FastStopping
+            | Phase::Braking
+            | Phase::Homing => Err(AnswerReason::StopFirst),
         }
     }
 
@@ -215,7 +233,9 @@ impl Supervisor {
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
         actions.axes.stop_all = true;
-        if self.step(Event::PauseRequested, cycle_state, actions) {
+        if self.stop_homing(cycle_state) {
+            Ok(AnswerReason::HomingStops)
+        } else if self.step(Event::PauseRequested, cycle_state, actions) {
             Ok(AnswerReason::Pausing)
         } else if self.moving_axis(cycle_state).is_some() {
             Ok(AnswerReason::AxesStop)
@@ -253,7 +273,9 @@ impl Supervisor {
         actions: &mut Actions,
     ) -> Result<AnswerReason, AnswerReason> {
         actions.axes.stop_all = true;
-        if self.step(Event::StopRequested, cycle_state, actions) {
+        if self.stop_homing(cycle_state) {
+            Ok(AnswerReason::HomingStops)
+        } else if self.step(Event::StopRequested, cycle_state, actions) {
             Ok(AnswerReason::Stopping)
         } else if self.phase == Phase::Holding && self.moving_axis(cycle_state).is_some() {
             Ok(AnswerReason::AxesStop)
@@ -278,6 +300,7 @@ impl Supervisor {
             | Phase::Pausing
             | Phase::Paused
             | Phase::Stopping
+            | Phase::Homing
             | Phase::Locked => {
                 self.raise(Event::StopFault, Cause::new(FaultReason::Operator), cycle_state, actions);
                 Ok(AnswerReason::FastStopping)
@@ -368,6 +391,10 @@ impl Supervisor {
             if kept {
                 continue;
             }
+            if servo.state == DriveState::Homing {
+                // On its way back to following.
+                return Err(AnswerReason::Wait);
+            }
             if servo.state != DriveState::Enabled {
                 return Err(AnswerReason::PartlyEnergised { joint, state: servo.state });
             }
@@ -435,6 +462,7 @@ fn stops_the_arm(command: Command) -> bool {
         | Command::TorqueOff
         | Command::Speed { .. }
         | Command::ClearFault
+        | Command::Home { .. }
         | Command::Reference { .. } => false,
         // A request to stop stops the axis, however late.
         Command::Axis { goal, .. } => goal == AxisGoal::Stop,

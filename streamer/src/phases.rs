@@ -47,11 +47,15 @@ pub enum Event {
     DisableRequested,
     /// Every drive is de-energised.
     DrivesDisabled,
+    /// The operator asked a joint to home itself.
+    HomeRequested,
+    /// Its homing is over, and its drive follows commands again.
+    HomingEnded,
 }
 
 impl Event {
     /// Every event.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::DrivesReady,
         Self::DrivesLost,
         Self::HoldAdopted,
@@ -72,6 +76,8 @@ impl Event {
         Self::ClearedOff,
         Self::DisableRequested,
         Self::DrivesDisabled,
+        Self::HomeRequested,
+        Self::HomingEnded,
     ];
 
     /// The words that logs show.
@@ -98,6 +104,8 @@ impl Event {
             Self::ClearedOff => "fault cleared, drives off",
             Self::DisableRequested => "disable requested",
             Self::DrivesDisabled => "drives de-energised",
+            Self::HomeRequested => "homing requested",
+            Self::HomingEnded => "homing has ended",
         }
     }
 }
@@ -132,12 +140,15 @@ pub fn next(phase: Phase, event: Event) -> Option<Phase> {
         (P::Moving | P::Pausing | P::Stopping, E::StopFault) => P::FastStopping,
         (P::Moving | P::Pausing | P::Stopping | P::FastStopping, E::GuardTrip) => P::Braking,
         // At rest, or not yet energised, there is nothing to slow down.
-        (P::Holding | P::Paused | P::Locked | P::Enabling, E::StopFault)
+        (P::Holding | P::Paused | P::Locked | P::Enabling | P::Homing, E::StopFault)
         | (P::FastStopping, E::AtRest | E::EndReached)
         | (P::Braking, E::AtRest) => P::Fault,
 
-        (P::Fault, E::ClearedHolding) | (P::Configuring | P::Disabled, E::HoldAdopted) => P::Locked,
-        (P::Holding | P::Paused | P::Locked | P::Enabling, E::DisableRequested) => P::Disabling,
+        (P::Disabled | P::Holding | P::Locked, E::HomeRequested) => P::Homing,
+        (P::Fault, E::ClearedHolding)
+        | (P::Configuring | P::Disabled, E::HoldAdopted)
+        | (P::Homing, E::HomingEnded) => P::Locked,
+        (P::Holding | P::Paused | P::Locked | P::Enabling | P::Homing, E::DisableRequested) => P::Disabling,
         _ => return None,
     })
 }
@@ -149,9 +160,9 @@ mod tests {
     /// The table as the documentation draws it, one line a phase, written independently of the match above.
     const TABLE: &str = "
         configuring: DrivesReady>disabled HoldAdopted>locked HardFault>fault
-        disabled: DrivesLost>configuring HoldAdopted>locked EnableRequested>enabling HardFault>fault
+        disabled: DrivesLost>configuring HoldAdopted>locked EnableRequested>enabling HomeRequested>homing HardFault>fault
         enabling: DrivesEnabled>holding DisableRequested>disabling StopFault>fault HardFault>fault
-        holding: Accepted>moving DisableRequested>disabling StopFault>fault HardFault>fault
+        holding: Accepted>moving DisableRequested>disabling HomeRequested>homing StopFault>fault HardFault>fault
         moving: EndReached>holding PauseRequested>pausing StopRequested>stopping StalledLong>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
         pausing: EndReached>holding ResumeRequested>moving StopRequested>stopping AtRest>paused StopFault>fast-stopping GuardTrip>braking HardFault>fault
         paused: ResumeRequested>moving StopRequested>holding DisableRequested>disabling StopFault>fault HardFault>fault
@@ -159,8 +170,9 @@ mod tests {
         fast-stopping: EndReached>fault AtRest>fault GuardTrip>braking HardFault>fault
         braking: AtRest>fault HardFault>fault
         fault: ClearedHolding>locked ClearedOff>disabled
-        locked: EnableRequested>holding AdoptRequested>enabling DisableRequested>disabling StopFault>fault HardFault>fault
-        disabling: DrivesDisabled>disabled HardFault>fault";
+        locked: EnableRequested>holding AdoptRequested>enabling DisableRequested>disabling HomeRequested>homing StopFault>fault HardFault>fault
+        disabling: DrivesDisabled>disabled HardFault>fault
+        homing: HomingEnded>locked DisableRequested>disabling StopFault>fault HardFault>fault";
 
     fn drawn(phase: Phase, event: Event) -> Option<&'static str> {
         let row = TABLE.lines().find_map(|l| l.trim().strip_prefix(&format!("{}: ", phase.word()))).unwrap();

@@ -372,13 +372,17 @@ fn received(report: &Report, joint: usize, age_s_max: f64) -> Option<JointNow> {
 /// A joint's offset is known from a record or the operator, and would be lost without one.
 fn needs_record(report: &Report) -> bool {
     let needs = |code: &u32| match ReferenceState::from_code(*code) {
-        ReferenceState::Record | ReferenceState::Adoption | ReferenceState::Operator => true,
+        ReferenceState::Record
+        | ReferenceState::Adoption
+        | ReferenceState::Operator
+        | ReferenceState::Homed => true,
         ReferenceState::NoFeedback
         | ReferenceState::Encoder
         | ReferenceState::NoRecord
         | ReferenceState::RecordMoving
         | ReferenceState::RecordFar
         | ReferenceState::OutOfRange
+        | ReferenceState::Homing
         | ReferenceState::Incremental => false,
     };
     report.reference_state.iter().take(report.slots()).any(needs)

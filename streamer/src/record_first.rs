@@ -8,7 +8,7 @@ use crate::intake::Shutdown;
 use crate::supervise::{Actions, Supervisor};
 use crate::write_ahead::{JointNow, Requester};
 use taustream_drivers::Nanos;
-use taustream_messages::{Command, Phase};
+use taustream_messages::{Command, Phase, ReferenceState};
 
 /// How long the disk may take, s.
 const RECORD_S_MAX: f64 = 1.0;
@@ -60,7 +60,7 @@ impl Supervisor {
             Command::Enable => {
                 matches!(self.phase, Phase::Disabled) || self.adopted && self.phase == Phase::Locked
             }
-            Command::Reference { .. } => true,
+            Command::Reference { .. } | Command::Home { .. } => true,
             Command::Disable
             | Command::Pause
             | Command::Resume
@@ -77,8 +77,11 @@ impl Supervisor {
         if self.records.waiting.is_some() {
             return Some(Err(AnswerReason::Wait));
         }
+        let mut homing = None;
         let checked = if let Command::Reference { joint, at_rad } = pending.command {
             self.check_reference(joint, at_rad, cycle_state).map(|_| ())
+        } else if let Command::Home { joint } = pending.command {
+            self.check_homing(joint, cycle_state).map(|(joint, _)| homing = Some(joint))
         } else {
             self.trusted_pose(cycle_state).map(|_| ())
         };
@@ -88,7 +91,10 @@ impl Supervisor {
         let mut joints = [JointNow::UNKNOWN; _];
         for (joint, servo) in self.servos(cycle_state) {
             let resolved = self.referencing.resolved(joint);
-            let (offset_rad, reference_state) = (resolved.offset_rad, resolved.reference_state);
+            // A joint that homes is not referenced by what was known before, whatever becomes of it.
+            let homes = homing == Some(joint);
+            let reference_state = if homes { ReferenceState::Homing } else { resolved.reference_state };
+            let offset_rad = resolved.offset_rad;
             if let Some(slot) = joints.get_mut(joint) {
                 *slot = JointNow { position_rad: servo.position_rad, offset_rad, reference_state };
             }
@@ -142,6 +148,8 @@ impl Supervisor {
             Some(Ok(())) => {
                 if let Command::Reference { joint, at_rad } = pending.command {
                     self.reference(joint, at_rad, cycle_state)
+                } else if let Command::Home { joint } = pending.command {
+                    self.home(joint, cycle_state, actions)
                 } else {
                     self.enable(cycle_state, actions)
                 }
@@ -171,6 +179,7 @@ impl Supervisor {
             | Phase::FastStopping
             | Phase::Braking
             | Phase::Locked
+            | Phase::Homing
             | Phase::Disabling => false,
         };
         let records = &self.records;

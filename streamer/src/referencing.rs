@@ -250,6 +250,30 @@ impl Referencing {
         Ok((reading_rad + offset_rad, offset_rad))
     }
 
+    /// The homing of a joint begins: its position means nothing any more. Gives back what was added to its reading.
+    ///
+    /// Real time: arithmetic only.
+    pub fn begin_homing(&mut self, joint: usize) -> f64 {
+        self.set_state(joint, ReferenceState::Homing)
+    }
+
+    /// The drive of a joint has found its home position, and counts from there.
+    ///
+    /// Real time: arithmetic only.
+    pub fn end_homing(&mut self, joint: usize) {
+        if self.resolved(joint).reference_state == ReferenceState::Homing {
+            self.set_state(joint, ReferenceState::Homed);
+        }
+    }
+
+    fn set_state(&mut self, joint: usize, reference_state: ReferenceState) -> f64 {
+        let Some(entry) = self.entries.get_mut(joint).and_then(Option::as_mut) else { return 0.0 };
+        let offset_rad = entry.resolved.offset_rad;
+        entry.resolved = Resolved { offset_rad: 0.0, reference_state, by_rad: 0.0 };
+        (entry.recorded, entry.anchor) = (None, (f64::NAN, Nanos(0)));
+        offset_rad
+    }
+
     /// Takes the operator's word. Gives back where the joint then is.
     ///
     /// Real time: arithmetic only.

@@ -6,6 +6,7 @@
 use crate::answer::{AnswerReason, CommandAnswer};
 use crate::axes::AxisRequests;
 use crate::cycle_state::{Braking, Cause, CycleState, Decision, TRANSITIONS_MAX, Transition};
+use crate::homing::{HomingRun, homing_joints};
 use crate::intake::{Answers, Shutdown};
 use crate::phases::{self, Event};
 use crate::record_first::{LEAVE_RECORD_S_MAX, Records};
@@ -14,7 +15,7 @@ use crate::stall::Stalls;
 use crate::watch::Watch;
 use taustream_arm::settings::Supervision;
 use taustream_arm::{Axis, Settings};
-use taustream_drivers::{DriveState, DriveTarget, Nanos, ServoStatus};
+use taustream_drivers::{DriveState, DriveTarget, JointSet, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Pause, PauseReason, Phase};
 use taustream_motion::stopping::{SpeedRequest, StopRules};
 use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
@@ -67,6 +68,10 @@ pub struct Supervisor {
     /// Drives are kept that were found holding at start.
     pub(crate) adopted: bool,
     pub(crate) referencing: Referencing,
+    /// Joints whose drives are set up to home themselves.
+    pub(crate) homing_joints: JointSet,
+    /// In the phase of homing: what was asked for.
+    pub(crate) homing: Option<HomingRun>,
     pub(crate) torque_off: bool,
     pub(crate) speed: f64,
     /// The commanded pose, or the start of the motion that runs, is outside the position limits.
@@ -107,6 +112,8 @@ impl Supervisor {
             holds: false,
             adopted: false,
             referencing: Referencing::new(settings),
+            homing_joints: homing_joints(settings),
+            homing: None,
             torque_off: false,
             speed_chosen: false,
             begins_slowly: settings.servos.iter().any(|servo| servo.limp_risk_acknowledged),
@@ -190,6 +197,7 @@ impl Supervisor {
             | Phase::Stopping
             | Phase::FastStopping
             | Phase::Braking
+            | Phase::Homing
             | Phase::Fault
             | Phase::Locked => DriveTarget::Enabled,
         }
@@ -218,6 +226,7 @@ impl Supervisor {
         }
         self.evaluate_shutdown(shutdown, cycle_state, &mut actions);
         self.release_record(cycle_state);
+        self.follow_homing(cycle_state, &mut actions);
         self.follow_measured(cycle_state, &mut actions);
         actions
     }
@@ -260,6 +269,9 @@ impl Supervisor {
         } else if to != Phase::Paused {
             self.paused_by = None;
         }
+        if to != Phase::Homing {
+            self.homing = None;
+        }
         // Drives that follow commands, or are de-energised, are no longer kept.
         self.adopted &= !matches!(to, Phase::Holding | Phase::Disabling | Phase::Disabled);
         match to {
@@ -279,6 +291,7 @@ impl Supervisor {
             | Phase::Enabling
             | Phase::Moving
             | Phase::Paused
+            | Phase::Homing
             | Phase::Braking => {}
         }
         true
@@ -294,7 +307,9 @@ impl Supervisor {
         let cause = self.stalls.blame(cause, cycle_state);
         // Drives that were on their way to energised go back; drives that carry the arm hold.
         let requested = matches!(self.drive_target(), DriveTarget::Enabled | DriveTarget::Keep);
-        let holds = requested && (self.phase != Phase::Enabling || self.adopted);
+        let rising = self.phase == Phase::Enabling
+            || (self.phase == Phase::Homing && self.homing.is_some_and(|run| !run.energised));
+        let holds = requested && (!rising || self.adopted);
         let before = self.cause.replace(cause);
         if phases::next(self.phase, event).is_none() {
             self.cause = before;
@@ -368,6 +383,7 @@ impl Supervisor {
             }
             Phase::Fault => self.evaluate_fault(cycle_state, actions),
             Phase::Locked if self.adopted => self.evaluate_adopted(cycle_state, actions),
+            Phase::Homing => self.evaluate_homing(cycle_state, actions),
             Phase::Enabling
             | Phase::Holding
             | Phase::Moving
@@ -402,6 +418,7 @@ impl Supervisor {
                 | DriveState::Adopted
                 | DriveState::Enabling
                 | DriveState::Enabled
+                | DriveState::Homing
                 | DriveState::Disabling => return None,
             };
             let [stated, expected] = servo.refused_numbers;
@@ -443,6 +460,7 @@ impl Supervisor {
             | DriveState::EnergisedUnowned
             | DriveState::Enabling
             | DriveState::Enabled
+            | DriveState::Homing
             | DriveState::Disabling
             | DriveState::Fault
             | DriveState::Refused => self.watch.drive_cause(cycle_state, joint),
@@ -538,6 +556,9 @@ impl Supervisor {
                         self.step(Event::DisableRequested, cycle_state, actions);
                     }
                     Phase::Fault => (self.holds, self.adopted) = (false, false),
+                    Phase::Homing => {
+                        self.stop_homing(cycle_state);
+                    }
                     Phase::Configuring
                     | Phase::Disabled
                     | Phase::Stopping
@@ -612,6 +633,7 @@ pub(crate) fn is_energised(state: DriveState) -> bool {
         state,
         DriveState::Enabled
             | DriveState::Enabling
+            | DriveState::Homing
             | DriveState::Disabling
             | DriveState::Adopted
             | DriveState::EnergisedUnowned

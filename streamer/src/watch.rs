@@ -7,7 +7,7 @@
 use crate::cycle_state::{BUSES_MAX, BusState, Cause, CycleState, LostSetpoints};
 use taustream_arm::Settings;
 use taustream_arm::settings::{SETPOINT_EVERY_MAX, Supervision};
-use taustream_drivers::{DriveState, Nanos};
+use taustream_drivers::{DriveState, Nanos, ServoStatus};
 use taustream_messages::{BusFault, FaultReason};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -158,8 +158,21 @@ impl Watch {
     /// Real time: no allocation.
     #[must_use]
     pub fn find_cause(&self, cycle_state: &CycleState, enabling: bool) -> Option<Cause> {
+        self.find_cause_beside(cycle_state, enabling, None)
+    }
+
+    /// The same, of every joint but one.
+    ///
+    /// Real time: no allocation.
+    #[must_use]
+    pub(crate) fn find_cause_beside(
+        &self,
+        cycle_state: &CycleState,
+        enabling: bool,
+        beside: Option<usize>,
+    ) -> Option<Cause> {
         self.bus_cause(cycle_state).or_else(|| {
-            (0..self.joints).find_map(|joint| {
+            (0..self.joints).filter(|joint| Some(*joint) != beside).find_map(|joint| {
                 let cause =
                     drive_cause(cycle_state, joint, enabling).or_else(|| self.feedback_cause(joint))?;
                 Some(self.blame_receive_path(cycle_state, cause))
@@ -255,6 +268,33 @@ impl Watch {
     pub(crate) fn late_cause(&self, cycle_state: &CycleState, joint: usize) -> Option<Cause> {
         let cause = self.feedback_cause(joint).filter(|cause| cause.reason != FaultReason::TrackingError)?;
         Some(self.blame_receive_path(cycle_state, cause))
+    }
+
+    /// What stops a drive that homes itself: its own state, or that it sends no feedback. Its position may jump where it
+    /// finds its zero, and follows no command.
+    #[must_use]
+    pub(crate) fn homing_cause(
+        &self,
+        cycle_state: &CycleState,
+        joint: usize,
+        enabling: bool,
+    ) -> Option<Cause> {
+        let homes = cycle_state.servos.get(joint).is_some_and(|servo| servo.state == DriveState::Homing);
+        let warns = |servo: &ServoStatus| {
+            let warning = Cause::new(FaultReason::DriveWarning).at_joint(joint).code(servo.status_word);
+            servo.warning.then_some(warning)
+        };
+        let state = if homes {
+            cycle_state.servos.get(joint).and_then(warns)
+        } else {
+            drive_cause(cycle_state, joint, enabling)
+        };
+        let late = || {
+            let (age_s, limit_s) = (self.no_feedback_s(joint), self.rules.feedback_age_s_max);
+            let cause = Cause::new(FaultReason::FeedbackLate).at_joint(joint).amount(age_s, limit_s);
+            (age_s.is_nan() || age_s > limit_s).then(|| self.blame_receive_path(cycle_state, cause))
+        };
+        state.or_else(late)
     }
 
     /// Why a drive is not where it should be.
@@ -358,6 +398,7 @@ fn drive_cause(cycle_state: &CycleState, joint: usize, enabling: bool) -> Option
         | DriveState::Configuring
         | DriveState::EnergisedUnowned
         | DriveState::Adopted
+        | DriveState::Homing
         | DriveState::Disabling
         | DriveState::Refused => Some(dropped),
     }

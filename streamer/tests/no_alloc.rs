@@ -52,6 +52,25 @@ fn cycle_with_damiao_motors_never_allocates() {
     assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
 }
 
+/// A joint that homes itself, is stopped in it, and homes again.
+#[test]
+fn cycle_with_a_joint_that_homes_itself_never_allocates() {
+    let multi_turn = |text: &str| text.replace("\"incremental\"\n", "\"multi-turn\"\n");
+    let mut arm = counted("no-alloc-homing", shipped("vcan6-homing.toml", multi_turn));
+    live_through(&mut arm, 5_000);
+    arm.ask(Command::Home { joint: 5 });
+    arm.run(1_500);
+    assert_eq!(arm.phase(), Phase::Homing);
+    arm.ask(Command::Stop);
+    arm.run_until(Phase::Locked, 3_000);
+    arm.ask(Command::Home { joint: 5 });
+    arm.run_until(Phase::Locked, 20_000);
+    arm.ask(Command::Enable);
+    arm.run(100);
+    assert_eq!(arm.phase(), Phase::Holding);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
 /// A gripper that opens, closes on an object, is led elsewhere in motion and is stopped, beside all that happens to the arm.
 #[test]
 fn cycle_with_a_gripper_never_allocates() {

@@ -21,6 +21,7 @@ pub mod debian;
 pub mod demo_file;
 pub mod disturbed_scenarios;
 pub mod documents;
+pub mod homing_scenarios;
 pub mod machine;
 pub mod mit_setpoints;
 pub mod motor_commands;

@@ -5,10 +5,11 @@ use crate::bus_load::flow::{Cia402Bus, Flow};
 use crate::bus_load::frame::Format;
 use crate::drive_features::{self, DriveFeatures, OptionalObject};
 use crate::drive_scale::{self, Overruled, ScaleObject};
+use crate::homing::{self, HomingSettings};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::RobotJoint;
 use crate::settings::{Bus, Servo, Settings};
-use crate::trust::Reaction;
+use crate::trust::{Feedback, Reaction};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -26,6 +27,8 @@ pub struct Cia402 {
     pub overruled: Overruled,
     /// What the drive lacks or does in its own time.
     pub features: DriveFeatures,
+    /// How it finds its zero by itself; `None`: it is not asked to.
+    pub homing: Option<HomingSettings>,
 }
 
 pub(super) const REGISTRATION: Registration = Registration {
@@ -44,6 +47,7 @@ pub(super) const REGISTRATION: Registration = Registration {
         "following_window_rad",
         "following_timeout_ms",
         "write_soft_limits",
+        "homing",
     ],
     // 127 is refused later, because it is this master.
     node_id: [1, 127],
@@ -83,12 +87,14 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
     let home_offset = table.integer_or("home_offset_counts", 0, low, high);
     let overruled = drive_scale::read_overruled(table);
     let features = drive_features::read(table);
+    let homing = homing::read(table);
     Some(Cia402 {
         gear_ratio: gear_ratio?,
         counts_per_rev: counts_per_rev?,
         home_offset_counts: i32::try_from(home_offset?).ok()?,
         overruled: overruled?,
         features: features?,
+        homing: homing?,
     })
 }
 
@@ -131,10 +137,28 @@ impl ServoProtocol for Cia402 {
                 return;
             }
         }
+        let most_rad_s = joint.limits.motion.velocity_rad_s;
+        let speeds = self
+            .homing
+            .filter(HomingSettings::moves)
+            .map_or([0.0; 2], |homing| [homing.switch_speed_rad_s, homing.zero_speed_rad_s]);
+        for (speed_rad_s, key) in speeds.into_iter().zip(["switch_speed_rad_s", "zero_speed_rad_s"]) {
+            if speed_rad_s > most_rad_s {
+                let expected =
+                    format!("at most {most_rad_s} rad/s, the motion limit of joint {}", joint.name);
+                table.fault(&format!("homing.{key}"), &format!("{speed_rad_s:?}"), &expected);
+            }
+        }
     }
 
     /// Times and traffic are those of the whole arm, which are checked for all of it.
-    fn check_settings(&self, _: &FaultList, _: usize, _: &Servo, _: &Settings) {}
+    fn check_settings(&self, fault_list: &FaultList, at: usize, servo: &Servo, _: &Settings) {
+        if self.homing.is_some() && servo.feedback == Feedback::Wraps {
+            let expected = "feedback = \"incremental\" or \"multi-turn\": homing resolves no offset of feedback that wraps; \
+                            `taustream reference` does";
+            fault_list.add(None, &format!("servo[{at}].homing"), "feedback = \"wraps\"", expected);
+        }
+    }
 
     fn flows(&self, servos: &[Protocol], bus: &Bus, cycle_hz: f64, format: Format) -> Vec<Flow> {
         let cia402 = Cia402Bus {
@@ -168,6 +192,7 @@ impl ServoProtocol for Cia402 {
             ("following_window_rad", self.features.limits.following_window_rad.into()),
             ("following_timeout_ms", self.features.limits.following_timeout_ms.into()),
             ("write_soft_limits", self.features.limits.soft_limits.into()),
+            ("homing", self.homing.map_or(Value::Null, |homing| homing.entries())),
         ]
     }
 
@@ -181,6 +206,9 @@ impl ServoProtocol for Cia402 {
         }
         for sentence in self.features.sentences() {
             let _ = write!(text, ", {sentence}");
+        }
+        if let Some(homing) = &self.homing {
+            let _ = write!(text, ", {}", homing.sentence());
         }
         text
     }

@@ -65,6 +65,30 @@ pub(crate) struct ReferenceArgs {
     pub(crate) confirm: bool,
 }
 
+const HOME_HELP: &str = "\
+Examples:
+  taustream home elbow                    the drive of the elbow homes itself; wait until it has
+  taustream home 3 && taustream enable    joint 3, then make the arm ready
+  taustream stop                          ends a homing: the drive is halted, and its joint holds, not referenced
+
+For CiA 402 drives whose [[servo]] has a table [servo.homing] (docs/homing.md). The drive moves the joint to its switch or
+index pulse by its own method and speed. NOTHING PLANS OR CHECKS THAT MOTION: see first that its path is free. It begins only
+while the arm is disabled, holding or locked, and at rest; drives that are off are energised, and the other joints hold. No
+motion is accepted meanwhile. Afterwards the joint is referenced, the arm holds, and `enable` makes it ready: look at its pose
+first. Joints are homed one at a time. Exit code 0 means: homed, and holding.";
+
+/// `taustream home`
+#[derive(Args, Debug)]
+#[command(after_help = HOME_HELP)]
+pub(crate) struct HomeArgs {
+    /// Joint or axis, by its name or its number from 1; axes follow the joints.
+    #[arg(value_name = "JOINT")]
+    pub(crate) joint: String,
+    /// Wait up to this long for the end, s; without it, the settings' timeout and 15 s; 0 returns when the streamer has accepted.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = waiting_s)]
+    pub(crate) wait_s: Option<f64>,
+}
+
 /// An angle: a finite number of rad, or one with its unit.
 fn angle_rad(text: &str) -> Result<f64, String> {
     crate::angles::angle_rad(text.trim(), 1.0)

@@ -18,8 +18,8 @@ pub(crate) use axis::{AxisAction, AxisArgs};
 pub(crate) use goal::Goal;
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
-    CancelArgs, CommandArgs, DemoArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs, StopArgs,
-    WatchArgs,
+    CancelArgs, CommandArgs, DemoArgs, HomeArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs,
+    StopArgs, WatchArgs,
 };
 pub(crate) use offline::{
     BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
@@ -226,6 +226,8 @@ pub(crate) enum Action {
     Axis(AxisArgs),
     /// Show or set joint references.
     Reference(ReferenceArgs),
+    /// Let the drive of a joint find its zero by itself. THE JOINT MOVES, unchecked for collisions.
+    Home(HomeArgs),
     /// Show the state of the arm: phase, joints, timing, buses.
     Status,
     /// Show the state of the arm, live; this does not affect the arm.

@@ -47,6 +47,7 @@ pub(crate) fn word(command: Command) -> &'static str {
         Command::Speed { .. } => "speed",
         Command::ClearFault => "clear-fault",
         Command::Reference { .. } => "reference",
+        Command::Home { .. } => "home",
         Command::Axis { .. } => "axis",
     }
 }
@@ -69,6 +70,7 @@ fn is_reached(command: Command, arm: Arm) -> bool {
         Command::Disable => de_energised || (phase == Phase::Fault && !arm.energised),
         // The motion may end by itself before the pause has slowed it down.
         Command::Pause => matches!(phase, Phase::Paused | Phase::Holding),
+        Command::Home { .. } => phase == Phase::Locked,
         // An arm that rests is stopped, whatever else is the matter with it.
         Command::Stop => de_energised || matches!(phase, Phase::Holding | Phase::Locked | Phase::Fault),
         Command::FastStop => de_energised || phase == Phase::Fault,
@@ -93,6 +95,7 @@ fn is_so_already(command: Command, phase: Phase) -> bool {
         | Command::TorqueOff
         | Command::Speed { .. }
         | Command::Reference { .. }
+        | Command::Home { .. }
         | Command::Axis { .. }
         | Command::ClearFault => false,
     }
@@ -101,7 +104,7 @@ fn is_so_already(command: Command, phase: Phase) -> bool {
 /// Whether a phase says that a command will not get where it leads to.
 fn is_lost(command: Command, phase: Phase) -> bool {
     match command {
-        Command::Enable | Command::Pause => {
+        Command::Enable | Command::Pause | Command::Home { .. } => {
             matches!(phase, Phase::Fault | Phase::Braking | Phase::FastStopping)
         }
         // In a fault that holds, it is under way.

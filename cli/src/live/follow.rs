@@ -148,7 +148,7 @@ impl Watch {
                 self.first_ns.get_or_insert(r.time_ns);
                 return Ok(None);
             }
-            Phase::Configuring | Phase::Disabled | Phase::Enabling | Phase::Disabling => {
+            Phase::Configuring | Phase::Disabled | Phase::Enabling | Phase::Homing | Phase::Disabling => {
                 return Err(stopped("dropped", &format!("the arm is {}", phase.word())));
             }
         }

@@ -4,6 +4,7 @@ pub(crate) mod cancel;
 pub(crate) mod client;
 pub(crate) mod command;
 pub(crate) mod follow;
+pub(crate) mod home;
 pub(crate) mod jog;
 mod jog_keys;
 mod jog_path;

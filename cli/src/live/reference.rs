@@ -81,7 +81,7 @@ pub(crate) fn run(form: Form, given: Option<&Path>, args: &ReferenceArgs) -> Res
 }
 
 /// A joint or an axis by its name, or by its number from 1; axes follow the joints.
-fn joint_of(settings: &Settings, word: &str) -> Result<usize, Failure> {
+pub(super) fn joint_of(settings: &Settings, word: &str) -> Result<usize, Failure> {
     let joints: Vec<_> = settings.all_slots().collect();
     let by_name = joints.iter().position(|joint| joint.name == word);
     let by_number = || word.parse::<usize>().ok()?.checked_sub(1).filter(|joint| *joint < joints.len());

@@ -137,7 +137,9 @@ fn check_ready(
                 Phase::Moving | Phase::Pausing | Phase::Paused => {
                     "wait for the end of the motion, or `taustream cancel`; `taustream replan --queue` goes on from a running motion"
                 }
-                Phase::Stopping | Phase::FastStopping | Phase::Braking => "wait until the arm is at rest",
+                Phase::Stopping | Phase::FastStopping | Phase::Braking | Phase::Homing => {
+                    "wait until the arm is at rest"
+                }
                 Phase::Configuring
                 | Phase::Disabled
                 | Phase::Enabling

@@ -119,6 +119,7 @@ impl Picture {
             | Phase::Stopping
             | Phase::FastStopping
             | Phase::Braking
+            | Phase::Homing
             | Phase::Disabling => "",
         };
         Line::of(format!("FAULT: {}{remedy}", fault_sentence(r, &self.arm)), Tone::Bad)
@@ -137,7 +138,7 @@ fn tone_of(phase: Phase) -> Tone {
     match phase {
         Phase::Holding | Phase::Moving => Tone::Good,
         Phase::Configuring | Phase::Disabled | Phase::Enabling | Phase::Disabling => Tone::Plain,
-        Phase::Pausing | Phase::Paused | Phase::Stopping | Phase::Locked => Tone::Warning,
+        Phase::Pausing | Phase::Paused | Phase::Stopping | Phase::Locked | Phase::Homing => Tone::Warning,
         Phase::FastStopping | Phase::Braking | Phase::Fault => Tone::Bad,
     }
 }

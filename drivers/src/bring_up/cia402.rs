@@ -5,6 +5,7 @@
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
+use crate::bring_up::homing::{Homing, HomingPlan, HomingTarget};
 use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan};
 use crate::bring_up::power::{Power, Received, TargetSource};
 use crate::bring_up::scale::StatedScale;
@@ -16,7 +17,7 @@ use crate::codec::emcy::HEARTBEAT;
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest};
 use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome};
-use crate::servo::{DriveState, DriveTarget, Nanos};
+use crate::servo::{DriveState, DriveTarget, HomingState, Nanos};
 
 /// Pause between two looks at the modes display of a drive that is being energised.
 const MODE_AGAIN: Nanos = Nanos(20_000_000);
@@ -131,6 +132,8 @@ pub struct Node {
     pub(super) there: bool,
     pub(super) mode: ModeDisplay,
     pub(super) stated: StatedScale,
+    pub(super) homing: Homing,
+    pub(super) homing_plan: Option<HomingPlan>,
     /// What the drive states of the object that contradicts the settings, and what they say.
     pub(super) numbers: [f64; 2],
 }
@@ -166,6 +169,8 @@ impl Node {
             there: false,
             mode: ModeDisplay::default(),
             stated: StatedScale::default(),
+            homing: Homing::default(),
+            homing_plan: plan.homing.map(|homing| HomingPlan::of(&homing, &plan)),
             numbers: [0.0; 2],
         }
     }
@@ -179,10 +184,17 @@ impl Node {
         )
     }
 
-    /// What an adopted drive holds, in counts.
+    /// What an adopted drive holds, or one at the end of its homing, in counts.
     #[must_use]
     pub fn held(&self) -> Option<i32> {
-        self.held.filter(|_| self.state() == DriveState::Adopted)
+        let adopted = self.held.filter(|_| self.state() == DriveState::Adopted);
+        adopted.or_else(|| self.homing.held().filter(|_| self.state() == DriveState::Homing))
+    }
+
+    /// What is known of its homing.
+    #[must_use]
+    pub fn homing(&self) -> HomingState {
+        if self.state() == DriveState::Homing { self.homing.outcome() } else { HomingState::None }
     }
 
     /// Newest position in counts.
@@ -221,7 +233,7 @@ impl Node {
             | NodeStage::Start { .. } => DriveState::Configuring,
             NodeStage::Held { .. } | NodeStage::Rejoin { .. } => DriveState::Adopted,
             NodeStage::Unowned { .. } => DriveState::EnergisedUnowned,
-            NodeStage::Operational { .. } => self.power.state(self.status),
+            NodeStage::Operational { .. } => self.homing.state(self.power.state(self.status)),
             NodeStage::Gone(_) => DriveState::Fault,
             NodeStage::Refused { .. } => DriveState::Refused,
         }
@@ -254,7 +266,8 @@ impl Node {
     /// What the drive states and what it should, where they contradict each other; 0 elsewhere.
     #[must_use]
     pub fn refused_numbers(&self) -> [f64; 2] {
-        match self.error().0 {
+        let homing = if let HomingState::Failed { code, .. } = self.homing() { code } else { 0 };
+        match self.error().0.max(homing) {
             SCALE_DIFFERS | NOT_TAKEN => self.numbers,
             _ => [0.0; 2],
         }
@@ -280,9 +293,14 @@ impl Node {
             fresh: self.age(cycle.now, self.tpdo_at) <= self.timeouts.feedback.0,
             command_near: target.near,
             in_mode: self.mode.is_right,
+            homes: self.homing.suspends_following(),
         };
+        self.homing.release_at(target.counts);
         let control = match self.stage {
-            NodeStage::Operational { .. } => self.power.control(cycle.now, cycle.drive_target, received),
+            NodeStage::Operational { .. } => {
+                let control = self.power.control(cycle.now, cycle.drive_target, received);
+                if self.power.follows(control) { self.homing.control(control) } else { control }
+            }
             NodeStage::Rejoin { .. } if cycle.drive_target != DriveTarget::TorqueOff => {
                 self.power.keeping(self.status)
             }
@@ -306,10 +324,13 @@ impl Node {
             self.power.target_source()
         };
         // A command that is no number must never become one: the last good target stays.
-        let wanted = match target_source {
-            TargetSource::Measured => self.position,
-            TargetSource::Held => self.held,
-            TargetSource::Command => target.counts,
+        let homing = self.homing.target().filter(|_| target_source == TargetSource::Command);
+        let wanted = match (homing, target_source) {
+            (Some(HomingTarget::Last), _) => None,
+            (Some(HomingTarget::Measured), _) | (None, TargetSource::Measured) => self.position,
+            (Some(HomingTarget::Held(counts)), _) => Some(counts),
+            (None, TargetSource::Held) => self.held,
+            (None, TargetSource::Command) => target.counts,
         };
         self.commanded = wanted.or(self.commanded);
         if target_source == TargetSource::Command {
@@ -378,6 +399,7 @@ impl Node {
         self.sdo.cancel();
         self.power = self.plan.power(self.timeouts.step);
         self.commanded = None;
+        self.homing.forget();
         self.power.watch(self.last_target);
         (self.emcy, self.requested_error) = (0, false);
         self.stage = NodeStage::Observe { since: now, next: now, fault };
@@ -460,6 +482,7 @@ impl Node {
 
     fn supervise(&mut self, cycle: BringUpCycle, shutdown_since: Option<Nanos>) {
         let now = cycle.now;
+        self.advance_homing(now);
         if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
             // A drive without feedback may still receive: it keeps its setpoints until the target is `Disabled`.
             self.power.note(BringUpFault::HeartbeatLost);
@@ -473,7 +496,7 @@ impl Node {
                     self.observe(now, Some(BringUpFault::HeartbeatLost));
                 }
             }
-        } else if !self.request_error() {
+        } else if !self.request_error() && self.homing.is_idle() {
             self.request_mode(now);
         }
     }
@@ -522,6 +545,9 @@ impl Node {
             }
             NodeStage::Verify => self.settle_verify(cycle.now, job, outcome),
             NodeStage::Configure { step, since } => self.settle_step(cycle.now, outcome, (step, since)),
+            NodeStage::Operational { .. } if !self.homing.is_idle() => {
+                self.settle_homing(cycle.now, job, outcome);
+            }
             NodeStage::Operational { .. } => {
                 if let SdoOutcome::Value(value) = outcome
                     && job.address() == object::MODE_DISPLAY

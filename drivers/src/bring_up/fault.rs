@@ -51,11 +51,25 @@ pub enum BringUpFault {
     NotTaken = 0x0001_0013,
     /// Object 0x6502 does not offer interpolated position.
     NoMode = 0x0001_0014,
+    /// It has reported an error of its homing.
+    HomingError = 0x0001_0015,
+    /// Its homing has not ended in time.
+    HomingTimeout = 0x0001_0016,
+    /// It goes on showing the end of an earlier homing.
+    HomingNotBegun = 0x0001_0017,
+    /// Object 0x6061 did not become 6.
+    HomingModeNotTaken = 0x0001_0018,
+    /// It sent no feedback while it was homing.
+    HomingNoFeedback = 0x0001_0019,
+    /// It did not come to rest after its homing.
+    HomingNotAtRest = 0x0001_001A,
+    /// Neither halt nor quick stop ended its homing.
+    HomingNotStopped = 0x0001_001B,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 27] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -76,6 +90,13 @@ impl BringUpFault {
         Self::ScaleDiffers,
         Self::NotTaken,
         Self::NoMode,
+        Self::HomingError,
+        Self::HomingTimeout,
+        Self::HomingNotBegun,
+        Self::HomingModeNotTaken,
+        Self::HomingNoFeedback,
+        Self::HomingNotAtRest,
+        Self::HomingNotStopped,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -129,6 +150,24 @@ impl BringUpFault {
                  is wrong"
             }
             Self::NotTaken => "the drive confirmed a write and holds another value",
+            Self::HomingError => {
+                "the drive reports a homing error (statusword bit 13); see its switches and its homing method (0x6098)"
+            }
+            Self::HomingTimeout => {
+                "homing has not ended within its time; see the switch and the direction of the method, or give it a longer timeout_s in \
+                 [servo.homing]"
+            }
+            Self::HomingNotBegun => {
+                "homing did not begin: the drive goes on showing the end of an earlier one (statusword bit 12); see its enable inputs"
+            }
+            Self::HomingModeNotTaken => {
+                "the drive did not take its homing mode (object 0x6061 did not become 6)"
+            }
+            Self::HomingNoFeedback => "the drive sent no feedback while it was homing; check its wiring",
+            Self::HomingNotAtRest => "the drive did not come to rest after its homing",
+            Self::HomingNotStopped => {
+                "neither halt nor quick stop has ended the drive's homing; use the emergency stop"
+            }
         }
     }
 }
@@ -159,7 +198,14 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::Foreign
         | BringUpFault::ScaleDiffers
         | BringUpFault::NotTaken
-        | BringUpFault::NoMode => None,
+        | BringUpFault::NoMode
+        | BringUpFault::HomingError
+        | BringUpFault::HomingTimeout
+        | BringUpFault::HomingNotBegun
+        | BringUpFault::HomingModeNotTaken
+        | BringUpFault::HomingNoFeedback
+        | BringUpFault::HomingNotAtRest
+        | BringUpFault::HomingNotStopped => None,
     }
 }
 

@@ -5,6 +5,7 @@ pub(crate) mod adopt;
 pub mod cia402;
 mod configure;
 pub mod fault;
+pub mod homing;
 mod observe;
 pub mod plan;
 pub mod power;

@@ -8,7 +8,9 @@ use crate::codec::object::{self, Address};
 use crate::codec::sdo::SdoBytes;
 use crate::codec::setpoint_frames::shared_cob_id;
 use crate::servo::Nanos;
-use taustream_arm::{DriveFeatures, MasterSupervision, OptionalObject, PositionMode, Reaction};
+use taustream_arm::{
+    DriveFeatures, HomingSettings, MasterSupervision, OptionalObject, PositionMode, Reaction,
+};
 use taustream_motion::range::POSITION_TOLERANCE_RAD;
 
 /// Period of the heartbeats that drives send, and that this master sends.
@@ -64,6 +66,10 @@ pub struct NodePlan {
     pub scale: ExpectedScale,
     /// What it lacks or does in its own time.
     pub features: DriveFeatures,
+    /// How it finds its zero by itself.
+    pub homing: Option<HomingSettings>,
+    /// Distance between a command and the measured position up to which they belong together, in counts.
+    pub near_counts: u32,
 }
 
 impl NodePlan {

@@ -31,6 +31,8 @@ pub struct Received {
     pub command_near: bool,
     /// The drive has said that it is in the mode of its settings.
     pub in_mode: bool,
+    /// It homes itself, and follows nothing.
+    pub homes: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,6 +128,16 @@ impl Power {
     #[must_use]
     pub const fn fault(&self) -> Option<BringUpFault> {
         self.fault
+    }
+
+    /// Energised, as it was asked to.
+    pub(super) fn is_on(&self) -> bool {
+        self.phase == Phase::On
+    }
+
+    /// A controlword is the one of a drive that follows.
+    pub(super) const fn follows(&self, control: u16) -> bool {
+        control == self.follow
     }
 
     /// Which target goes out.
@@ -302,7 +314,7 @@ impl Power {
     fn advance_on(&mut self, step: Option<DriveStep>, received: Received) {
         if step != Some(DriveStep::OperationEnabled) {
             self.drop_out(step);
-        } else if received.status & STATUS_FOLLOWS != 0 {
+        } else if received.homes || received.status & STATUS_FOLLOWS != 0 {
             self.not_following = 0;
         } else {
             self.not_following = self.not_following.saturating_add(1);

@@ -16,7 +16,7 @@
 use crate::codec::cia402_words::{CountScale, counts_from_rad};
 use crate::codec::object::{self, Address};
 use std::f64::consts::TAU;
-use taustream_arm::{Cia402, Overruled, RobotJoint, ScaleObject, Servo};
+use taustream_arm::{Cia402, Feedback, Overruled, RobotJoint, ScaleObject, Servo};
 
 /// Relative difference up to which two ratios are the same: a decimal fraction of the settings has its digits.
 const SAME: f64 = 1e-6;
@@ -52,12 +52,7 @@ impl ExpectedScale {
             gear_ratio: cia402.gear_ratio,
             range_counts: [low.min(high), low.max(high)],
             home_offset_counts: cia402.home_offset_counts,
-            overruled: if cia402.features.limits.soft_limits {
-                // It is written, not compared.
-                cia402.overruled.with(ScaleObject::SoftLimit)
-            } else {
-                cia402.overruled
-            },
+            overruled: overruled(servo, cia402),
         })
     }
 
@@ -77,6 +72,19 @@ impl ExpectedScale {
         };
         ADDRESSES.into_iter().filter(read)
     }
+}
+
+/// Objects that are not compared: by their owner's word, or because they are written.
+fn overruled(servo: &Servo, cia402: &Cia402) -> Overruled {
+    let mut overruled = cia402.overruled;
+    if cia402.features.limits.soft_limits {
+        overruled = overruled.with(ScaleObject::SoftLimit);
+    }
+    // Before its homing an incremental position means nothing, and homing writes the offset.
+    if cia402.homing.is_some() && servo.feedback == Feedback::Incremental {
+        overruled = overruled.with(ScaleObject::HomeOffset);
+    }
+    overruled
 }
 
 /// The gear ratio before the feed constant, whose meaning depends on it.

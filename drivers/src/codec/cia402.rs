@@ -163,6 +163,8 @@ impl Cia402Driver {
                 feedback_every,
                 setpoints_lost_ms: u16::try_from(settings.cycle.drive_watchdog_ms).unwrap_or(u16::MAX),
                 scale: expected,
+                homing: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.homing),
+                near_counts: expected.counts_of(near_rad),
                 features: servo.protocol.get::<Cia402>().map(|cia402| cia402.features).unwrap_or_default(),
             };
             driver.add(servo, scale, Node::new(plan, timeouts))?;
@@ -362,6 +364,7 @@ impl ServoDriver for Cia402Driver {
             position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
             velocity_rad_s: f64::NAN,
             torque_nm: f64::NAN,
+            homing: node.homing(),
             hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
             status_word: u32::from(node.status()),
@@ -372,6 +375,12 @@ impl ServoDriver for Cia402Driver {
             lost_master: node.lost_master(),
             emergency: u32::from(emergency),
             emergencies,
+        }
+    }
+
+    fn set_homing(&mut self, joint: Option<usize>) {
+        for drive in &mut self.drives {
+            drive.node.request_homing(joint == Some(drive.joint));
         }
     }
 

@@ -34,6 +34,13 @@ pub const STATUS_ENERGISED: u16 = 1 << 2;
 /// Statusword bit in CSP: the drive follows the target.
 pub const STATUS_FOLLOWS: u16 = 1 << 12;
 
+/// Statusword bit in homing mode: the home position is found.
+pub const STATUS_HOMED: u16 = 1 << 12;
+/// Statusword bit in homing mode: homing has failed.
+pub const STATUS_HOMING_ERROR: u16 = 1 << 13;
+/// Statusword bit: the target is reached; in homing mode, the motor stands.
+pub const STATUS_REACHED: u16 = 1 << 10;
+
 /// Controlword: disable voltage.
 pub const CONTROL_OFF: u16 = 0x0000;
 /// Controlword: quick stop.
@@ -46,6 +53,10 @@ pub const CONTROL_SWITCH_ON: u16 = 0x0007;
 pub const CONTROL_ENABLE: u16 = 0x000F;
 /// Controlword bit in interpolated position mode: interpolate.
 pub const CONTROL_INTERPOLATE: u16 = 0x0010;
+/// Controlword bit in homing mode: start, and go on.
+pub const CONTROL_HOME: u16 = 0x0010;
+/// Controlword bit: come to rest.
+pub const CONTROL_HALT: u16 = 0x0100;
 /// Controlword: fault reset (rising edge).
 pub const CONTROL_FAULT_RESET: u16 = 0x0080;
 

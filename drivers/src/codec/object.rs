@@ -146,6 +146,14 @@ objects! {
     VELOCITY_OFFSET = 0x60B1:0;
     /// Torque offset, i16, 0.1 % of the rated torque.
     TORQUE_OFFSET = 0x60B2:0;
+    /// Homing method, i8.
+    HOMING_METHOD = 0x6098:0;
+    /// Homing speed towards the switch, u32.
+    HOMING_SWITCH_SPEED = 0x6099:1;
+    /// Homing speed towards the zero, u32.
+    HOMING_ZERO_SPEED = 0x6099:2;
+    /// Homing acceleration, u32.
+    HOMING_ACCELERATION = 0x609A:0;
     /// Interpolation data, i32, counts: the target position of interpolated position mode.
     INTERPOLATION_DATA = 0x60C1:1;
     /// Interpolation period, value, u8.

@@ -186,6 +186,10 @@ impl ServoDriver for BusDriver {
         driver.map_or(Err(ZeroRefused::NoSuchJoint), |driver| driver.set_zero(joint))
     }
 
+    fn set_homing(&mut self, joint: Option<usize>) {
+        self.drivers.iter_mut().for_each(|driver| driver.set_homing(joint));
+    }
+
     fn other_master(&self) -> Option<CanId> {
         self.drivers.iter().find_map(|driver| driver.other_master())
     }

@@ -233,6 +233,18 @@ impl Drive {
         self.power.state()
     }
 
+    /// Its mode of operation (0x6060).
+    #[must_use]
+    pub fn mode(&self) -> i64 {
+        self.dictionary.get(0x6060, 0)
+    }
+
+    /// Its position as it states it (0x6064), counts.
+    #[must_use]
+    pub fn counted(&self) -> i32 {
+        self.counts(0.0)
+    }
+
     /// Communication state.
     #[must_use]
     pub fn network_state(&self) -> NmtState {

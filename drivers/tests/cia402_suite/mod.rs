@@ -16,6 +16,7 @@ mod bring_up;
 mod counting;
 mod encoding;
 mod frames;
+mod homing;
 mod operation;
 mod properties;
 mod scripted;

@@ -361,6 +361,32 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "CiA 402: true: the joint's `position_rad` is written as software position limit (0x607D); false: compared.",
     ),
     (
+        "Settings files: servo[].homing",
+        "CiA 402: how the drive finds its zero by itself: see [homing.md](homing.md); without it `taustream home` is refused.",
+    ),
+    (
+        "Settings files: servo[].homing.method",
+        "Homing method (0x6098), by the drive's manual; negative ones are the maker's own.",
+    ),
+    (
+        "Settings files: servo[].homing.velocity_unit",
+        "Unit in which the drive takes speeds and, a second, accelerations, of its motor.",
+    ),
+    (
+        "Settings files: servo[].homing.switch_speed_rad_s",
+        "Speed of the joint towards the switch (0x6099:01); at most its motion limit.",
+    ),
+    (
+        "Settings files: servo[].homing.zero_speed_rad_s",
+        "Speed of the joint towards the zero (0x6099:02); at most its motion limit.",
+    ),
+    ("Settings files: servo[].homing.acceleration_rad_s2", "Acceleration of the joint (0x609A)."),
+    ("Settings files: servo[].homing.timeout_s", "Longest time from start to end; then the drive is halted."),
+    (
+        "Settings files: servo[].homing.collision_risk_acknowledged",
+        "true: its owner knows that nothing checks this motion for collisions; needed for methods that move (all but 35 and 37).",
+    ),
+    (
         "Settings files: simulator.fixed_pdos",
         "CiA 402: true: PDO 1 is mapped and on as this master needs it, and no PDO can be changed; false.",
     ),

@@ -11,8 +11,8 @@ use taustream_tests::setpoints::{BusFrame, CheckResult, Encoding, Losses, check_
 use taustream_tests::test_bench::{CYCLE_LOG, Place, RECORDING, TestBench};
 use taustream_tests::traffic::as_plain;
 use taustream_tests::{
-    bus_scenarios, candump, cut_scenarios, cycle_log, disturbed_scenarios, restart_scenarios,
-    stream_scenarios,
+    bus_scenarios, candump, cut_scenarios, cycle_log, disturbed_scenarios, homing_scenarios,
+    restart_scenarios, stream_scenarios,
 };
 
 /// Runs the scenarios over the real processes on a real vcan0.
@@ -67,6 +67,7 @@ fn run(arguments: &Arguments) -> Result<usize> {
         .chain(cut_scenarios::ALL)
         .chain(disturbed_scenarios::ALL)
         .chain(stream_scenarios::ALL)
+        .chain(homing_scenarios::ALL)
         .chain(bus_scenarios::ALL);
     let chosen: Vec<&Scenario> = all.filter(|s| s.name.contains(&arguments.only)).collect();
     // Written for one bus; where the settings have more, the other settings' run has them.

@@ -85,6 +85,7 @@ impl Operator {
             | Phase::Braking
             | Phase::Fault
             | Phase::Locked
+            | Phase::Homing
             | Phase::Disabling => self.next_recovery(phase).map(Deed::Command),
         }
     }
@@ -120,6 +121,7 @@ impl Operator {
             | Phase::Stopping
             | Phase::FastStopping
             | Phase::Braking
+            | Phase::Homing
             | Phase::Disabling => None,
         }
     }

@@ -6,7 +6,7 @@ use super::axis::{Axis, AxisPlan, AxisTarget};
 use super::frames::{Command, Message};
 use crate::bring_up::timing::{StepTimer, Timeouts};
 use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
-use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
+use crate::servo::{DriveTarget, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus};
 use std::f64::consts::TAU;
 use taustream_motion::MAX_JOINTS;
 
@@ -133,6 +133,7 @@ impl ServoDriver for OdriveDriver {
             velocity_rad_s: velocity_turns_s / mapping.turns_a_rad(),
             torque_nm: f64::NAN,
             hold_position_rad: f64::NAN,
+            homing: HomingState::None,
             received: *received,
             status_word: axis.status_word(),
             error_code,
