@@ -266,9 +266,9 @@ fn outcomes_of(ticks: &[u64]) -> Vec<ProcessOutcomes> {
     all
 }
 
-/// Phases in which single drives may be off, or on their way on or off.
+/// Phases in which single drives may be off, on their way on or off, or in another mode.
 pub(crate) fn may_be_off(phase: &str) -> bool {
-    matches!(phase, "enabling" | "fast-stopping" | "braking" | "fault" | "locked" | "disabling")
+    matches!(phase, "enabling" | "fast-stopping" | "braking" | "fault" | "locked" | "disabling" | "homing")
 }
 
 fn last_measured(frames: &[BusFrame], encodings: &[Encoding]) -> CheckResult {
