@@ -72,6 +72,11 @@ impl OptionalObject {
             Self::SupportedModes => "supported drive modes",
         }
     }
+    /// It is needed for homing alone, and not at bring-up.
+    #[must_use]
+    pub const fn is_of_homing(self) -> bool {
+        matches!(self, Self::HomeOffset | Self::HomingMethod | Self::HomingSpeeds | Self::HomingAcceleration)
+    }
     /// What is left to the drive without it.
     #[must_use]
     pub const fn without(self) -> &'static str {
