@@ -13,7 +13,7 @@ use taustream_arm::Settings;
 use taustream_drivers::sim::{Drive, FaultRequest};
 use taustream_drivers::{CanId, Nanos};
 use taustream_messages::{Command, FaultReason, Phase, ReferenceState, Replaces};
-use taustream_motion::{Stroke, Trajectory};
+use taustream_motion::{JointArray, Stroke, Trajectory};
 use taustream_streamer::answer::AnswerReason;
 use taustream_streamer::cycle::NoProbe;
 use taustream_streamer::cycle_state::Decision;
@@ -103,6 +103,10 @@ fn watch(arm: &mut Arm, most: u64, mut ends: impl FnMut(&Arm) -> bool) -> u64 {
     panic!("{:?} after {most} cycles, cause {:?}", arm.phase(), arm.core.supervisor().cause());
 }
 
+fn joint_array(values: [f64; JOINTS]) -> JointArray {
+    std::array::from_fn(|joint| values.get(joint).copied().unwrap_or(0.0))
+}
+
 fn home(arm: &mut Arm) {
     arm.ask(Command::Home { joint: 5 });
     assert_eq!(arm.phase(), Phase::Homing);
@@ -140,8 +144,12 @@ fn joint_with_incremental_feedback_homes_and_the_arm_is_ready_after_enable() {
     assert_eq!(arm.phase(), Phase::Holding);
     arm.run(200);
     // It stands a little outside its range, where the switch is, and may only move inwards.
-    let inwards =
-        Stroke { start_s: 0.0, duration_s: 2.0, n: 6, delta_rad: [0.0, 0.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0] };
+    let inwards = Stroke {
+        start_s: 0.0,
+        duration_s: 2.0,
+        n: 6,
+        delta_rad: joint_array([0.0, 0.0, 0.0, 0.0, 0.0, -0.5]),
+    };
     let base_rad = arm.newest.unwrap().position_rad;
     let trajectory = Trajectory::new(JOINTS, base_rad, &[inwards]).unwrap();
     let decision = arm.offer(&trajectory, Replaces::Rest);
@@ -156,8 +164,7 @@ fn joint_with_incremental_feedback_homes_and_the_arm_is_ready_after_enable() {
 fn nothing_else_is_accepted_while_a_joint_homes() {
     let mut arm = configured("homing-else", settings(18));
     homing_moves(&mut arm);
-    let rest =
-        Stroke { start_s: 0.0, duration_s: 1.0, n: 6, delta_rad: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.0, 0.0] };
+    let rest = Stroke { start_s: 0.0, duration_s: 1.0, n: 6, delta_rad: joint_array([0.1; JOINTS]) };
     let trajectory = Trajectory::new(JOINTS, arm.newest.unwrap().position_rad, &[rest]).unwrap();
     let decision = arm.offer(&trajectory, Replaces::Rest);
     assert_eq!(decision, Decision::NotReady { phase: Phase::Homing });
