@@ -3,6 +3,7 @@
 //! The digest is taken over this and nothing else, so whatever changes the meaning of a setpoint must be here.
 use crate::capsule::Capsule;
 use crate::document::{Node, Value, shown};
+use crate::group::{self, Group};
 use crate::limit_notices;
 use crate::link_margin::LinkMargins;
 use crate::mass::{self, Weight};
@@ -32,6 +33,16 @@ pub(crate) enum Geometry {
     Urdf(Box<UrdfArm>),
 }
 
+impl Geometry {
+    /// The tips, each with the joints that move it.
+    pub(crate) fn tips(&self) -> Vec<(String, Vec<usize>)> {
+        match self {
+            Self::Rows(rows) => vec![(link_name(rows.len()), (0..rows.len()).collect())],
+            Self::Urdf(arm) => arm.tips(),
+        }
+    }
+}
+
 /// A robot file without faults.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Description {
@@ -53,6 +64,8 @@ pub(crate) struct Description {
     pub(crate) gravity_m_s2: [f64; 3],
     /// Poses that the robot file names.
     pub(crate) poses: Vec<NamedPose>,
+    /// Joints that belong together.
+    pub(crate) groups: Vec<Group>,
     /// What the owner should know about the joints' limits, as text.
     pub(crate) notices: Vec<String>,
 }
@@ -87,7 +100,12 @@ impl Description {
         let margins = LinkMargins::read(&mut top, read.links.as_deref());
         let payload = read_payload(&mut top);
         let joints = read.whole.as_ref().map(|(joints, _)| joints.as_slice());
-        let poses = named_pose::read(&mut top, joints);
+        let tips = read.whole.as_ref().map(|(_, geometry)| geometry.tips());
+        let groups = group::read(&mut top, joints.zip(tips.as_deref()));
+        let poses = named_pose::read(&mut top, joints, &groups);
+        if let (Some(Some(_)), Some([_, _, ..])) = (&payload, tips.as_deref()) {
+            top.fault("payload", "a table", "a payload only where the robot has one tip");
+        }
         let gravity_m_s2 = Weight::read_gravity(&mut top);
         top.done();
         let (joints, geometry) = read.whole?;
@@ -103,6 +121,7 @@ impl Description {
             payload,
             gravity_m_s2,
             poses,
+            groups,
             notices,
         };
         modelled::check(fault_list, &listed, &read.links.unwrap_or_default(), |link| {

@@ -41,6 +41,12 @@
 //! | string | `link margins` |
 //! | f64 | the margin of all pairs |
 //! | u32 | number of pairs with one of their own; per pair 2 x u32 links, f64 margin |
+//! | then, only when a URDF's arm has more than one tip: | |
+//! | string | `tips` |
+//! | u32 | number of tips; per tip u32 link |
+//! | then, only when the joints have groups: | |
+//! | string | `groups` |
+//! | u32 | number of groups; per group: string name; u32 number of joints, per joint u32; u32 0 without a tip, else its place among the tips, from 1 |
 //!
 //! With feed-forward torques (`[feed_forward]` of a settings file) gravity and moments of inertia change what is commanded. The
 //! digest in messages then is that of the torque model, over these bytes:
@@ -56,6 +62,7 @@
 //! IEEE 754 bits; -0.0 is written as 0.0, because both mean the same.
 use crate::capsule::Capsule;
 use crate::description::{Description, Geometry, Joint};
+use crate::group::Group;
 use crate::link_margin::LinkMargins;
 use crate::mass::Weight;
 use crate::rows::{Row, RowKind};
@@ -109,6 +116,7 @@ fn bytes(description: &Description) -> Vec<u8> {
         payload,
         gravity_m_s2: _,
         poses: _,
+        groups,
         notices: _,
     } = description;
     let mut out = HEADER.to_vec();
@@ -135,7 +143,34 @@ fn bytes(description: &Description) -> Vec<u8> {
     put_weights(&mut out, geometry, payload.as_ref());
     put_capsules(&mut out, geometry, base_capsules);
     put_margins(&mut out, margins);
+    put_tips(&mut out, geometry);
+    put_groups(&mut out, groups);
     out
+}
+
+/// The tips of a tree; nothing for a serial arm.
+fn put_tips(out: &mut Vec<u8>, geometry: &Geometry) {
+    let Geometry::Urdf(arm) = geometry else { return };
+    if arm.tips.len() > 1 {
+        put_text(out, "tips");
+        put_count(out, arm.tips.len());
+        arm.tips.iter().for_each(|tip| put_count(out, *tip));
+    }
+}
+
+/// Which joints belong together; nothing when the file does not say.
+fn put_groups(out: &mut Vec<u8>, groups: &[Group]) {
+    if groups.is_empty() {
+        return;
+    }
+    put_text(out, "groups");
+    put_count(out, groups.len());
+    for Group { name, joints, tip } in groups {
+        put_text(out, name);
+        put_count(out, joints.len());
+        joints.iter().for_each(|joint| put_count(out, *joint));
+        put_count(out, tip.map_or(0, |tip| tip + 1));
+    }
 }
 
 /// The capsules of base and links; nothing at all when there are none, as with weights.

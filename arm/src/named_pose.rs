@@ -1,15 +1,18 @@
 //! Poses with a name: `[[pose]]` in the robot file, and the group states of an SRDF file that state every joint.
 use crate::description::Joint;
 use crate::document::shown;
+use crate::group::Group;
 use crate::reader::{Bounds, Table, numbers_of};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// A pose that the owner has named.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedPose {
-    /// Its name, each once.
+    /// Its name, each once in a group, and once among those of all joints.
     pub name: String,
-    /// One angle a joint; unused slots are zero.
+    /// Index of the group that it is a pose of, into [`crate::Robot::groups`]; none for all joints.
+    pub group: Option<usize>,
+    /// One angle a joint; unused slots, and joints of other groups, are zero.
     pub position_rad: JointArray,
 }
 
@@ -24,22 +27,24 @@ pub(crate) struct GroupState {
 const ANGLE_RAD: Bounds = Bounds::within(-1e3, 1e3, "rad");
 
 /// Takes every `[[pose]]`; the joints are not known after a fault in the geometry.
-pub(crate) fn read(top: &mut Table<'_>, joints: Option<&[Joint]>) -> Vec<NamedPose> {
+pub(crate) fn read(top: &mut Table<'_>, joints: Option<&[Joint]>, groups: &[Group]) -> Vec<NamedPose> {
     let mut poses: Vec<NamedPose> = Vec::new();
     for mut table in top.tables("pose") {
         let name = table.name("name");
+        let group = read_group(&mut table, groups);
         let node = table.need("position_rad", "a list of one angle a joint");
-        let angles = node.zip(joints).and_then(|(node, joints)| {
+        let members = joints.zip(group).map(|(joints, group)| members(joints, groups, group));
+        let angles = node.zip(members.as_ref()).and_then(|(node, members)| {
             let key = table.path_of("position_rad");
-            numbers_of(table.fault_list(), &key, &node, joints.len(), &ANGLE_RAD)
+            numbers_of(table.fault_list(), &key, &node, members.len(), &ANGLE_RAD)
         });
-        if let (Some(name), Some(angles), Some(joints)) = (name, angles, joints) {
-            if poses.iter().any(|pose| pose.name == name) {
+        if let (Some(name), Some(group), Some(angles), Some(members)) = (name, group, angles, members) {
+            if poses.iter().any(|pose| pose.name == name && pose.group == group) {
                 table.fault("name", &shown(&name), "each pose's name once");
-            } else if let Some(words) = outside(joints, &angles) {
+            } else if let Some(words) = outside(&members, &angles) {
                 table.fault("position_rad", &words, "every joint inside its limits");
             } else {
-                poses.push(NamedPose { name, position_rad: padded(&angles) });
+                poses.push(NamedPose { name, group, position_rad: spread(&members, &angles) });
             }
         }
         table.done();
@@ -47,42 +52,78 @@ pub(crate) fn read(top: &mut Table<'_>, joints: Option<&[Joint]>) -> Vec<NamedPo
     poses
 }
 
-/// The group states that state every joint of the arm inside its limits, unless the robot file has one of that name. What
-/// is left out for another reason than belonging to other joints is said.
+/// The group that a pose is of; the outer `None` is a fault.
+#[expect(clippy::option_option, reason = "a missing group and a faulty one are distinguished")]
+fn read_group(table: &mut Table<'_>, groups: &[Group]) -> Option<Option<usize>> {
+    let Some(name) = table.text_if_there("group", "the name of a [[group]]") else { return Some(None) };
+    let found = groups.iter().position(|group| group.name == name);
+    if found.is_none() {
+        let names: Vec<String> = groups.iter().map(|group| shown(&group.name)).collect();
+        let known = if names.is_empty() { "the file has none".to_owned() } else { names.join(", ") };
+        table.fault("group", &shown(&name), &format!("a [[group]] of the file: {known}"));
+    }
+    found.map(Some)
+}
+
+/// The joints of a group, or all, with their indices.
+fn members<'j>(joints: &'j [Joint], groups: &[Group], group: Option<usize>) -> Vec<(usize, &'j Joint)> {
+    let group = group.and_then(|group| groups.get(group));
+    let is_in = |(index, _): &(usize, &Joint)| group.is_none_or(|group| group.joints.contains(index));
+    joints.iter().enumerate().filter(is_in).collect()
+}
+
+/// The group states that state every joint of the arm, or of one of its groups, inside its limits, unless the robot file has one of
+/// that name. What is left out for another reason than belonging to other joints is said.
 pub(crate) fn of_states(
     states: &[GroupState],
-    joints: &[Joint],
+    (joints, groups): (&[Joint], &[Group]),
     own: &[NamedPose],
     notices: &mut Vec<String>,
 ) -> Vec<NamedPose> {
     let mut poses: Vec<NamedPose> = own.to_vec();
     for state in states {
-        let of = |joint: &Joint| state.joints.iter().find(|(name, _)| *name == joint.name);
-        let angles: Vec<f64> = joints.iter().filter_map(|joint| Some(of(joint)?.1)).collect();
-        if angles.len() < joints.len() || poses.iter().any(|pose| pose.name == state.name) {
-            continue;
-        }
-        match outside(joints, &angles) {
-            Some(words) => {
-                let name = &state.name;
-                notices.push(format!("SRDF group state {name:?} is left out: {words} is outside its limits"));
+        let all = std::iter::once(None).chain((0..groups.len()).map(Some));
+        for group in all {
+            let members = members(joints, groups, group);
+            let of = |joint: &Joint| state.joints.iter().find(|(name, _)| *name == joint.name);
+            let angles: Vec<f64> = members.iter().filter_map(|(_, joint)| Some(of(joint)?.1)).collect();
+            let is_known = |pose: &NamedPose| pose.name == state.name && pose.group == group;
+            if angles.len() < members.len() || poses.iter().any(is_known) {
+                continue;
             }
-            None => poses.push(NamedPose { name: state.name.clone(), position_rad: padded(&angles) }),
+            match outside(&members, &angles) {
+                Some(words) => {
+                    let name = &state.name;
+                    notices.push(format!(
+                        "SRDF group state {name:?} is left out: {words} is outside its limits"
+                    ));
+                }
+                None => {
+                    let position_rad = spread(&members, &angles);
+                    poses.push(NamedPose { name: state.name.clone(), group, position_rad });
+                }
+            }
+            // The groups of a state of all joints are in it.
+            break;
         }
     }
     poses
 }
 
-fn outside(joints: &[Joint], angles: &[f64]) -> Option<String> {
-    let mut both = joints.iter().zip(angles);
-    let (joint, angle) = both.find(|(joint, angle)| !joint.limits.is_inside(**angle))?;
+fn outside(members: &[(usize, &Joint)], angles: &[f64]) -> Option<String> {
+    let mut both = members.iter().zip(angles);
+    let ((_, joint), angle) = both.find(|((_, joint), angle)| !joint.limits.is_inside(**angle))?;
     let [low, high] = joint.limits.position_rad;
     Some(format!("joint {:?} at {angle} rad of [{low}, {high}]", joint.name))
 }
 
-fn padded(angles: &[f64]) -> JointArray {
+fn spread(members: &[(usize, &Joint)], angles: &[f64]) -> JointArray {
     let mut pose = [0.0; MAX_JOINTS];
-    pose.iter_mut().zip(angles).for_each(|(slot, angle)| *slot = *angle);
+    for ((joint, _), angle) in members.iter().zip(angles) {
+        if let Some(slot) = pose.get_mut(*joint) {
+            *slot = *angle;
+        }
+    }
     pose
 }
 

@@ -2,6 +2,7 @@
 use crate::capsule::{Capsule, segment_shape};
 use crate::contact::{ContactRule, Ruled};
 use crate::description::{Description, Geometry};
+use crate::group::{Group, Tip};
 use crate::link_margin::LinkMargins;
 use crate::mass::LinkMass;
 use crate::named_pose::{self, GroupState, NamedPose};
@@ -49,8 +50,12 @@ pub struct Robot {
     pub file: PathBuf,
     /// 1 to [`MAX_JOINTS`] joints, base to tip.
     pub joints: Vec<RobotJoint>,
-    /// Kinematics. Frame 0 is the base; the last frame is the flange of the last row, or the tip link of a URDF.
+    /// Kinematics. Frame 0 is the base; with rows the last frame is the flange of the last row, with a URDF each tip has its frame.
     pub chain: Chain,
+    /// What is led somewhere: one in a serial arm, in the order of [`Chain::tips`].
+    pub tips: Vec<Tip>,
+    /// Joints that belong together, as the arms of a robot with two.
+    pub groups: Vec<Group>,
     /// Names of the links: "base", "link1", ... with rows, where link i has frame i; those of the URDF otherwise.
     pub links: Vec<String>,
     /// Collision shapes. Their poses: `chain.frames(pose)[shape.frame] * shape.pose`.
@@ -134,7 +139,9 @@ impl Robot {
     /// Makes the robot of a description without faults.
     fn build(fault_list: &FaultList, description: &Description, touching: Touching) -> Option<Self> {
         let parts = Parts::of(description);
-        let Some(chain) = Chain::new(&parts.chain) else {
+let (chain_joints, parents): (Vec<ChainJoint>, Vec<usize>) = parts.chain.iter().copied().unzip();
+        let frames: Vec<usize> = parts.tips.iter().map(|tip| tip.frame).collect();
+        let Some(chain) = Chain::tree(&chain_joints, &parents, &frames) else {
             fault_list.add(
                 None,
                 "joint",
@@ -156,13 +163,14 @@ impl Robot {
         for pair in &ruled.close {
             margins.set(*pair, 0.0);
         }
-        let tip = (chain.joints(), Pose::identity());
+        let tip = (chain.tip_frame(), Pose::identity());
         let outside = modelled::masses_outside(&parts.links, &parts.shapes, &parts.masses);
         let listed = |name: &String| description.unmodelled_links.contains(name);
         let unlisted_links = parts.moving_bare.iter().filter(|name| !listed(name)).cloned().collect();
         let payload = description.payload.map(|weight| LinkMass::placed(&weight, parts.tip_link, tip));
         let (states, mut notices) = (&parts.states, Vec::new());
-        let poses = named_pose::of_states(states, &description.joints, &description.poses, &mut notices);
+        let of = (description.joints.as_slice(), description.groups.as_slice());
+        let poses = named_pose::of_states(states, of, &description.poses, &mut notices);
         let joints = description.joints.iter();
         let digest = digest::of(description);
         Some(Self {
@@ -175,6 +183,8 @@ impl Robot {
                     torque_nm_max: j.torque_nm_max,
                 })
                 .collect(),
+            tips: parts.tips,
+            groups: description.groups.clone(),
             links: parts.links,
             shapes: parts.shapes,
             masses: parts.masses.into_iter().chain(payload).collect(),
@@ -196,10 +206,27 @@ impl Robot {
             chain,
         })
     }
-    /// The pose of a name.
+    /// The pose of a name, of all joints.
     #[must_use]
     pub fn pose(&self, name: &str) -> Option<JointArray> {
-        self.poses.iter().find(|pose| pose.name == name).map(|pose| pose.position_rad)
+        self.poses.iter().find(|pose| pose.name == name && pose.group.is_none()).map(|pose| pose.position_rad)
+    }
+    /// The group of a name.
+    #[must_use]
+    pub fn group(&self, name: &str) -> Option<&Group> {
+        self.groups.iter().find(|group| group.name == name)
+    }
+    /// The same robot with some joints held where they stand: their ranges are these angles alone, so that nothing that is planned for
+    /// it moves them. A bit a joint. Digests and everything else stay.
+    #[must_use]
+    pub fn holding(&self, held_joints: u32, at_rad: &JointArray) -> Self {
+        let mut holding = self.clone();
+        for (index, (joint, at_rad)) in holding.joints.iter_mut().zip(at_rad).enumerate() {
+            if held_joints & (1 << index) != 0 {
+                joint.limits.position_rad = [*at_rad; 2];
+            }
+        }
+        holding
     }
     /// Limits as the motion crate takes them; unused slots are zero.
     #[must_use]
@@ -250,7 +277,9 @@ pub(crate) fn link_name(link: usize) -> String {
 
 /// What rows and URDF files both come down to.
 struct Parts {
-    chain: Vec<ChainJoint>,
+    /// Joints, each with the frame that it stands in.
+    chain: Vec<(ChainJoint, usize)>,
+    tips: Vec<Tip>,
     links: Vec<String>,
     shapes: Vec<LinkShape>,
     masses: Vec<LinkMass>,
@@ -272,10 +301,11 @@ impl Parts {
             Geometry::Rows(rows) => Self::of_rows(rows, &description.base_capsules),
             Geometry::Urdf(arm) => Self {
                 chain: arm.chain(),
+                tips: tips(arm.tips()),
                 links: arm.links(),
                 shapes: arm.shapes(),
                 masses: arm.masses(),
-                tip_link: arm.tip,
+                tip_link: arm.tips.first().copied().unwrap_or_default(),
                 bare_links: arm.bare_links(),
                 moving_bare: arm.moving_bare_links(),
                 ends: arm.ends(),
@@ -298,7 +328,8 @@ impl Parts {
         let links: Vec<String> = (0..=rows.len()).map(link_name).collect();
         let is_bare = |link: &usize| shapes.iter().all(|shape| shape.link != *link);
         Self {
-            chain: rows.iter().map(chain_joint).collect(),
+            chain: rows.iter().map(chain_joint).zip(0..).collect(),
+            tips: vec![Tip { name: link_name(rows.len()), frame: rows.len() }],
             bare_links: (0..links.len()).filter(is_bare).map(link_name).collect(),
             moving_bare: (1..links.len()).filter(is_bare).map(link_name).collect(),
             links,
@@ -312,6 +343,15 @@ impl Parts {
             notices: Vec::new(),
         }
     }
+}
+
+/// Each tip has the frame of the last joint that moves it.
+fn tips(named: Vec<(String, Vec<usize>)>) -> Vec<Tip> {
+    let tip = |(name, movers): (String, Vec<usize>)| Tip {
+        name,
+        frame: movers.last().map_or(0, |joint| joint + 1),
+    };
+    named.into_iter().map(tip).collect()
 }
 
 /// The mass of the link behind a joint; its frame moves with the joint in both conventions.

@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
-use taustream_arm::Robot;
+use taustream_arm::{Group, Robot};
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// One to eight finite angles, base to tip.
@@ -117,10 +117,43 @@ impl Angles {
         Ok(pose)
     }
 
+    /// The angles as a pose in which a group has them and the other joints those of `others_rad`.
+    ///
+    /// # Errors
+    /// When there is not one value a joint of the group.
+    pub(crate) fn pose_in(
+        &self,
+        (robot, group): (&Robot, Option<&Group>),
+        others_rad: &JointArray,
+        option: &str,
+    ) -> Result<JointArray, Failure> {
+        let Some(group) = group else { return self.pose_of(robot, option) };
+        let (got, joints) = (self.0.len(), group.joints.len());
+        if got != joints {
+            let names = group.joints.iter().filter_map(|joint| robot.joints.get(*joint));
+            let names: Vec<&str> = names.map(|joint| joint.name.as_str()).collect();
+            return Err(Failure::Usage(format!(
+                "{option} has {got} values, but group `{}` has {joints} joints; give one angle (rad) for each of: {}",
+                group.name,
+                names.join(", ")
+            )));
+        }
+        let mut pose = *others_rad;
+        for (joint, value) in group.joints.iter().zip(&self.0) {
+            if let Some(slot) = pose.get_mut(*joint) {
+                *slot = *value;
+            }
+        }
+        Ok(pose)
+    }
+
     /// A second sentence for values that look like degrees: beyond any turn, or beyond the joint's range while
     /// the same number in degrees lies inside it. It never changes what is done with them.
-    pub(crate) fn degrees_hint(&self, robot: &Robot) -> Option<String> {
-        let suspicious = self.0.iter().zip(&robot.joints).find(|(value, joint)| {
+    pub(crate) fn degrees_hint(&self, robot: &Robot, group: Option<&Group>) -> Option<String> {
+        let is_in = |joint: usize| group.is_none_or(|group| group.joints.contains(&joint));
+        let joints =
+            robot.joints.iter().enumerate().filter(|(joint, _)| is_in(*joint)).map(|(_, joint)| joint);
+        let suspicious = self.0.iter().zip(joints).find(|(value, joint)| {
             let [low, high] = joint.limits.position_rad;
             let outside = **value < low || **value > high;
             let as_degrees = **value * PI / 180.0;

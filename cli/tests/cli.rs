@@ -9,6 +9,8 @@ mod common;
 mod doctor;
 #[path = "cli/good_path.rs"]
 mod good_path;
+#[path = "cli/groups.rs"]
+mod groups;
 #[path = "cli/imports.rs"]
 mod imports;
 #[path = "cli/json.rs"]

@@ -31,7 +31,7 @@ pub struct PlanRequest {
     goal_rad: [f64; MAX_JOINTS],
     planner: Text,
     sender_pid: u32,
-    reserved: u32,
+    held_joints: u32,
     tip: TipGoalWire,
     way_points: WayPointsWire,
 }
@@ -55,6 +55,9 @@ pub struct CheckedPlanRequest {
     pub via_rad: Vec<JointArray>,
     /// How far from corners the motion may pass.
     pub blend: Blend,
+    /// Joints that the request says nothing of, a bit each: they hold, or go on to where they were led before. Their values count
+    /// nothing.
+    pub held_joints: u32,
     /// Where the tip shall end, instead.
     pub tip: Option<TipGoal>,
     /// When to replace it.
@@ -73,7 +76,21 @@ impl CheckedPlanRequest {
     pub fn to_pose(joints: usize, goal_rad: JointArray) -> Self {
         let (via_rad, blend, tip, when) = (Vec::new(), Blend::default(), None, When::AtOnce);
         let (deadline_ms, seed, planner) = (0, 1, String::new());
-        Self { joints, goal_rad, via_rad, blend, tip, when, deadline_ms, seed, planner }
+        Self { joints, goal_rad, via_rad, blend, held_joints: 0, tip, when, deadline_ms, seed, planner }
+    }
+
+    /// The same with the joints that it says nothing of where they are in another pose.
+    #[must_use]
+    pub fn holding_at(&self, pose_rad: &JointArray) -> Self {
+        let mut filled = self.clone();
+        for point in filled.via_rad.iter_mut().chain(std::iter::once(&mut filled.goal_rad)) {
+            for (joint, (q, held)) in point.iter_mut().zip(pose_rad).enumerate() {
+                if self.held_joints & (1 << joint) != 0 {
+                    *q = *held;
+                }
+            }
+        }
+        filled
     }
 
     /// The way points, and the goal behind them.
@@ -134,6 +151,16 @@ pub enum PlanRequestError {
         /// The code in the message.
         got: u32,
     },
+    /// Joints that are not there, or all of them.
+    #[error(
+        "the request holds the joints {got:#b} of {joints} (a bit each); it must leave at least one of them to move"
+    )]
+    Held {
+        /// The bits in the message.
+        got: u32,
+        /// How many joints there are.
+        joints: usize,
+    },
     /// A number of the tip's goal.
     #[error("the tip's {what} is {value}, which makes no sense")]
     Tip {
@@ -172,7 +199,7 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             goal_rad: r.goal_rad,
             planner: Text::new(&r.planner),
             sender_pid: std::process::id(),
-            reserved: 0,
+            held_joints: r.held_joints,
             tip: TipGoalWire::from(r.tip.as_ref()),
             way_points: WayPointsWire::new(&r.via_rad, r.blend),
         }
@@ -202,12 +229,17 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
                 return Err(PlanRequestError::Goal { joint, value_rad });
             }
         }
+        let all = u32::try_from((1_u64 << joints) - 1).unwrap_or(u32::MAX);
+        if r.held_joints & !all != 0 || r.held_joints == all {
+            return Err(PlanRequestError::Held { got: r.held_joints, joints });
+        }
         let (via_rad, blend) = r.way_points.read(joints)?;
         Ok(Self {
             joints,
             goal_rad: r.goal_rad,
             via_rad,
             blend,
+            held_joints: r.held_joints,
             tip: r.tip.read()?,
             when,
             deadline_ms: r.deadline_ms,

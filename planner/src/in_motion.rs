@@ -6,6 +6,7 @@
 //! ordinary plan from there. The last one always exists. Of those that are proven the shortest is taken. Way points before the
 //! goal, and the end of a motion that is gone on from, are corners: they are rounded where that is proven, else the arm stops at them.
 use crate::budget::Budget;
+use crate::held::held;
 use crate::pipeline::blends_rad;
 use crate::plan::{
     Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_through_until,
@@ -123,6 +124,8 @@ pub struct Surroundings<'a> {
     pub scene: &'a Scene,
     /// Set when nobody waits for the result any more.
     pub cancel: &'a AtomicBool,
+    /// Joints that no plan from rest moves whose points leave them where they are, a bit each.
+    pub held_joints: u32,
 }
 
 impl Surroundings<'_> {
@@ -300,7 +303,16 @@ impl Surroundings<'_> {
         points_rad: &[JointArray],
         options: &PlanOptions,
     ) -> Result<Plan, NoReplacement> {
-        let (robot, scene, margin) = (self.robot, self.scene, StartMargin::AsItStands);
+        let (held, points_rad) = held(self.held_joints, start_rad, points_rad);
+        let holding;
+        let robot = if held == 0 {
+            self.robot
+        } else {
+            holding = self.robot.holding(held, start_rad);
+            &holding
+        };
+        let (scene, margin) = (self.scene, StartMargin::AsItStands);
+        let points_rad = points_rad.as_slice();
         if let [goal_rad] = points_rad {
             let task = Task { robot, scene, start_rad: *start_rad, goal_rad: *goal_rad, margin };
             return Ok(plan_until(&task, options, Some(self.cancel))?);

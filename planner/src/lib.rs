@@ -13,6 +13,7 @@ pub mod enter;
 pub mod explain;
 pub mod foraging;
 pub mod goals;
+pub mod held;
 pub mod import;
 pub mod in_motion;
 pub mod kept_scene;
@@ -46,5 +47,5 @@ pub use taustream_messages::way_points::Blend;
 
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
-pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, plan, plan_through};
+pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, check_pose, plan, plan_through};
 pub use verify::{Contact, Proof, Violation, verify};

@@ -118,6 +118,16 @@ pub enum SceneChangeError {
         /// The name.
         name: String,
     },
+    /// It is not said which tip is meant.
+    #[error(
+        "{name:?} cannot be fixed to the tip: the robot has {tips} tips, and objects are fixed to the tip of robots with one only"
+    )]
+    SeveralTips {
+        /// The name.
+        name: String,
+        /// How many.
+        tips: usize,
+    },
     /// Nobody knows where the tip is.
     #[error(
         "where the tip is must be known, and the arm at rest, to attach or detach {name:?}: wait until it rests, or pause it"
@@ -284,6 +294,9 @@ impl Draft<'_> {
                     return Err(SceneChangeError::Exists { name: name.clone() });
                 }
                 let shape = shape_to(shape).ok_or_else(|| SceneChangeError::Mesh { name: name.clone() })?;
+                if *fixed_to == FixedTo::Tip {
+                    self.check_tip(name)?;
+                }
                 let object = Obstacle { name: name.clone(), pose: pose_to(pose), shape };
                 self.put(object, *fixed_to, *mass_kg);
             }
@@ -316,6 +329,7 @@ impl Draft<'_> {
         if fixed_to == FixedTo::Tip {
             return Err(SceneChangeError::Attached { name: name.to_owned() });
         }
+        self.check_tip(name)?;
         if matches!(object.shape, Shape::Mesh { .. } | Shape::Hull { .. }) {
             return Err(SceneChangeError::Mesh { name: name.to_owned() });
         }
@@ -333,6 +347,14 @@ impl Draft<'_> {
         object.pose = self.tip(name)? * object.pose;
         self.put(object, FixedTo::Base, 0.0);
         Ok(())
+    }
+
+    /// Refuses to fix anything where there are several tips.
+    fn check_tip(&self, name: &str) -> Result<(), SceneChangeError> {
+        match self.robot.tips.len() {
+            1 => Ok(()),
+            tips => Err(SceneChangeError::SeveralTips { name: name.to_owned(), tips }),
+        }
     }
 
     /// The tip in the base's frame.
@@ -417,7 +439,7 @@ fn check_held(
 /// The robot with what its tip holds: each object is a link, and its mass is that of a point in its origin.
 fn carrying(robot: &Robot, attached: &[Attached]) -> Robot {
     let mut robot = robot.clone();
-    let frame = robot.joints.len();
+    let frame = robot.chain.tip_frame();
     for Attached { object: Obstacle { name, pose, shape }, mass_kg } in attached {
         let link = robot.links.len();
         robot.links.push(name.clone());

@@ -578,7 +578,10 @@ fn check_numbers(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<
 }
 
 /// Refuses a pose that no arm has, or that lies outside the limits by more than the tolerance.
-pub(crate) fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
+///
+/// # Errors
+/// The first joint whose value is none, or outside.
+pub fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result<(), PlanError> {
     check_numbers(robot, which, pose_rad)?;
     for (joint, (described, &value_rad)) in robot.joints.iter().zip(pose_rad).enumerate() {
         let limits = &described.limits;

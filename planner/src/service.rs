@@ -11,6 +11,7 @@ mod scene_effect;
 mod streaming;
 mod tip;
 
+use crate::held::check_held;
 use crate::kept_scene::{SceneFile, restore};
 use crate::kind::PlannerKind;
 use crate::live_scene::LiveScene;
@@ -20,6 +21,7 @@ use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -279,7 +281,8 @@ impl<'a> Service<'a> {
                 Err("a straight line of the tip passes no way points".to_owned())
             }
             Some(line) if rests => {
-                let plan = self.plan_straight(request, report.command_rad, (tip, line, options))?;
+                let start = (report.command_rad, requested.held_joints);
+                let plan = self.plan_straight(request, start, (tip, line, options))?;
                 Ok(self.send(request, &plan))
             }
             Some(_) if moving::runs(phase) => {
@@ -304,8 +307,9 @@ impl<'a> Service<'a> {
         start_rad: JointArray,
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
     ) -> Result<Plan, String> {
-        let (revision, goal_rad) = (self.revision(), requested.goal_rad);
-        let (robot, scene) = (&*revision.robot, &*revision.scene);
+        let (revision, requested) = (self.revision(), requested.holding_at(&start_rad));
+        let robot = holding(&revision.robot, requested.held_joints, &start_rad);
+        let (robot, scene, goal_rad) = (&*robot, &*revision.scene, requested.goal_rad);
         // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
         let task = Task { robot, scene, start_rad, goal_rad, margin: StartMargin::AsItStands };
         let points_rad = requested.points_rad();
@@ -317,6 +321,7 @@ impl<'a> Service<'a> {
             plan_through_until((robot, scene, StartMargin::AsItStands), &all_rad, options, Some(cancel))
         })?;
         let plan = planned.map_err(|e: PlanError| e.to_string())?;
+        check_held(robot, &plan.trajectory, requested.held_joints).map_err(|e| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)
     }
@@ -477,6 +482,11 @@ impl Seen {
     fn is_recent(&self) -> bool {
         self.at.is_some_and(|at| at.elapsed() <= REPORT_WITHIN)
     }
+}
+
+/// The robot, with joints that hold where they stand.
+fn holding<'r>(robot: &'r Robot, held_joints: u32, at_rad: &JointArray) -> Cow<'r, Robot> {
+    if held_joints == 0 { Cow::Borrowed(robot) } else { Cow::Owned(robot.holding(held_joints, at_rad)) }
 }
 
 fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {

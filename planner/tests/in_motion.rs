@@ -41,7 +41,7 @@ fn most_used(trajectory: &Trajectory, cut_s: f64, limits: &[JointLimits; MAX_JOI
 #[test]
 fn dropping_pending_strokes_alone_leaves_the_limits() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let limits = robot.limits();
     let first = train(&limits);
     let mut motions = vec![(first.clone(), 0.0)];
@@ -88,7 +88,7 @@ fn options() -> PlanOptions {
 #[test]
 fn motion_after_the_end_goes_on_from_there_bit_by_bit() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     let end_s = running.duration_s();
     for from_s in [end_s, 0.4 * end_s] {
@@ -116,7 +116,7 @@ fn motion_after_the_end_goes_on_from_there_bit_by_bit() {
 #[test]
 fn taper_direct_and_rest_first_keep_the_limits_and_what_has_begun() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     for step in 1..12 {
         let at_s = running.duration_s() * f64::from(step) / 12.0;
@@ -141,7 +141,7 @@ fn taper_direct_and_rest_first_keep_the_limits_and_what_has_begun() {
 #[test]
 fn replacements_without_known_strokes_or_with_too_many_say_so() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     let cut = CutPoint { trajectory: None, ..cut_point(&running, (0.3, 0.3)) };
     assert_eq!(around.taper(&cut, &options()), Err(NoReplacement::Unknown));
@@ -192,7 +192,7 @@ fn slowest_and_off(motion: &Trajectory, [from_s, to_s]: [f64; 2], lines: &[[f64;
 #[test]
 fn queued_motion_rounds_the_corner_within_the_blend() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     let end_s = running.duration_s();
     for (goal, saved, least_rad_s) in [
@@ -233,7 +233,7 @@ fn queued_motion_rounds_the_corner_within_the_blend() {
 #[test]
 fn queued_motion_stops_where_no_corner_may_be_rounded() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     let end_s = running.duration_s();
     let end = cut_point(&running, (end_s, end_s));
@@ -253,7 +253,7 @@ fn queued_motion_stops_where_no_corner_may_be_rounded() {
 #[test]
 fn replacement_passes_way_points_within_the_blend() {
     let (robot, scene, cancel) = (ur5(), scene("open"), AtomicBool::new(false));
-    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel };
+    let around = Surroundings { robot: &robot, scene: &scene, cancel: &cancel, held_joints: 0 };
     let running = train(&robot.limits());
     let points = [[0.9, -1.1, 1.5, -1.5, -1.57, 0.2], [0.2, -1.0, 1.2, -1.2, -1.2, -0.4], THERE].map(pose);
     for share in [0.2, 0.5, 0.8] {

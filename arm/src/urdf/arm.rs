@@ -1,7 +1,7 @@
-//! The arm in a URDF: the chain from base to tip, and the geometry that hangs on it.
+//! The arm in a URDF: the chain from base to tip, or the tree to several tips, and the geometry that hangs on it.
 //!
 //! Links are gathered by the frame that they are rigid with: frame 0 is the base link, frame i the link behind the i-th
-//! joint of the arm, and the last frame the tip link. Joints off the chain do not move.
+//! joint of the arm, or the tip link that is rigid with it. Joints that lead to no tip do not move.
 use super::mesh_part::MeshPart;
 use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid, StatedLimits};
 use super::tree::Tree;
@@ -22,7 +22,7 @@ use taustream_motion::MAX_JOINTS;
 use taustream_motion::chain::{ChainJoint, Pose};
 
 /// Keys of a robot file that say where a URDF is and which part of it is the arm.
-pub(crate) const KEYS: [&str; 5] = ["urdf", "srdf", "tip_link", "base_link", "package_dirs"];
+pub(crate) const KEYS: [&str; 6] = ["urdf", "srdf", "tip_link", "tip_links", "base_link", "package_dirs"];
 
 /// What a URDF says about a joint of the arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,11 +60,9 @@ pub(crate) struct UrdfArm {
     pub(crate) tree: Tree,
     /// Index of the base link.
     pub(crate) base: usize,
-    /// Index of the tip link.
-    pub(crate) tip: usize,
-    /// The joints from base to tip, fixed ones included.
-    pub(crate) path: Vec<usize>,
-    /// Those of them that move.
+    /// Indices of the tip links.
+    pub(crate) tips: Vec<usize>,
+    /// The joints from the base to the tips that move, each after those that carry it.
     pub(crate) moving: Vec<usize>,
     pub(crate) fixed_joints: Vec<FixedJoint>,
     pub(crate) parts: Vec<SolidPart>,
@@ -82,7 +80,8 @@ pub(crate) struct UrdfArm {
 struct Keys {
     urdf: PathBuf,
     srdf: Option<PathBuf>,
-    tip_link: Option<String>,
+    /// `tip_link` or `tip_links`, and what it says.
+    tips: Option<(&'static str, Vec<String>)>,
     base_link: Option<String>,
     package_dirs: Vec<PathBuf>,
 }
@@ -108,32 +107,27 @@ impl UrdfArm {
         let semantics =
             keys.srdf.as_ref().map(|file| srdf::load(top.fault_list(), file, &model)).unwrap_or_default();
         let (allowed, states) = (semantics.allowed, semantics.states);
-        let tip = named_link(top, &model, &tree, "tip_link", keys.tip_link.as_deref());
+        let (tip_key, tip_names) = keys.tips.clone().unwrap_or(("tip_link", Vec::new()));
+        let tips: Vec<Option<usize>> =
+            tip_names.iter().map(|name| named_link(top, &model, &tree, tip_key, Some(name))).collect();
         let base = match &keys.base_link {
             Some(name) => named_link(top, &model, &tree, "base_link", Some(name)),
             None => tree.order.first().copied(),
         };
-        let (base, tip) = (base?, tip?);
-        let path = path(top, &model, &tree, (base, tip))?;
-        let moving = moving(top, &model, &path)?;
+        let base = base?;
+        let tips = tips.into_iter().collect::<Option<Vec<usize>>>().filter(|tips| !tips.is_empty())?;
+        let mut paths: Vec<Vec<usize>> = Vec::new();
+        for tip in &tips {
+            paths.push(path(top, &model, &tree, (base, *tip), tip_key)?);
+        }
+        let moving = moving(top, &model, (tip_key, &paths))?;
+        check_tips(top, (tip_key, &tip_names), &paths, &moving)?;
         let (parts, skipped, mut notices) = parts?;
         let fixed_joints = fixed_joints(&model, &moving, &mut notices);
         say_bare_links(&model, &mut notices);
         say_odd_moments(&model, &mut notices);
-        let arm = Self {
-            model,
-            tree,
-            base,
-            tip,
-            path,
-            moving,
-            fixed_joints,
-            parts,
-            skipped,
-            allowed,
-            states,
-            notices,
-        };
+        let arm =
+            Self { model, tree, base, tips, moving, fixed_joints, parts, skipped, allowed, states, notices };
         top.fault_list().is_clean().then_some(arm)
     }
     /// What the file says about the arm's joints, base to tip.
@@ -149,10 +143,25 @@ impl UrdfArm {
     pub(crate) fn links(&self) -> Vec<String> {
         self.model.links.iter().map(|link| link.name.clone()).collect()
     }
-    /// Names of the base link and the tip link.
+    /// Names of the base link and the first tip link.
     pub(crate) fn ends(&self) -> Option<[String; 2]> {
         let name = |link: usize| self.model.links.get(link).map(|link| link.name.clone());
-        Some([name(self.base)?, name(self.tip)?])
+        Some([name(self.base)?, name(*self.tips.first()?)?])
+    }
+    /// The tips, each with the joints of the arm that move it, base first.
+    pub(crate) fn tips(&self) -> Vec<(String, Vec<usize>)> {
+        let name = |link: usize| self.model.links.get(link).map_or(String::new(), |link| link.name.clone());
+        let tip = |link: &usize| (name(*link), self.movers(*link));
+        self.tips.iter().map(tip).collect()
+    }
+    /// The joints of the arm that move a link, base first, counted in the order of the arm.
+    fn movers(&self, link: usize) -> Vec<usize> {
+        let path = self.tree.path(&self.model, self.base, link).unwrap_or_default();
+        path.iter().filter_map(|joint| self.moving.iter().position(|moving| moving == joint)).collect()
+    }
+    /// The tip link that is rigid with a frame, if there is one.
+    fn tip_of(&self, frame: usize) -> Option<usize> {
+        self.tips.iter().copied().find(|tip| self.movers(*tip).last().map_or(0, |joint| joint + 1) == frame)
     }
     /// Names of the links that have no collision geometry.
     pub(crate) fn bare_links(&self) -> Vec<String> {
@@ -182,23 +191,38 @@ impl UrdfArm {
         });
         unmodelled.map(|(_, link)| link.name.clone()).collect()
     }
-    /// The chain; fixed joints are part of what stands before the next joint that moves, or behind the last.
-    pub(crate) fn chain(&self) -> Vec<ChainJoint> {
-        let mut joints: Vec<ChainJoint> = Vec::new();
-        let mut before = Pose::identity();
-        for index in &self.path {
-            let Some(joint) = self.model.joints.get(*index) else { continue };
-            before *= pose(&joint.origin);
-            if self.moving.contains(index) {
-                let axis = Unit::new_normalize(Vector3::from(joint.axis));
-                joints.push(ChainJoint { pre: before, axis, offset_rad: 0.0, post: Pose::identity() });
-                before = Pose::identity();
-            }
-        }
-        if let Some(last) = joints.last_mut() {
-            last.post = before;
-        }
-        joints
+    /// The joints, each with the frame that it stands in; fixed joints are part of what stands before the next joint that moves, or
+    /// between the last one and a tip.
+    pub(crate) fn chain(&self) -> Vec<(ChainJoint, usize)> {
+        let origins = |mut before: Pose, path: &[usize]| {
+            path.iter()
+                .filter_map(|joint| self.model.joints.get(*joint))
+                .for_each(|joint| before *= pose(&joint.origin));
+            before
+        };
+        // From the link behind a joint to the tip that is rigid with it.
+        let to_tip = |index: usize| -> Option<Pose> {
+            let joint = self.model.joints.get(*self.moving.get(index)?)?;
+            let path = self.tree.path(&self.model, joint.child, self.tip_of(index + 1)?)?;
+            Some(origins(Pose::identity(), &path))
+        };
+        let posts: Vec<Option<Pose>> = (0..self.moving.len()).map(to_tip).collect();
+        let chain_joint = |(index, joint): (usize, &usize)| {
+            let of = self.model.joints.get(*joint)?;
+            let parent = self.movers(of.parent).last().copied();
+            let from = match parent {
+                Some(parent) => self.model.joints.get(*self.moving.get(parent)?)?.child,
+                None => self.base,
+            };
+            let path = self.tree.path(&self.model, from, of.child)?;
+            // A frame that a tip stands in is that tip's.
+            let tip = parent.and_then(|parent| posts.get(parent).copied().flatten());
+            let pre = origins(tip.map_or(Pose::identity(), |tip| tip.inverse()), &path);
+            let axis = Unit::new_normalize(Vector3::from(of.axis));
+            let post = posts.get(index).copied().flatten().unwrap_or_default();
+            Some((ChainJoint { pre, axis, offset_rad: 0.0, post }, parent.map_or(0, |parent| parent + 1)))
+        };
+        self.moving.iter().enumerate().filter_map(chain_joint).collect()
     }
     /// The pose of each link: the frame that it is rigid with, and its pose there.
     pub(crate) fn placed(&self) -> Vec<(usize, Pose)> {
@@ -218,14 +242,14 @@ impl UrdfArm {
                 *slot = here;
             }
         }
-        // Frame 0 is the base link and not the root, the last frame the tip link and not the link behind the last joint.
+        // Frame 0 is the base link and not the root, the frame of a tip that tip and not the link behind its joint.
         let inside = |link: usize| placed.get(link).map_or(Pose::identity(), |(_, pose)| pose.inverse());
-        let (from_base, from_tip) = (inside(self.base), inside(self.tip));
+        let from: Vec<Option<Pose>> = (0..=self.moving.len())
+            .map(|frame| if frame == 0 { Some(self.base) } else { self.tip_of(frame) }.map(inside))
+            .collect();
         for (frame, pose) in &mut placed {
-            if *frame == 0 {
-                *pose = from_base * *pose;
-            } else if *frame == self.moving.len() {
-                *pose = from_tip * *pose;
+            if let Some(from) = from.get(*frame).copied().flatten() {
+                *pose = from * *pose;
             }
         }
         placed
@@ -320,22 +344,51 @@ fn read_keys(top: &mut Table<'_>) -> Option<Keys> {
     let beside = |named: &str| document::beside(&robot_file, named);
     let urdf = top.text("urdf", "the path of a URDF file, relative to this file");
     let srdf = top.text_if_there("srdf", "the path of an SRDF file, relative to this file");
-    let tip_link = top.text("tip_link", "the name of the link whose frame is the tip");
+    let tips = read_tips(top);
     let base_link =
         top.text_if_there("base_link", "the name of the link whose frame is the base (default: the root)");
     let package_dirs = read_package_dirs(top);
     Some(Keys {
         urdf: beside(&urdf?),
         srdf: srdf.map(|named| beside(&named)),
-        tip_link,
+        tips,
         base_link,
         package_dirs: package_dirs.iter().map(|named| beside(named)).collect(),
     })
 }
 
+/// The tip link, or several.
+fn read_tips(top: &mut Table<'_>) -> Option<(&'static str, Vec<String>)> {
+    const ONE: &str = "tip_link";
+    const SEVERAL: &str = "tip_links";
+    const EXPECTED: &str = "a list of links, each once, whose frames are tips";
+    if !top.has(SEVERAL) {
+        top.take(SEVERAL);
+        return Some((ONE, vec![top.text(ONE, "the name of the link whose frame is the tip")?]));
+    }
+    let names = read_texts(top, SEVERAL, EXPECTED);
+    if top.take(ONE).is_some() {
+        top.fault(ONE, "given beside tip_links", "one of the two");
+        return None;
+    }
+    let is_repeated = |(i, name): (usize, &String)| names.iter().take(i).any(|other| other == name);
+    if let Some(name) = names.iter().enumerate().find(|named| is_repeated(*named)).map(|(_, name)| name) {
+        top.fault(SEVERAL, &shown(name), "each tip once");
+        return None;
+    }
+    if names.is_empty() && top.fault_list().is_clean() {
+        top.fault(SEVERAL, "[]", EXPECTED);
+    }
+    (!names.is_empty()).then_some((SEVERAL, names))
+}
+
 fn read_package_dirs(top: &mut Table<'_>) -> Vec<String> {
-    const EXPECTED: &str = "a list of folders that packages are looked for in";
-    let Some(node) = top.take("package_dirs") else { return Vec::new() };
+    read_texts(top, "package_dirs", "a list of folders that packages are looked for in")
+}
+
+/// A list of texts; none when the key is not there.
+fn read_texts(top: &mut Table<'_>, key: &'static str, expected: &str) -> Vec<String> {
+    let Some(node) = top.take(key) else { return Vec::new() };
     let texts: Option<Vec<String>> = match &node.value {
         Value::List(items) => items
             .iter()
@@ -349,7 +402,7 @@ fn read_package_dirs(top: &mut Table<'_>) -> Vec<String> {
         | Value::Other(_) => None,
     };
     if texts.is_none() {
-        top.fault("package_dirs", &node.to_string(), EXPECTED);
+        top.fault(key, &node.to_string(), expected);
     }
     texts.unwrap_or_default()
 }
@@ -431,43 +484,80 @@ fn named_link(
     link
 }
 
-fn path(top: &Table<'_>, model: &Model, tree: &Tree, (base, tip): (usize, usize)) -> Option<Vec<usize>> {
+fn path(
+    top: &Table<'_>,
+    model: &Model,
+    tree: &Tree,
+    (base, tip): (usize, usize),
+    key: &'static str,
+) -> Option<Vec<usize>> {
     let path = tree.path(model, base, tip);
     if path.is_none() {
         let name = |link: usize| model.links.get(link).map_or(String::new(), |link| shown(&link.name));
-        top.fault("tip_link", &name(tip), &format!("a link that hangs on the base link {}", name(base)));
+        top.fault(key, &name(tip), &format!("a link that hangs on the base link {}", name(base)));
     }
     path
 }
 
-/// The joints of the arm: revolute or continuous ones, each free.
-fn moving(top: &Table<'_>, model: &Model, path: &[usize]) -> Option<Vec<usize>> {
-    let mut moving = Vec::new();
-    for (index, joint) in path.iter().filter_map(|index| Some((*index, model.joints.get(*index)?))) {
+/// The joints of the arm, revolute or continuous ones, each free, in the order of the paths to the tips.
+fn moving(top: &Table<'_>, model: &Model, (key, paths): (&'static str, &[Vec<usize>])) -> Option<Vec<usize>> {
+    let (mut moving, mut seen) = (Vec::new(), Vec::new());
+    for (index, joint) in paths.iter().flatten().filter_map(|index| Some((*index, model.joints.get(*index)?)))
+    {
+        // Two paths begin alike where their tips share a torso.
+        if seen.contains(&index) {
+            continue;
+        }
+        seen.push(index);
         let value = format!("joint {} ({}) between base and tip", shown(&joint.name), joint.kind.word());
         match (joint.kind, &joint.mimic) {
             (Kind::Fixed, _) => {}
             (Kind::Revolute | Kind::Continuous, None) => moving.push(index),
             (Kind::Revolute | Kind::Continuous, Some(mimic)) => {
                 let expected = "joints that each have a servo of their own; linkages are not supported";
-                top.fault(
-                    "tip_link",
-                    &format!("{value}, which follows joint {}", shown(&mimic.joint)),
-                    expected,
-                );
+                top.fault(key, &format!("{value}, which follows joint {}", shown(&mimic.joint)), expected);
             }
             (Kind::Prismatic | Kind::Planar | Kind::Floating, _) => {
                 let expected = "revolute, continuous and fixed joints only: angles, limits and servos are in radians here";
-                top.fault("tip_link", &value, expected);
+                top.fault(key, &value, expected);
             }
         }
     }
     if (1..=MAX_JOINTS).contains(&moving.len()) {
         return Some(moving);
     }
-    let expected = format!("1 to {MAX_JOINTS} joints between base and tip");
-    top.fault("tip_link", &format!("{} joints that move", moving.len()), &expected);
+    let where_from = if paths.len() > 1 { "the tips together" } else { "tip" };
+    let expected = format!("1 to {MAX_JOINTS} joints between base and {where_from}");
+    top.fault(key, &format!("{} joints that move", moving.len()), &expected);
     None
+}
+
+/// Every tip is moved, and each by a joint of its own: a frame is one tip's.
+fn check_tips(
+    top: &Table<'_>,
+    (key, names): (&'static str, &[String]),
+    paths: &[Vec<usize>],
+    moving: &[usize],
+) -> Option<()> {
+    let last = |path: &Vec<usize>| path.iter().rev().find(|joint| moving.contains(joint)).copied();
+    let mut others: Vec<(usize, &String)> = Vec::new();
+    for (name, path) in names.iter().zip(paths) {
+        let Some(joint) = last(path) else {
+            top.fault(key, &shown(name), "a link that a joint moves against the base");
+            return None;
+        };
+        if let Some((_, other)) = others.iter().find(|(known, _)| *known == joint) {
+            let value = format!("{} and {}", shown(other), shown(name));
+            top.fault(
+                key,
+                &value,
+                "tips that each hang on a joint of their own: these two are rigid with each other",
+            );
+            return None;
+        }
+        others.push((joint, name));
+    }
+    Some(())
 }
 
 /// Joints off the chain stay where they are; at 0, or as near to it as their range goes.

@@ -10,14 +10,13 @@ impl UrdfArm {
     /// Numbers as the files state them, and not what is derived from them: a sine may differ by a bit between two
     /// machines, a digest must not.
     pub(crate) fn put(&self, out: &mut Vec<u8>) {
-        // Taken apart, so that a new field cannot be forgotten here without the compiler saying so. Path and moving
-        // joints follow from the rest, notices mean nothing.
+        // Taken apart, so that a new field cannot be forgotten here without the compiler saying so. The moving
+        // joints follow from the rest, notices mean nothing. Tips beyond the first come with the groups.
         let Self {
             model,
             tree: _,
             base,
-            tip,
-            path: _,
+            tips,
             moving: _,
             fixed_joints,
             parts,
@@ -28,7 +27,7 @@ impl UrdfArm {
         } = self;
         let Model { name: _, links, joints } = model;
         put_count(out, *base);
-        put_count(out, *tip);
+        put_count(out, tips.first().copied().unwrap_or_default());
         put_count(out, links.len());
         for link in links {
             put_link(out, link);

@@ -2,14 +2,19 @@
 use crate::angles::{Angles, Position, TipPose, Tolerances};
 use crate::failure::Failure;
 use clap::{ArgGroup, Args};
-use taustream_arm::Robot;
-use taustream_motion::JointArray;
+use taustream_arm::{Group, NamedPose, Robot};
+use taustream_motion::{JointArray, MAX_JOINTS};
 use taustream_planner::goals::{Orientation, TipSpeed, TipTarget, nearest_turn};
 
 /// A goal.
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("goal_kind").required(true)))]
 pub(crate) struct GoalArgs {
+    /// Move the joints of one group only (`[[group]]` of the robot file): goals have its values, and the other joints hold.
+    ///
+    /// --to-position and --to-pose are for the group's tip: a robot with several tips needs the group to say which.
+    #[arg(long, value_name = "NAME")]
+    group: Option<String>,
     /// Goal pose, rad, one value per joint; a value may have a unit: "90deg". Several: the best of them is taken.
     #[arg(long, value_name = "RAD,..", allow_hyphen_values = true, group = "goal_kind")]
     goal: Vec<Angles>,
@@ -84,24 +89,33 @@ pub(crate) enum Goal {
 }
 
 impl GoalArgs {
-    /// The goal of an arm that starts somewhere.
+    /// The group that alone moves, if one was named.
     ///
     /// # Errors
-    /// Not one value a joint, or a name that no pose has.
+    /// A name that no group of the robot has.
+    pub(crate) fn group_of<'r>(&self, robot: &'r Robot) -> Result<Option<&'r Group>, Failure> {
+        group_of(robot, self.group.as_deref())
+    }
+
+    /// The goal of an arm that starts somewhere; joints of other groups stay there.
+    ///
+    /// # Errors
+    /// Not one value a joint, a name that no pose has, or a tip that is not named.
     pub(crate) fn of(&self, robot: &Robot, start_rad: &JointArray) -> Result<Goal, Failure> {
+        let group = self.group_of(robot)?;
         if let Some(target) = self.tip() {
-            return Ok(Goal::Tip(target));
+            return Ok(Goal::Tip(TipTarget { tip: tip_of(robot, group)?, ..target }));
         }
         let mut poses_rad = Vec::new();
         for (angles, option) in self.angles() {
-            poses_rad.push(angles.pose_of(robot, option)?);
+            poses_rad.push(angles.pose_in((robot, group), start_rad, option)?);
         }
         if let Some((angles, option)) = self.relative() {
-            let by_rad = angles.pose_of(robot, option)?;
+            let by_rad = angles.pose_in((robot, group), &[0.0; MAX_JOINTS], option)?;
             poses_rad.push(std::array::from_fn(|i| start_rad[i] + by_rad[i]));
         }
         if let Some(name) = &self.to_named {
-            poses_rad.push(robot.pose(name).ok_or_else(|| no_such_pose(robot, name))?);
+            poses_rad.push(named_pose(robot, group, start_rad, name)?);
         }
         if self.nearest_turn {
             poses_rad.iter_mut().for_each(|pose| *pose = nearest_turn(robot, start_rad, pose));
@@ -147,8 +161,80 @@ impl GoalArgs {
     }
 }
 
+/// The group of a name, if one was given.
+///
+/// # Errors
+/// A name that no group of the robot has.
+pub(crate) fn group_of<'r>(robot: &'r Robot, name: Option<&str>) -> Result<Option<&'r Group>, Failure> {
+    let Some(name) = name else { return Ok(None) };
+    let no_such_group = || {
+        let names: Vec<&str> = robot.groups.iter().map(|group| group.name.as_str()).collect();
+        let known = if names.is_empty() {
+            "none; add [[group]] tables with name and tip_link or joints to the robot file".to_owned()
+        } else {
+            names.join(", ")
+        };
+        Failure::Usage(format!("--group: robot `{}` has no group `{name}`; it has: {known}", robot.name))
+    };
+    robot.group(name).map(Some).ok_or_else(no_such_group)
+}
+
+/// The tip that a group leads, or the only one.
+///
+/// # Errors
+/// Several tips and no group, or a group that leads none of its own.
+pub(crate) fn tip_of(robot: &Robot, group: Option<&Group>) -> Result<usize, Failure> {
+    let (tips, name) = (&robot.tips, &robot.name);
+    match group {
+        Some(group) => group.tip.ok_or_else(|| {
+            Failure::Usage(format!(
+                "--group {}: it leads no tip of its own; give it a tip_link in the robot file, or a goal of the joints",
+                group.name
+            ))
+        }),
+        None if tips.len() == 1 => Ok(0),
+        None => {
+            let led = robot.groups.iter().filter_map(|g| Some(format!("{} ({})", g.name, tips.get(g.tip?)?.name)));
+            let led: Vec<String> = led.collect();
+            let tips: Vec<&str> = tips.iter().map(|tip| tip.name.as_str()).collect();
+            let remedy = if led.is_empty() {
+                "add a [[group]] with tip_link for each to the robot file".to_owned()
+            } else {
+                led.join(", ")
+            };
+            Err(Failure::Usage(format!(
+                "robot `{name}` has several tips ({}); say which one by --group: {remedy}",
+                tips.join(", ")
+            )))
+        }
+    }
+}
+
+/// A pose by its name: of the group, or the group's part of one of all joints; without a group one of all joints.
+fn named_pose(
+    robot: &Robot,
+    group: Option<&Group>,
+    start_rad: &JointArray,
+    name: &str,
+) -> Result<JointArray, Failure> {
+    let Some(group) = group else {
+        return robot.pose(name).ok_or_else(|| no_such_pose(robot, name));
+    };
+    let is_own = |of: usize| robot.groups.get(of).is_some_and(|of| of.name == group.name);
+    let own = robot.poses.iter().find(|pose| pose.name == name && pose.group.is_some_and(is_own));
+    let found = own.map(|pose| pose.position_rad).or_else(|| robot.pose(name));
+    let found = found.ok_or_else(|| no_such_pose(robot, name))?;
+    let mut pose_rad = *start_rad;
+    group.joints.iter().for_each(|joint| pose_rad[*joint] = found[*joint]);
+    Ok(pose_rad)
+}
+
 fn no_such_pose(robot: &Robot, name: &str) -> Failure {
-    let names: Vec<&str> = robot.poses.iter().map(|pose| pose.name.as_str()).collect();
+    let word = |pose: &NamedPose| match pose.group.and_then(|group| robot.groups.get(group)) {
+        Some(group) => format!("{} (--group {})", pose.name, group.name),
+        None => pose.name.clone(),
+    };
+    let names: Vec<String> = robot.poses.iter().map(word).collect();
     let known = if names.is_empty() {
         "none; add a [[pose]] table with name and position_rad to the robot file".to_owned()
     } else {

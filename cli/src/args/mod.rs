@@ -15,7 +15,7 @@ mod timing;
 mod via;
 
 pub(crate) use axis::{AxisAction, AxisArgs};
-pub(crate) use goal::Goal;
+pub(crate) use goal::{Goal, group_of, tip_of};
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
     CancelArgs, CommandArgs, DemoArgs, HomeArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs,

@@ -49,6 +49,9 @@ pub(crate) struct JogArgs {
     /// Axis to move the tip along; its rotation is held.
     #[arg(long, value_name = "AXIS")]
     pub(crate) axis: Option<Axis>,
+    /// Group whose tip is moved, of a robot with several tips.
+    #[arg(long, value_name = "NAME", requires = "axis")]
+    pub(crate) group: Option<String>,
     /// The axis is that of the tip, as it is when the key is pressed; without it, that of the base.
     #[arg(long, requires = "axis")]
     pub(crate) tool: bool,

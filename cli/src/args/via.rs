@@ -2,7 +2,7 @@
 use crate::angles::Angles;
 use crate::failure::Failure;
 use clap::Args;
-use taustream_arm::Robot;
+use taustream_arm::{Group, Robot};
 use taustream_motion::JointArray;
 use taustream_planner::Blend;
 
@@ -49,9 +49,13 @@ impl ViaArgs {
     /// The poses, with the numbers of a robot.
     ///
     /// # Errors
-    /// Not one value a joint.
-    pub(crate) fn poses_of(&self, robot: &Robot) -> Result<Vec<JointArray>, Failure> {
-        self.via.iter().map(|via| via.pose_of(robot, "--via")).collect()
+    /// Not one value a joint of the group, or of the robot without one.
+    pub(crate) fn poses_of(
+        &self,
+        of: (&Robot, Option<&Group>),
+        others_rad: &JointArray,
+    ) -> Result<Vec<JointArray>, Failure> {
+        self.via.iter().map(|via| via.pose_in(of, others_rad, "--via")).collect()
     }
 
     /// How far from its corners the motion may pass.

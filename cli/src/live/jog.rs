@@ -6,7 +6,7 @@ use super::client::{Client, Limit};
 use super::jog_keys::{Key, Keys};
 use super::jog_path::{JogPath, Jogged};
 use super::target_port::TargetPort;
-use crate::args::{Axis, JogArgs};
+use crate::args::{Axis, JogArgs, group_of, tip_of};
 use crate::arm;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -116,7 +116,9 @@ fn jogged(args: &JogArgs, robot: &Robot) -> Result<(Jogged, f64), Failure> {
             Axis::Y => Vector3::y_axis(),
             Axis::Z => Vector3::z_axis(),
         };
-        return Ok((Jogged::Tip { axis, is_tools: args.tool }, args.speed_m_s));
+        let tip = tip_of(robot, group_of(robot, args.group.as_deref())?)?;
+        let frame = robot.tips.get(tip).map_or(robot.chain.tip_frame(), |tip| tip.frame);
+        return Ok((Jogged::Tip { axis, is_tools: args.tool, frame }, args.speed_m_s));
     }
     let given = args.joint.as_deref().unwrap_or_default();
     let by_name = robot.joints.iter().position(|joint| joint.name == given);

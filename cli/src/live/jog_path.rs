@@ -24,6 +24,8 @@ pub(super) enum Jogged {
         axis: Unit<Vector3<f64>>,
         /// The axis is the tip's.
         is_tools: bool,
+        /// The tip's frame.
+        frame: usize,
     },
 }
 
@@ -41,12 +43,15 @@ pub(super) struct JogPath<'a> {
 
 impl<'a> JogPath<'a> {
     pub(super) fn new(robot: &'a Robot, jogged: Jogged, from_rad: &JointArray) -> Self {
-        let tip_frame = robot.chain.tip_frame();
+        let tip_frame = match jogged {
+            Jogged::Tip { frame, .. } => frame,
+            Jogged::Joint(_) => robot.chain.tip_frame(),
+        };
         let tip = robot.chain.frame(tip_frame, from_rad);
         let direction = match jogged {
             Jogged::Joint(_) => Vector3::zeros(),
-            Jogged::Tip { axis, is_tools: false } => axis.into_inner(),
-            Jogged::Tip { axis, is_tools: true } => tip.rotation * axis.into_inner(),
+            Jogged::Tip { axis, is_tools: false, .. } => axis.into_inner(),
+            Jogged::Tip { axis, is_tools: true, .. } => tip.rotation * axis.into_inner(),
         };
         Self { robot, jogged, tip_frame, at_rad: *from_rad, tip, direction }
     }
@@ -137,7 +142,7 @@ mod tests {
         for (axis, is_tools) in
             [(Vector3::z_axis(), false), (Vector3::x_axis(), false), (Vector3::y_axis(), true)]
         {
-            let mut path = JogPath::new(&robot, Jogged::Tip { axis, is_tools }, &HOME);
+            let mut path = JogPath::new(&robot, Jogged::Tip { axis, is_tools, frame: 6 }, &HOME);
             let from = robot.chain.frame(6, &HOME);
             assert!((0..50).all(|_| path.lead(0.002)), "{axis:?}");
             let to = robot.chain.frame(6, path.at_rad());
@@ -154,7 +159,7 @@ mod tests {
     #[test]
     fn reach_ends_without_a_jump_of_the_joints() {
         let robot = ur5();
-        let jogged = Jogged::Tip { axis: Vector3::x_axis(), is_tools: false };
+        let jogged = Jogged::Tip { axis: Vector3::x_axis(), is_tools: false, frame: 6 };
         let mut path = JogPath::new(&robot, jogged, &HOME);
         let mut before = *path.at_rad();
         let mut steps = 0;

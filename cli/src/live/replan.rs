@@ -150,8 +150,10 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
             )),
         }
     };
-    let (goal_rad, tip) =
-        goal_rad(&if args.goal.needs_start() { start_rad(&client)? } else { [0.0; MAX_JOINTS] })?;
+    let (robot, group) = (&settings.robot, args.goal.group_of(&settings.robot)?);
+    // The planner knows best where the joints of other groups are.
+    let others_rad = if args.goal.needs_start() { start_rad(&client)? } else { [0.0; MAX_JOINTS] };
+    let (goal_rad, tip) = goal_rad(&others_rad)?;
     if args.goal.linear
         && let Some(option) = args.via.given()
     {
@@ -160,16 +162,17 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
     }
     let request = CheckedPlanRequest {
         tip,
-        via_rad: args.via.poses_of(&settings.robot)?,
+        via_rad: args.via.poses_of((robot, group), &others_rad)?,
+        held_joints: group.map_or(0, |group| group.others(robot.joints.len())),
         blend: args.via.blend(),
         when: args.when(),
         deadline_ms: args.deadline_ms.unwrap_or(0),
         seed: args.seed,
         planner: args.planner.name().to_owned(),
-        ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), goal_rad)
+        ..CheckedPlanRequest::to_pose(robot.joints.len(), goal_rad)
     };
     go(form, (&client, &settings), &request, args.wait).map_err(|failure| {
-        let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(&settings.robot));
+        let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot, group));
         match hint {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
                 Failure::Refused(format!("{failure} ({hint})"))

@@ -1,8 +1,9 @@
 //! A robot as `taustream check` shows it: joints, solid links, and everything that is let through.
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt;
 use taustream_arm::text::counted;
-use taustream_arm::{Robot, Shape};
+use taustream_arm::{Group, Robot, Shape};
 use taustream_motion::stopping::StopRules;
 use taustream_planner::torque::TorqueLimits;
 
@@ -71,6 +72,56 @@ fn kind_of(shape: &Shape) -> &'static str {
     }
 }
 
+/// Joints that belong together.
+#[derive(Debug, Serialize)]
+struct GroupLine {
+    name: String,
+    /// Null where the group leads no tip of its own.
+    tip: Option<String>,
+    joints: Vec<String>,
+}
+
+impl GroupLine {
+    fn of(robot: &Robot, group: &Group) -> Self {
+        let name = |joint: &usize| robot.joints.get(*joint).map(|joint| joint.name.clone());
+        Self {
+            name: group.name.clone(),
+            tip: group.tip.and_then(|tip| robot.tips.get(tip)).map(|tip| tip.name.clone()),
+            joints: group.joints.iter().filter_map(name).collect(),
+        }
+    }
+}
+
+/// Links of two groups against each other.
+#[derive(Debug, Serialize)]
+struct AcrossLine {
+    groups: [String; 2],
+    /// Pairs of links that are kept apart.
+    pairs: usize,
+    may_touch: usize,
+}
+
+impl AcrossLine {
+    fn all(robot: &Robot) -> Vec<Self> {
+        // Links with shapes that some joint of a group moves.
+        let links = |group: &Group| -> BTreeSet<usize> {
+            let moves = |frame: usize| group.joints.iter().any(|joint| robot.chain.moves(*joint, frame));
+            robot.shapes.iter().filter(|shape| moves(shape.frame)).map(|shape| shape.link).collect()
+        };
+        let mut lines = Vec::new();
+        for (i, a) in robot.groups.iter().enumerate() {
+            for b in robot.groups.iter().skip(i + 1) {
+                let (of_a, of_b) = (links(a), links(b));
+                let pairs = || of_a.iter().flat_map(|a| of_b.iter().map(move |b| (*a, *b)));
+                let may_touch = pairs().filter(|(a, b)| robot.may_touch(*a, *b)).count();
+                let groups = [a.name.clone(), b.name.clone()];
+                lines.push(Self { groups, pairs: pairs().count() - may_touch, may_touch });
+            }
+        }
+        lines
+    }
+}
+
 /// A pair of links that touches in most random poses, and their share.
 #[derive(Debug, Serialize)]
 struct OftenTouching {
@@ -94,6 +145,11 @@ pub(super) struct CheckedRobot {
     joints: Vec<JointLine>,
     /// Links whose frames are base and tip; null for Denavit-Hartenberg rows.
     base_and_tip: Option<[String; 2]>,
+    /// What is led somewhere: one link in a serial arm.
+    tips: Vec<String>,
+    groups: Vec<GroupLine>,
+    /// Each two groups.
+    across_groups: Vec<AcrossLine>,
     shapes: usize,
     links: Vec<LinkLine>,
     /// Nothing keeps these from being hit.
@@ -151,6 +207,9 @@ impl CheckedRobot {
             digest: robot.digest_hex(),
             joints: joints.collect(),
             base_and_tip: robot.ends.clone(),
+            tips: robot.tips.iter().map(|tip| tip.name.clone()).collect(),
+            groups: robot.groups.iter().map(|group| GroupLine::of(robot, group)).collect(),
+            across_groups: AcrossLine::all(robot),
             shapes: robot.shapes.len(),
             links: LinkLine::all(robot),
             links_without_shape: robot.bare_links.clone(),
@@ -237,6 +296,22 @@ impl fmt::Display for CheckedRobot {
 }
 
 impl CheckedRobot {
+    /// Tips, groups, and what is kept apart between them.
+    fn tree(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let [_, _, ..] = self.tips.as_slice() {
+            writeln!(f, "  {} tips: {}", self.tips.len(), self.tips.join(", "))?;
+        }
+        for GroupLine { name, tip, joints } in &self.groups {
+            let tip = tip.as_ref().map_or(String::new(), |tip| format!(", leads {tip}"));
+            writeln!(f, "  group {name}{tip}: {}", joints.join(", "))?;
+        }
+        for AcrossLine { groups: [a, b], pairs, may_touch } in &self.across_groups {
+            let kept = counted(*pairs, "pair");
+            writeln!(f, "  groups {a} and {b}: {kept} of links are kept apart, {may_touch} may touch")?;
+        }
+        Ok(())
+    }
+
     /// What the drives can bear, and whether motions are held to it.
     fn torques(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let stated = self.joints.iter().filter_map(|j| Some(format!("{} {} Nm", j.name, j.torque_nm_max?)));
@@ -273,6 +348,7 @@ impl CheckedRobot {
         if let Some([base, tip]) = &self.base_and_tip {
             writeln!(f, "  base link {base}, tip link {tip}")?;
         }
+        self.tree(f)?;
         if let Some(mass_kg) = self.mass_kg {
             writeln!(
                 f,

@@ -14,15 +14,18 @@ use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::budget::Budget;
 use taustream_planner::goals::{TipError, plan_line};
+use taustream_planner::held::check_held;
 use taustream_planner::{
-    Finder, GoalError, Plan, PlanOptions, Situation, StartMargin, TipTarget, plan_through, plan_to_any,
-    plan_to_tip,
+    Finder, GoalError, Plan, PlanOptions, PoseOf, Situation, StartMargin, TipTarget, check_pose,
+    plan_through, plan_to_any, plan_to_tip,
 };
 
 /// The summary of a plan.
 #[derive(Debug, Serialize)]
 struct Summary {
     robot: String,
+    /// The group that alone moves; null for all joints.
+    group: Option<String>,
     digest: String,
     file: Option<String>,
     planner: String,
@@ -78,6 +81,9 @@ struct StageLine {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s (seed {})", self.planner, self.planning_s, self.seed)?;
+        if let Some(group) = &self.group {
+            writeln!(f, "moves         group {group}; the other joints hold")?;
+        }
         if self.explain {
             for stage in &self.stages {
                 writeln!(f, "  {}", stage.line)?;
@@ -128,6 +134,16 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     let scene = arm::scene(&args.scene)?;
     let (start, option) = args.start();
     let start_rad = start.pose_of(&robot, option)?;
+    let group = args.goal.group_of(&robot)?.cloned();
+    let robot = match &group {
+        Some(group) => {
+            // Else a joint that stands outside its range would be led in.
+            check_pose(&robot, PoseOf::Start, &start_rad)
+                .map_err(|error| explain(&error.into(), args, &robot))?;
+            robot.holding(group.others(robot.joints.len()), &start_rad)
+        }
+        None => robot,
+    };
     let default = PlanOptions::default();
     let deadline = args.deadline_ms.map(|ms| Duration::from_millis(ms.into()));
     let options = PlanOptions {
@@ -159,6 +175,9 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         }
         explain(&error, args, &robot)
     })?;
+    let held_joints = group.as_ref().map_or(0, |group| group.others(robot.joints.len()));
+    check_held(&robot, &found.plan.trajectory, held_joints)
+        .map_err(|moved| Failure::Failed(moved.to_string()))?;
     let json = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
@@ -208,7 +227,7 @@ fn to_poses(
     (args, options): (&PlanArgs, &PlanOptions),
 ) -> Result<Result<Planned, GoalError>, Failure> {
     let Situation { robot, scene, start_rad, .. } = *situation;
-    let via_rad = args.via.poses_of(robot)?;
+    let via_rad = args.via.poses_of((robot, args.goal.group_of(robot)?), &start_rad)?;
     let plan = if via_rad.is_empty() {
         plan_to_any(situation, goals_rad, options, None).map(|(plan, _)| plan)
     } else if let [goal_rad] = goals_rad {
@@ -236,9 +255,10 @@ fn millimetres_hint(error: &GoalError, args: &PlanArgs) -> Option<String> {
 }
 
 fn explain(error: &GoalError, args: &PlanArgs, robot: &Robot) -> Failure {
-    let goal_hint = || args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot));
+    let group = args.goal.group_of(robot).ok().flatten();
+    let goal_hint = || args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot, group));
     let hint =
-        args.start().0.degrees_hint(robot).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
+        args.start().0.degrees_hint(robot, None).or_else(goal_hint).or_else(|| millimetres_hint(error, args));
     Failure::Refused(match hint {
         Some(hint) => format!("no plan: {error} ({hint})"),
         None => format!("no plan: {error}"),
@@ -257,6 +277,7 @@ fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &
     let (a, b) = found.proof.clearance_between;
     Summary {
         robot: robot.name.clone(),
+        group: args.goal.group_of(robot).ok().flatten().map(|group| group.name.clone()),
         digest: robot.digest_hex(),
         file: args.output.as_ref().map(|p| p.display().to_string()),
         planner: found.how,

@@ -158,9 +158,12 @@ impl Service<'_> {
             Way::RestFirst => PlanOptions { deadline: Duration::from_secs_f64(search_s), ..*options },
             Way::Taper | Way::Direct | Way::PastEnd | Way::End => *options,
         };
-        let (revision, points_rad) = (self.revision(), requested.points_rad());
+        // Joints that the request says nothing of go on to where the motion leads them.
+        let (revision, held_joints) = (self.revision(), requested.held_joints);
+        let points_rad = requested.holding_at(&end.end_rad).points_rad();
         let made = self.work(request, limited.deadline, |cancel| {
-            let surroundings = Surroundings { robot: &revision.robot, scene: &revision.scene, cancel };
+            let (robot, scene) = (&*revision.robot, &*revision.scene);
+            let surroundings = Surroundings { robot, scene, cancel, held_joints };
             match way {
                 Way::Taper => surroundings.taper(&cut, &limited),
                 Way::Direct => surroundings.direct_or_after_end([&cut, &end], &points_rad, &limited),

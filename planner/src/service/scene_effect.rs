@@ -15,6 +15,7 @@ use crate::verify::{Stretch, Violation, first_contact};
 use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
+use taustream_arm::Robot;
 use taustream_messages::clock::now_ns;
 use taustream_messages::scene_reply::MotionEffect;
 use taustream_messages::{Command, CommandRequest, Outcome, Phase, Report};
@@ -68,6 +69,13 @@ struct InTheWay {
     at_s: f64,
     parts: Vec<Part>,
     violation: Violation,
+}
+
+/// The joints of groups that a motion leaves where they are, a bit each: a way round takes no other arm along.
+fn resting(robot: &Robot, motion: &Trajectory) -> u32 {
+    let rests = |joint: usize| motion.strokes().iter().all(|stroke| stroke.delta_rad[joint] == 0.0);
+    let groups = robot.groups.iter().filter(|group| group.joints.iter().all(|joint| rests(*joint)));
+    groups.flat_map(|group| &group.joints).fold(0, |bits, joint| bits | (1 << joint))
 }
 
 impl Service<'_> {
@@ -168,7 +176,6 @@ impl Service<'_> {
     ) -> Option<(u64, String)> {
         let begun = Instant::now();
         let cancel = AtomicBool::new(false);
-        let surroundings = Surroundings { robot: &revision.robot, scene: &revision.scene, cancel: &cancel };
         let latency_s = self.latency.quantile_s() + LATENCY_MARGIN_S;
         for search_s in [0.0, SEARCH_S_MAX] {
             let left_s = spare_s - begun.elapsed().as_secs_f64() - latency_s;
@@ -184,6 +191,9 @@ impl Service<'_> {
             let deadline = Duration::from_secs_f64(if search_s > 0.0 { search_s } else { left_s.min(1.0) });
             let options = PlanOptions { deadline, ..PlanOptions::default() };
             let goal_rad = cut.end_rad;
+            let (robot, scene) = (&*revision.robot, &*revision.scene);
+            let held_joints = cut.trajectory.as_ref().map_or(0, |motion| resting(robot, motion));
+            let surroundings = Surroundings { robot, scene, cancel: &cancel, held_joints };
             let made = if search_s > 0.0 {
                 surroundings.rest_first((&cut, &[goal_rad]), &options)
             } else {

@@ -1,11 +1,13 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
-use super::{Request, Service};
+use super::{Request, Service, holding};
 use crate::budget::Budget;
 use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
+use crate::held::check_held;
 use crate::live_scene::SceneRevision;
 use crate::plan::{Plan, PlanOptions, StartMargin};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::time::{Duration, Instant};
+use taustream_arm::Robot;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome};
 use taustream_messages::tip_goal::{TipGoal, TipLine};
 use taustream_motion::JointArray;
@@ -25,9 +27,8 @@ fn target(tip: &TipGoal) -> TipTarget {
     TipTarget { tip: number, position_m: tip.position_m, tolerance_m: tip.tolerance_m, orientation }
 }
 
-fn situation(revision: &SceneRevision, start_rad: JointArray) -> Situation<'_> {
-    let (robot, scene) = (&*revision.robot, &*revision.scene);
-    Situation { robot, scene, start_rad, margin: StartMargin::AsItStands }
+fn situation<'a>((robot, revision): (&'a Robot, &'a SceneRevision), start_rad: JointArray) -> Situation<'a> {
+    Situation { robot, scene: &revision.scene, start_rad, margin: StartMargin::AsItStands }
 }
 
 impl Service<'_> {
@@ -39,7 +40,8 @@ impl Service<'_> {
         (tip, near_rad): (&TipGoal, JointArray),
     ) -> Result<PlanOutcome, String> {
         let revision = self.revision();
-        let (situation, target) = (situation(&revision, near_rad), target(tip));
+        let robot = holding(&revision.robot, requested.held_joints, &near_rad);
+        let (situation, target) = (situation((&robot, &revision), near_rad), target(tip));
         let poses = self.work(request, options.deadline, |cancel| {
             tip_poses(&situation, &target, options, Some(cancel))
         })?;
@@ -59,12 +61,13 @@ impl Service<'_> {
     pub(super) fn plan_straight(
         &self,
         request: &Request,
-        start_rad: JointArray,
+        (start_rad, held_joints): (JointArray, u32),
         (tip, line, options): (&TipGoal, &TipLine, &PlanOptions),
     ) -> Result<Plan, String> {
         let started = Instant::now();
         let revision = self.revision();
-        let (situation, target) = (situation(&revision, start_rad), target(tip));
+        let robot = holding(&revision.robot, held_joints, &start_rad);
+        let (situation, target) = (situation((&robot, &revision), start_rad), target(tip));
         let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
         let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
         let within = if options.spends_deadline { options.deadline } else { LINE_WITHIN };
@@ -74,6 +77,7 @@ impl Service<'_> {
         let line = planned.map_err(|e| e.to_string())?;
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);
         let plan = line.into_plan(how, started.elapsed().as_secs_f64());
+        check_held(&robot, &plan.trajectory, held_joints).map_err(|e| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)
     }
