@@ -91,17 +91,11 @@ pub(crate) fn of_states(
             if angles.len() < members.len() || poses.iter().any(is_known) {
                 continue;
             }
-            match outside(&members, &angles) {
-                Some(words) => {
-                    let name = &state.name;
-                    notices.push(format!(
-                        "SRDF group state {name:?} is left out: {words} is outside its limits"
-                    ));
-                }
-                None => {
-                    let position_rad = spread(&members, &angles);
-                    poses.push(NamedPose { name: state.name.clone(), group, position_rad });
-                }
+            let name = state.name.clone();
+            if let Some(words) = outside(&members, &angles) {
+                notices.push(format!("SRDF group state {name:?} is left out: {words} is outside its limits"));
+            } else {
+                poses.push(NamedPose { name, group, position_rad: spread(&members, &angles) });
             }
             // The groups of a state of all joints are in it.
             break;
