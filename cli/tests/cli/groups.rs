@@ -43,6 +43,7 @@ fn apart_m(q: &[f64; 6]) -> f64 {
 }
 
 /// The poses of a trajectory file, with their text.
+#[expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 fn samples(scratch: &Scratch, file: &str) -> Vec<([f64; 6], Vec<String>)> {
     let csv = scratch.run(&["sample", file, "--rate-hz", "50"]);
     let rows = csv.done().lines().skip(1).map(|line| {
