@@ -20,7 +20,7 @@ fn files_of(folder: &str) -> Vec<PathBuf> {
 #[test]
 fn shipped_file_of_every_kind_loads() {
     let (robots, scenes, settings) = (files_of("robots"), files_of("scenes"), files_of("settings"));
-    for file in &robots {
+    for file in robots.iter().filter(|file| file.extension().is_some_and(|e| e == "toml")) {
         assert!(Robot::load(file).is_ok_and(|robot| robot.file == *file), "{:?}", Robot::load(file).err());
     }
     for file in scenes.iter().filter(|file| file.extension().is_some_and(|e| e == "toml")) {
