@@ -139,7 +139,7 @@ impl Robot {
     /// Makes the robot of a description without faults.
     fn build(fault_list: &FaultList, description: &Description, touching: Touching) -> Option<Self> {
         let parts = Parts::of(description);
-let (chain_joints, parents): (Vec<ChainJoint>, Vec<usize>) = parts.chain.iter().copied().unzip();
+        let (chain_joints, parents): (Vec<ChainJoint>, Vec<usize>) = parts.chain.iter().copied().unzip();
         let frames: Vec<usize> = parts.tips.iter().map(|tip| tip.frame).collect();
         let Some(chain) = Chain::tree(&chain_joints, &parents, &frames) else {
             fault_list.add(

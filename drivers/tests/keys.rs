@@ -64,6 +64,7 @@ fn kinds() -> Vec<Kind> {
                 ),
                 shipped("config/robots/piper.toml", &[]),
                 shipped("tests/robots/nasty.toml", &[]),
+                shipped("tests/robots/two_arms.toml", &[]),
             ],
             load: |file, text| Robot::from_toml(file, text).map(drop),
         },

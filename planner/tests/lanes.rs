@@ -74,7 +74,6 @@ fn scene(rng: &mut SeededRng, obstacles: usize, far_m: f64) -> Scene {
 }
 
 /// The three upper joints of an arm with what they carry, moved from its forearm to the base beside it.
-#[expect(clippy::expect_used, reason = "a helper of tests fails by panicking")]
 fn two_arms(mut robot: Robot) -> Robot {
     let mut joints: Vec<ChainJoint> = (0..6).filter_map(|i| robot.chain.joint(i).copied()).collect();
     joints[3].pre = Pose::translation(0.3, 0.3, 0.4) * joints[3].pre;

@@ -11,7 +11,16 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Robot files: pose", "A pose with a name, for `--to-named`."),
     ("Robot files: pose[].name", "Its name."),
     ("Robot files: pose[].position_rad", "One angle for each joint, base to tip."),
+    ("Robot files: pose[].group", "The group that the pose is of; without it, it is one of all joints."),
     ("Robot files: tip_link", "Link of the URDF whose frame is the tip."),
+    ("Robot files: tip_links", "Instead of `tip_link`: several, as of a robot with two arms."),
+    ("Robot files: group", "Joints that belong together, as one arm of two, for `--group`."),
+    ("Robot files: group[].name", "Its name."),
+    (
+        "Robot files: group[].tip_link",
+        "The tip that it leads; without `joints`, its joints are those that move this tip and no other.",
+    ),
+    ("Robot files: group[].joints", "Its joints, by name; each is in one group at most."),
     ("Robot files: base_link", "Link of the URDF whose frame is the base; without it the root of the tree."),
     (
         "Robot files: package_dirs",
