@@ -38,6 +38,8 @@ struct Played {
     cuts: AtomicU64,
     /// So many cuts come too late.
     late: AtomicU64,
+    /// Joints that no trajectory may move, a bit each.
+    still: AtomicU32,
     mute: AtomicBool,
     end: AtomicBool,
 }
@@ -50,6 +52,7 @@ impl Played {
             accepted: AtomicU64::new(0),
             cuts: AtomicU64::new(0),
             late: AtomicU64::new(0),
+            still: AtomicU32::new(0),
             mute: AtomicBool::new(false),
             end: AtomicBool::new(false),
         }
@@ -104,6 +107,12 @@ impl Played {
     }
 
     fn evaluate(&self, checked: &CheckedTrajectory) -> Outcome {
+        let still = self.still.load(Ordering::SeqCst);
+        for stroke in checked.trajectory.strokes() {
+            let moved =
+                stroke.delta_rad.iter().enumerate().find(|(j, delta)| still >> j & 1 == 1 && **delta != 0.0);
+            assert!(moved.is_none(), "a joint that is to hold is moved: {moved:?}");
+        }
         if let Replaces::Cut { at_s, .. } = checked.replaces {
             let number = self.cuts.fetch_add(1, Ordering::SeqCst);
             let strokes = checked.trajectory.strokes();
@@ -315,6 +324,52 @@ fn service_goals_of_the_tip_are_planned_at_rest_and_in_motion_and_lines_at_rest_
             assert!(reason_of(&ask(arm, requested, || ())).contains("taustream enable"));
         }
     });
+}
+
+/// Goal: a request for one group moves its joints alone: from rest, to a tip, and after what runs. What it
+/// says of the other joints counts nothing.
+#[test]
+fn service_request_of_a_group_moves_its_joints_alone() {
+    let robot = Robot::load(&common::config("../tests/robots/two_arms.toml")).expect("a robot for tests");
+    let played = Played::new(Phase::Holding);
+    let held_joints = robot.groups[0].others(6);
+    played.still.store(held_joints, Ordering::SeqCst);
+    with_service_of(&robot, &scene("open"), "group", &played, |arm, robot| {
+        let here = robot.chain.frame(robot.tips[0].frame, &pose(AWAY)).translation.vector;
+        let left = CheckedPlanRequest {
+            held_joints,
+            // Far outside, if the last three counted.
+            ..request(When::AtOnce, "", pose([-0.4, -1.2, 1.2, 9.0, 9.0, 9.0]))
+        };
+        let via = CheckedPlanRequest { via_rad: vec![pose([0.0, -1.0, 1.0, 9.0, 9.0, 9.0])], ..left.clone() };
+        let to_tip = |tip: u32| CheckedPlanRequest {
+            tip: Some(TipGoal {
+                tip,
+                position_m: [here.x, here.y - 0.1, here.z],
+                tolerance_m: 0.0,
+                orientation: None,
+                line: None,
+            }),
+            ..left.clone()
+        };
+        for requested in [&left, &via, &to_tip(0)] {
+            let outcome = ask(arm, requested, || ());
+            assert_eq!(receipt_of(&outcome), Outcome::Accepted { from_s: 0.0, tick: 9 });
+        }
+        let refused = ask(arm, &to_tip(5), || ());
+        assert!(reason_of(&refused).contains("there is no tip 6; the robot has 2"), "{refused:?}");
+        for held_joints in [0b11_1111, 0b100_0001] {
+            let refused = ask(arm, &CheckedPlanRequest { held_joints, ..left.clone() }, || ());
+            assert!(
+                reason_of(&refused).contains("it must leave at least one of them to move"),
+                "{refused:?}"
+            );
+        }
+        played.show(Phase::Moving);
+        receipt_of(&ask(arm, &CheckedPlanRequest { when: When::AfterCurrent, ..left.clone() }, || ()));
+    });
+    assert_eq!(played.accepted.load(Ordering::SeqCst), 3);
+    assert_eq!(played.cuts.load(Ordering::SeqCst), 1);
 }
 
 #[test]
