@@ -12,7 +12,7 @@
 mod arm;
 mod fed;
 
-use arm::{Arm, JOINTS, shipped};
+use arm::{Arm, bimanual, shipped};
 use taustream_arm::Settings;
 use taustream_drivers::Nanos;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
@@ -108,6 +108,45 @@ fn cycle_with_cubemars_motors_never_allocates() {
     assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
 }
 
+#[test]
+fn cycle_with_myactuator_motors_never_allocates() {
+    let mut arm = counted("no-alloc-myactuator", shipped("rmd6.toml", str::to_owned));
+    live_through(&mut arm, 15_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+#[test]
+fn cycle_with_odrive_axes_never_allocates() {
+    let mut arm = counted("no-alloc-odrive", shipped("odrive6.toml", str::to_owned));
+    live_through(&mut arm, 15_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+/// The arm controller of a Piper: its joints have ranges and signs of their own, so it is not led to the others' home.
+#[test]
+fn cycle_with_a_piper_never_allocates() {
+    let mut arm = counted("no-alloc-piper", shipped("piper.toml", str::to_owned));
+    live_through(&mut arm, 15_000);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
+/// Fourteen joints and two grippers: every slot that there is, on four buses.
+#[test]
+fn cycle_with_sixteen_servos_on_four_buses_never_allocates() {
+    let mut arm = counted("no-alloc-sixteen", bimanual::settings(4));
+    assert_eq!((arm.settings.slots(), arm.settings.buses.len()), (16, 4));
+    live_through(&mut arm, 15_000);
+    for axis in 0..bimanual::GRIPPERS {
+        for goal in [AxisGoal::Open, AxisGoal::Closed] {
+            arm.ask(Command::Axis { axis, goal, force: None });
+            arm.run(400);
+        }
+    }
+    arm.ask(Command::FastStop);
+    recover(&mut arm);
+    assert_eq!(arm.calls, 0, "allocations and frees in {} cycles", arm.counted);
+}
+
 /// The same with torques beside the positions, on an arm that feels its masses.
 #[test]
 fn cycle_with_torques_beside_positions_never_allocates() {
@@ -193,7 +232,7 @@ fn replace(arm: &mut Arm, running: &Trajectory, (ahead_s, by_rad): (f64, f64)) -
     let mut strokes = kept.strokes.to_vec();
     strokes.push(stroke);
     strokes.extend(later);
-    let trajectory = Trajectory::new(JOINTS, kept.base_rad, &strokes).unwrap();
+    let trajectory = Trajectory::new(running.joints(), kept.base_rad, &strokes).unwrap();
     check_motion_from(&trajectory, &arm.settings.robot.limits(), at_s).unwrap();
     arm.offer(&trajectory, Replaces::Cut { trajectory_id, at_s })
 }
@@ -237,7 +276,7 @@ fn live_through(arm: &mut Arm, cycles: u64) {
         // Dropped by what comes next.
         count(replace(arm, &running, (0.5, 0.04)));
         arm.run(50);
-        let joint = round % JOINTS + 1;
+        let joint = round % arm.settings.robot.joints.len() + 1;
         match round % 5 {
             0 => fault(arm, &format!("joint={joint},kind=silence")),
             1 => fault(arm, &format!("joint={joint},kind=fault")),

@@ -1,5 +1,7 @@
 //! The shipped cycle, its CiA 402 drivers and local links on one side, simulated drives on the other: one thread, on
 //! simulated time, so that tens of thousands of cycles take seconds and always run the same.
+pub(crate) mod bimanual;
+
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};
@@ -8,7 +10,7 @@ use taustream_drivers::sim::settings::{drives, queue_frames};
 use taustream_drivers::sim::{LinkedSimulator, ServoSimulator};
 use taustream_drivers::{CanFrame, CanLink, FrameBatch, Nanos};
 use taustream_messages::{CheckedTrajectory, Command, Phase, Replaces};
-use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory, joint_array};
+use taustream_motion::{JointLimits, MAX_JOINTS, Stroke, Trajectory};
 use taustream_streamer::buses::{Bus, Buses};
 use taustream_streamer::cycle::{Core, NoProbe, Probe, run_cycle};
 use taustream_streamer::cycle_state::Decision;
@@ -18,9 +20,10 @@ use taustream_streamer::prepared::PreparedTrajectory;
 use taustream_streamer::report::{self, CycleRecord, Readers, Record};
 use taustream_streamer::tick::Tick;
 
-const PERIOD_NS: u64 = 1_000_000;
 pub(crate) const JOINTS: usize = 6;
 const HOME_RAD: [f64; JOINTS] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
+/// How far a motion goes, from joint to joint; arms of more joints repeat it.
+const DELTA_RAD: [f64; JOINTS] = [0.9, 0.2, -0.4, 0.3, 0.2, 0.5];
 
 /// Shipped settings, with the text of the file changed before it is read.
 pub(crate) fn shipped(file: &str, edit: impl Fn(&str) -> String) -> Settings {
@@ -72,7 +75,8 @@ impl Arm {
         let (queues, command_queue) = intake::pair();
         let (reports, readers) = report::queues(true);
         let core = Core::new(&settings, Buses::new(buses).unwrap(), queues, reports);
-        let mut setups = drives(&settings, Some(&HOME_RAD)).unwrap_or_else(|faults| panic!("{faults}"));
+        let home_rad = (settings.robot.name == "ur5").then_some(HOME_RAD.as_slice());
+        let mut setups = drives(&settings, home_rad).unwrap_or_else(|faults| panic!("{faults}"));
         setups.iter_mut().for_each(|setup| setup.parameters.plant_mut().brake = true);
         let count = settings.buses.len();
         let queue_frames = queue_frames(&settings).unwrap_or_else(|faults| panic!("{faults}"));
@@ -107,7 +111,7 @@ impl Arm {
     }
 
     pub(crate) fn now(&self) -> Nanos {
-        Nanos(self.tick * PERIOD_NS)
+        Nanos(self.tick * u64::from(self.settings.cycle.period_us) * 1_000)
     }
 
     pub(crate) fn phase(&self) -> Phase {
@@ -181,16 +185,19 @@ impl Arm {
         // Towards the middle, so that motions that were cut short do not add up to the end of a range.
         let mut hold_position_rad = self.newest.map_or([0.0; MAX_JOINTS], |cycle| cycle.position_rad);
         // Behind the joints stand axes that are no joints of the path.
-        hold_position_rad[JOINTS..].fill(0.0);
+        let joints = self.settings.robot.joints.len();
+        hold_position_rad[joints..].fill(0.0);
         let size = if hold_position_rad[0] > 0.0 { -size } else { size };
         let stroke = |start_s: f64, sign: f64| Stroke {
             start_s,
             duration_s: 1.2,
             n: 6,
-            delta_rad: joint_array([0.9, 0.2, -0.4, 0.3, 0.2, 0.5]).map(|d| d * size * sign),
+            delta_rad: std::array::from_fn(|joint| {
+                if joint < joints { DELTA_RAD[joint % DELTA_RAD.len()] * size * sign } else { 0.0 }
+            }),
         };
         let strokes = [stroke(0.0, 1.0), stroke(0.8, -0.5), stroke(1.9, 0.5), stroke(2.6, -1.0)];
-        let trajectory = Trajectory::new(JOINTS, hold_position_rad, &strokes).unwrap();
+        let trajectory = Trajectory::new(joints, hold_position_rad, &strokes).unwrap();
         let decision = self.offer(&trajectory, Replaces::Rest);
         assert!(matches!(decision, Decision::Accepted { .. }), "{decision:?}");
         trajectory
