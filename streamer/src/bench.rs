@@ -1,10 +1,11 @@
 //! What the streamer's cycle costs, beside the barest loop that could do the same on the same machine.
 //!
-//! Two ratios, each from one run in alternating slices, so that both sides meet the same machine:
+//! Ratios, each from one run in alternating slices, so that both sides meet the same machine:
 //!
 //! - *lateness*: wake-ups of the streamer's loop against wake-ups of a bare `clock_nanosleep` loop on the same grid;
 //! - *cycle*: time from wake-up to the end of the shipped `run_cycle`, with its link, against the time that the same
-//!   system calls with the same frames take in a bare loop (clock, send, receive until empty, clock).
+//!   system calls with the same frames take in a bare loop (clock, send, receive until empty, clock);
+//! - *sixteen*: the cycle of the same arm with 16 joints on 4 buses against its own, on a link without system calls.
 //!
 //! No servos are needed: the driver writes the frames of the configured drives (SYNC and one setpoint each), calls them
 //! energised, and reports the commanded pose as measured. The arm swings along a trajectory all the time, so sampling,
@@ -13,6 +14,7 @@ mod compare;
 mod peers;
 mod stages;
 mod wake;
+mod wide;
 
 use crate::buses::{Bus, Buses};
 use crate::cycle::{Core, Next, NoProbe, Probe, run_cycle};
@@ -44,6 +46,10 @@ pub use wake::{Bin, WakeUps, wake_ups};
 const WARM_UP: u64 = 20;
 /// Slices in which stages are timed, streamer and bare alternately.
 const STAGE_SLICES: u64 = 4;
+/// Shortest measurement, s.
+const SECONDS_MIN: f64 = 0.1;
+/// Time of each side of the comparison with sixteen joints, in that of the measurement.
+const WIDE_SHARE: f64 = 0.25;
 /// Cycles within which the arm must be ready.
 const READY_MAX: u64 = 2_000;
 
@@ -127,6 +133,8 @@ pub struct CycleBench {
     pub cycle_p50_ratio: f64,
     /// 99 % cycle time, streamer over bare.
     pub cycle_p99_ratio: f64,
+    /// Median cycle time of 16 joints on 4 buses over that of this arm, both on a link without system calls.
+    pub sixteen_p50_ratio: f64,
     /// Deadlines skipped by either loop.
     pub skipped: u64,
     /// What one clock read takes; every stage's times include one.
@@ -141,13 +149,19 @@ pub struct CycleBench {
 /// When a link or a right is missing, or the options make no sense.
 pub fn cycle(options: &BenchOptions) -> Result<CycleBench, BenchError> {
     let (seconds, slices) = (options.seconds, options.slices);
-    if !(0.1..=3_600.0).contains(&seconds) || !(2..=10_000).contains(&slices) {
+    if !(SECONDS_MIN..=3_600.0).contains(&seconds) || !(2..=10_000).contains(&slices) {
         return Err(BenchError::Options { seconds, slices });
     }
-    let options = options.clone();
-    on_the_real_time_thread(options.settings.cycle, options.allow_non_realtime, move |realtime| {
-        Bench::prepare(&options)?.measure(&options, realtime)
-    })
+    let own = options.clone();
+    let cycle = on_the_real_time_thread(own.settings.cycle, own.allow_non_realtime, move |realtime| {
+        Bench::prepare(&own)?.measure(&own, realtime)
+    })?;
+    let sixteen = compare(
+        &BenchOptions { link: None, seconds: (seconds * WIDE_SHARE).max(SECONDS_MIN), ..options.clone() },
+        &[wide::widened(&options.settings)],
+    )?;
+    let sixteen_p50_ratio = sixteen.last().map_or(f64::NAN, |wide| wide.p50_ratio);
+    Ok(CycleBench { sixteen_p50_ratio, ..cycle })
 }
 
 /// Does `work` on a thread of its own with the priority that the streamer's would have; tells it whether it has it.
@@ -487,6 +501,7 @@ impl Bench {
             lateness_p99_ratio: ratio(streamer_lateness.p99_ns, bare_lateness.p99_ns),
             cycle_p50_ratio: ratio(streamer_cycle.p50_ns, bare_cycle.p50_ns),
             cycle_p99_ratio: ratio(streamer_cycle.p99_ns, bare_cycle.p99_ns),
+            sixteen_p50_ratio: f64::NAN,
             skipped,
             clock_read: clock.clock_read(),
             stages: clock.times(),

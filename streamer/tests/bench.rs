@@ -25,6 +25,7 @@ fn bench_counts_every_slice_and_stage() {
             assert_eq!(stage.bare.is_some_and(|b| b.count > 0), has_calls, "{stage:?}");
         }
         assert!(result.clock_read.count > 0);
+        assert!(result.sixteen_p50_ratio > 0.0, "{result:?}");
         assert!(result.cycle_p50_ratio.is_finite() && result.lateness_p99_ratio > 0.0);
     }
 }

@@ -136,7 +136,7 @@ fn cycle_with_sixteen_servos_on_four_buses_never_allocates() {
     let mut arm = counted("no-alloc-sixteen", bimanual::settings(4));
     assert_eq!((arm.settings.slots(), arm.settings.buses.len()), (16, 4));
     live_through(&mut arm, 15_000);
-    for axis in 0..bimanual::GRIPPERS {
+    for axis in [0, 1] {
         for goal in [AxisGoal::Open, AxisGoal::Closed] {
             arm.ask(Command::Axis { axis, goal, force: None });
             arm.run(400);
