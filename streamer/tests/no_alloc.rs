@@ -181,10 +181,24 @@ fn recover(arm: &mut Arm) {
     arm.run(100);
     arm.ask(Command::Disable);
     arm.run(500);
-    arm.ask(Command::ClearFault);
-    arm.run_until(Phase::Disabled, 8_000);
+    clear(arm);
     arm.run(400);
     arm.enable();
+}
+
+/// Clears until the arm is ready: motors come back with faults of their own, and one that kept its torque without a master is
+/// let go first.
+fn clear(arm: &mut Arm) {
+    for _ in 0..10 {
+        if arm.try_ask(Command::ClearFault).is_err() {
+            let _not_while_it_is_off = arm.try_ask(Command::TorqueOff);
+        }
+        arm.run(1_000);
+        if arm.phase() == Phase::Disabled {
+            return;
+        }
+    }
+    panic!("{:?} cannot be cleared: {:?}", arm.phase(), arm.core.supervisor().cause());
 }
 
 /// The first bus vanishes under the motion and comes back; this thread plays the service thread's part.
@@ -212,7 +226,7 @@ fn lose_a_bus_and_restore_it(arm: &mut Arm) {
     // The drives' own watchdogs have left faults, which are reported once they were looked at again.
     arm.run(1_000);
     if arm.phase() == Phase::Fault {
-        arm.ask(Command::ClearFault);
+        clear(arm);
     }
     arm.enable();
 }

@@ -10,7 +10,8 @@ pub const GRIPPERS: usize = 2;
 
 /// The robot file: no shapes, since nothing is planned for it.
 fn robot() -> String {
-    let mut text = "name = \"bimanual\"\n".to_owned();
+    let links: Vec<String> = (1..=JOINTS).map(|joint| format!("\"link{joint}\"")).collect();
+    let mut text = format!("name = \"bimanual\"\nunmodelled_links = [{}]\n", links.join(", "));
     for joint in 1..=JOINTS {
         let alpha_rad = if joint % 2 == 0 { 1.5 } else { -1.5 };
         write!(

@@ -175,10 +175,15 @@ impl Arm {
     }
 
     pub(crate) fn ask(&mut self, command: Command) {
+        self.try_ask(command).unwrap_or_else(|why| panic!("{command:?}: {why}"));
+    }
+
+    /// Gives a command; why it was refused.
+    pub(crate) fn try_ask(&mut self, command: Command) -> Result<(), String> {
         assert!(self.command_queue.commands.ask(command, Nanos(u64::MAX)).is_some());
         self.step(&mut NoProbe);
         let answer = self.command_queue.commands.answer().unwrap();
-        assert!(answer.accepted, "{command:?}: {}", answer.why.sentence(&Names::default()));
+        if answer.accepted { Ok(()) } else { Err(answer.why.sentence(&Names::default())) }
     }
 
     pub(crate) fn move_it(&mut self, size: f64) -> Trajectory {
