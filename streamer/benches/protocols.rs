@@ -12,8 +12,10 @@
 )]
 #[path = "../tests/arm/mod.rs"]
 mod arm;
+#[path = "../tests/bimanual/mod.rs"]
+mod bimanual;
 
-use arm::{Arm, bimanual, shipped};
+use arm::{Arm, shipped};
 use taustream_arm::Settings;
 use taustream_messages::Phase;
 use taustream_streamer::cycle::NoProbe;

@@ -10,9 +10,10 @@
     reason = "helpers of tests fail by panicking"
 )]
 mod arm;
+mod bimanual;
 mod fed;
 
-use arm::{Arm, bimanual, shipped};
+use arm::{Arm, shipped};
 use taustream_arm::Settings;
 use taustream_drivers::Nanos;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};

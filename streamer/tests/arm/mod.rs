@@ -1,7 +1,5 @@
 //! The shipped cycle, its CiA 402 drivers and local links on one side, simulated drives on the other: one thread, on
 //! simulated time, so that tens of thousands of cycles take seconds and always run the same.
-pub(crate) mod bimanual;
-
 use std::path::{Path, PathBuf};
 use taustream_arm::Settings;
 use taustream_drivers::link::{self, LinkChoice, LinkRole};

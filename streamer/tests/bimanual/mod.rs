@@ -4,9 +4,9 @@ use std::path::Path;
 use taustream_arm::Settings;
 
 /// Joints of the path, and grippers beside it.
-pub const JOINTS: usize = 14;
+pub(crate) const JOINTS: usize = 14;
 /// Grippers, in the slots behind the joints.
-pub const GRIPPERS: usize = 2;
+pub(crate) const GRIPPERS: usize = 2;
 
 /// The robot file: no shapes, since nothing is planned for it.
 fn robot() -> String {
@@ -80,7 +80,7 @@ fn text(robot: &str, buses: usize) -> String {
 }
 
 /// The arm on so many buses.
-pub fn settings(buses: usize) -> Settings {
+pub(crate) fn settings(buses: usize) -> Settings {
     static MADE: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
     let number = MADE.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     let robot_file =
