@@ -1,4 +1,4 @@
-//! A made-up arm of two: fourteen joints in a row and two grippers, all Damiao motors, on as many buses as wished.
+//! A made-up arm of two: fourteen joints in a row and two grippers, all Damiao motors, on as many buses as requested.
 use std::fmt::Write as _;
 use std::path::Path;
 use taustream_arm::Settings;
