@@ -17,5 +17,6 @@ pub mod words;
 pub use frame::{CanFrame, CanId, FrameBatch, JointSet};
 pub use link::{CanLink, ErrorFrame, LinkFault};
 pub use servo::{
-    DriveState, DriveTarget, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused,
+    DriveState, DriveTarget, FixedPdos, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus,
+    ZeroRefused,
 };

@@ -119,6 +119,32 @@ pub enum HomingState {
     },
 }
 
+/// PDOs 2 to 4 of a CANopen drive that this master does not use and that the drive does not let be switched off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FixedPdos(u8);
+
+impl FixedPdos {
+    /// None.
+    pub const NONE: Self = Self(0);
+
+    /// Adds the one whose communication record has this index.
+    pub(crate) fn note(&mut self, index: u16) {
+        let first = if index >= 0x1800 { 4 } else { 0 };
+        self.0 |= 1 << (first + (index & 0x3));
+    }
+    /// They as text: "RPDO 2, TPDO 2 and TPDO 3"; empty for none.
+    #[must_use]
+    pub fn words(self) -> String {
+        let name = |at: u8| format!("{} {}", if at < 4 { "RPDO" } else { "TPDO" }, at % 4 + 1);
+        let names: Vec<String> = (0..8).filter(|at| self.0 >> at & 1 != 0).map(name).collect();
+        match names.split_last() {
+            Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+            Some((only, _)) => only.clone(),
+            None => String::new(),
+        }
+    }
+}
+
 /// What is known of one joint's drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoStatus {
@@ -134,6 +160,8 @@ pub struct ServoStatus {
     pub hold_position_rad: f64,
     /// What is known of its homing.
     pub homing: HomingState,
+    /// PDOs that are not needed and stay on (CANopen).
+    pub fixed_pdos: FixedPdos,
     /// When the newest feedback arrived; `None` before the first.
     pub received: Option<Nanos>,
     /// The protocol's status word.
@@ -172,6 +200,7 @@ impl ServoStatus {
         torque_nm: f64::NAN,
         hold_position_rad: f64::NAN,
         homing: HomingState::None,
+        fixed_pdos: FixedPdos::NONE,
         received: None,
         status_word: 0,
         error_code: 0,

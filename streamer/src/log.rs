@@ -223,6 +223,15 @@ pub fn note(note: &Note, names: &Names) {
             bus_fault.word(),
             names.bus_remedy(*bus, *bus_fault)
         ),
+        Note::FixedPdos { joint, pdos } if pdos.words().is_empty() => {
+            info!("the drive of {} has no PDO any more that stays on unused", names.joint(*joint));
+        }
+        Note::FixedPdos { joint, pdos } => info!(
+            "the drive of {} does not let {} be switched off, which this master does not use; under its own identifiers it does no \
+             harm, but what it sends there is not in the bus load of `check`",
+            names.joint(*joint),
+            pdos.words()
+        ),
         Note::Emergency { joint, code, count } => warn!(
             "emergency message of the {} ({count} since the last such line)",
             names.drive_error(*joint, *code)

@@ -11,7 +11,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use taustream_arm::Settings;
-use taustream_drivers::ErrorFrame;
+use taustream_drivers::{ErrorFrame, FixedPdos};
 use taustream_messages::{AxisReport, BusFault, BusReport, LAYOUT_VERSION, Phase, Replaces, Report};
 use taustream_motion::axis::AXES_MAX;
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -61,6 +61,13 @@ pub enum Note {
         bus: usize,
         /// Why.
         bus_fault: BusFault,
+    },
+    /// A drive has PDOs that are not needed and cannot be switched off.
+    FixedPdos {
+        /// Zero-based joint.
+        joint: usize,
+        /// Which.
+        pdos: FixedPdos,
     },
     /// A drive has sent an emergency message.
     Emergency {
@@ -237,6 +244,7 @@ struct NotedBus {
 /// What was last noted of a drive.
 #[derive(Clone, Copy, Debug, Default)]
 struct NotedDrive {
+    fixed_pdos: FixedPdos,
     emergency: u32,
     emergencies: u32,
     tick: u64,
@@ -388,8 +396,14 @@ impl Reporter {
                     emergency: code,
                     emergencies: servo.emergencies,
                     tick: cycle_state.tick.number,
+                    ..*noted
                 };
                 let _ = self.queues.notes.push(Note::Emergency { joint, code, count });
+            }
+            // Bring-up is long over when a drive reports its position.
+            if servo.state.reports() && servo.fixed_pdos != noted.fixed_pdos {
+                noted.fixed_pdos = servo.fixed_pdos;
+                let _ = self.queues.notes.push(Note::FixedPdos { joint, pdos: servo.fixed_pdos });
             }
         }
     }

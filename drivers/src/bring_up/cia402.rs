@@ -5,7 +5,8 @@
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::homing::{Homing, HomingPlan, HomingTarget};
+use crate::bring_up::homing::{Homing, HomingTarget};
+use crate::bring_up::homing_plan::HomingPlan;
 use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan};
 use crate::bring_up::power::{Power, Received, TargetSource};
 use crate::bring_up::scale::StatedScale;
@@ -17,7 +18,7 @@ use crate::codec::emcy::HEARTBEAT;
 use crate::codec::object;
 use crate::codec::sdo::{SdoBytes, SdoRequest};
 use crate::codec::sdo_client::{SdoClient, SdoJob, SdoOutcome};
-use crate::servo::{DriveState, DriveTarget, HomingState, Nanos};
+use crate::servo::{DriveState, DriveTarget, FixedPdos, HomingState, Nanos};
 
 /// Pause between two looks at the modes display of a drive that is being energised.
 const MODE_AGAIN: Nanos = Nanos(20_000_000);
@@ -128,8 +129,10 @@ pub struct Node {
     pub(super) reset_sent: bool,
     /// What differs in the group of steps that is at work.
     pub(super) differs: Parts,
-    /// The object that was compared last let itself be read.
-    pub(super) there: bool,
+    /// What the object that was compared last holds; `None` when it did not let itself be read.
+    pub(super) there: Option<u32>,
+    /// PDOs that are not needed and stay on.
+    pub(super) fixed_pdos: FixedPdos,
     pub(super) mode: ModeDisplay,
     pub(super) stated: StatedScale,
     pub(super) homing: Homing,
@@ -166,7 +169,8 @@ impl Node {
             requested_error: false,
             reset_sent: false,
             differs: Parts::NONE,
-            there: false,
+            there: None,
+            fixed_pdos: FixedPdos::NONE,
             mode: ModeDisplay::default(),
             stated: StatedScale::default(),
             homing: Homing::default(),
@@ -189,6 +193,12 @@ impl Node {
     pub fn held(&self) -> Option<i32> {
         let adopted = self.held.filter(|_| self.state() == DriveState::Adopted);
         adopted.or_else(|| self.homing.held().filter(|_| self.state() == DriveState::Homing))
+    }
+
+    /// PDOs that are not needed, and that the drive does not let be switched off.
+    #[must_use]
+    pub const fn fixed_pdos(&self) -> FixedPdos {
+        self.fixed_pdos
     }
 
     /// What is known of its homing.

@@ -3,6 +3,7 @@ use crate::bring_up::cia402::{Node, NodeStage, SCALE_DIFFERS};
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::scale::Contradiction;
 use crate::bring_up::steps::{self, Check, Parts, Step};
+use crate::codec::canopen::PDO_DISABLED;
 use crate::codec::cia402_words::STATUS_ENERGISED;
 use crate::codec::error_text::{ABORT_TIMEOUT, is_of_the_transfer};
 use crate::codec::sdo_client::{SdoOutcome, SdoValue};
@@ -41,9 +42,10 @@ impl Node {
             self.compare(now, step, index, None);
         } else if let Check::Compare { part, first, .. } = step.check {
             self.note_difference(part, first);
-            self.there = false;
+            self.there = None;
             self.next_step(now, index);
         } else if step.may_be_refused(self.there) {
+            self.note_fixed_pdo(step);
             self.next_step(now, index);
         } else {
             self.refuse(code, step.job);
@@ -55,6 +57,13 @@ impl Node {
         let rest = self.steps.iter().enumerate().skip(index + 1);
         let due = rest.filter(|(_, step)| self.differs.meets(step.when)).map(|(at, _)| at).next();
         self.stage = NodeStage::Configure { step: due.unwrap_or(self.steps.len()), since: now };
+    }
+
+    /// A PDO that is not needed, and stays on.
+    fn note_fixed_pdo(&mut self, step: Step) {
+        if self.there.is_some_and(|cob_id| step.is_own(cob_id) && cob_id & PDO_DISABLED == 0) {
+            self.fixed_pdos.note(step.job.address().index);
+        }
     }
 
     fn note_difference(&mut self, part: Parts, first: bool) {
@@ -108,14 +117,17 @@ impl Node {
                 Ok(true)
             }
             Check::Compare { value, mask, part, first } => {
-                self.there = true;
+                self.there = Some(number);
                 let differs = number & mask != value & mask;
                 self.note_difference(if differs { part } else { Parts::NONE }, first);
                 Ok(true)
             }
-            Check::Present | Check::Profile402 | Check::Offers(_) | Check::Scale | Check::Equals { .. } => {
-                Ok(true)
-            }
+            Check::Present
+            | Check::Profile402
+            | Check::Offers(_)
+            | Check::Scale
+            | Check::OffOrOwn(_)
+            | Check::Equals { .. } => Ok(true),
         }
     }
 }

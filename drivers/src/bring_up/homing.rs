@@ -10,20 +10,18 @@
 //! Source: CiA 402-2, "Homing mode", statusword bits 10, 12 and 13, controlword bits 4 and 8.
 use crate::bring_up::cia402::Node;
 use crate::bring_up::fault::BringUpFault;
-use crate::bring_up::plan::NodePlan;
+use crate::bring_up::homing_plan::HomingPlan;
 use crate::codec::cia402_words::{
     CONTROL_ENABLE, CONTROL_HALT, CONTROL_HOME, CONTROL_QUICK_STOP, STATUS_FOLLOWS, STATUS_HOMED,
     STATUS_HOMING_ERROR, STATUS_REACHED,
 };
 use crate::codec::error_text::is_of_the_transfer;
-use crate::codec::object::{self, Address};
+use crate::codec::object;
 use crate::codec::sdo::SdoBytes;
 use crate::codec::sdo_client::{SdoJob, SdoOutcome};
 use crate::servo::{DriveState, HomingState, Nanos};
-use taustream_arm::{HomingSettings, OptionalObject};
 
-/// A joint that moves less than this within [`STILL`] stands.
-const STILL_RAD: f64 = 0.001;
+/// A joint that moves by less than the plan's counts within this time stands.
 const STILL: Nanos = Nanos(100_000_000);
 /// Pause after a change of mode, bits or target, so that the newest answer is one to it.
 const ANSWERED: Nanos = Nanos(50_000_000);
@@ -33,54 +31,8 @@ const STALE: Nanos = Nanos(500_000_000);
 const HALT_MAX: Nanos = Nanos(1_000_000_000);
 /// Pause between two looks at the modes display, and between two tries to return to the position mode.
 const AGAIN: Nanos = Nanos(20_000_000);
-/// Objects that are written at most.
-const PARAMETERS_MAX: usize = 5;
 /// Mode of operation.
 const MODE_HOMING: u8 = 6;
-
-/// What a drive needs for its homing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HomingPlan {
-    /// Objects that are written, and read back.
-    parameters: [Option<(Address, SdoBytes)>; PARAMETERS_MAX],
-    timeout: Nanos,
-    /// The joint moves.
-    moves: bool,
-    /// Movement within [`STILL`] that is rest, in counts.
-    still_counts: u32,
-}
-
-impl HomingPlan {
-    /// Of the settings; `None` where they have no homing.
-    #[must_use]
-    pub fn of(homing: &HomingSettings, plan: &NodePlan) -> Self {
-        let scale = &plan.scale;
-        let unit = |value: f64| {
-            let exact = homing.velocity_unit.of_rad_s(value, scale.gear_ratio, scale.counts_per_rev).round();
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-            let whole = exact.clamp(1.0, f64::from(u32::MAX)) as u32;
-            SdoBytes::from_u32(whole)
-        };
-        let all = [
-            (OptionalObject::HomeOffset, object::HOME_OFFSET, SdoBytes::from_i32(scale.home_offset_counts)),
-            (OptionalObject::HomingMethod, object::HOMING_METHOD, SdoBytes::from_i8(homing.method)),
-            (OptionalObject::HomingSpeeds, object::HOMING_SWITCH_SPEED, unit(homing.switch_speed_rad_s)),
-            (OptionalObject::HomingSpeeds, object::HOMING_ZERO_SPEED, unit(homing.zero_speed_rad_s)),
-            (
-                OptionalObject::HomingAcceleration,
-                object::HOMING_ACCELERATION,
-                unit(homing.acceleration_rad_s2),
-            ),
-        ];
-        let absent = plan.features.absent;
-        Self {
-            parameters: all.map(|(of, address, bytes)| (!absent.holds(of)).then_some((address, bytes))),
-            timeout: super::timing::nanos(homing.timeout_s).unwrap_or(Nanos(0)),
-            moves: homing.moves(),
-            still_counts: scale.counts_of(STILL_RAD),
-        }
-    }
-}
 
 /// What a step of a parameter does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use crate::codec::canopen::{Emcy, NmtCommand, NmtState};
 use crate::codec::cia402_words::DriveStep;
 use crate::codec::emcy::RESET;
 use crate::codec::sdo::SdoResponse;
-use crate::servo::{DriveTarget, Nanos};
+use crate::servo::{DriveTarget, FixedPdos, Nanos};
 use taustream_arm::OptionalObject;
 
 /// Heartbeats in a row that deny "operational" before it is believed: one may have been queued before the start.
@@ -102,7 +102,8 @@ impl Node {
 
     fn booted(&mut self, now: Nanos) {
         self.sdo.cancel();
-        (self.reset_sent, self.differs, self.there) = (false, Parts::NONE, false);
+        (self.reset_sent, self.differs, self.there) = (false, Parts::NONE, None);
+        self.fixed_pdos = FixedPdos::NONE;
         self.stage = NodeStage::Configure { step: 0, since: now };
     }
 

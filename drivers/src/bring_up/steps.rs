@@ -28,6 +28,8 @@ pub enum Check {
     Position,
     /// It agrees with the settings' scale, direction or range.
     Scale,
+    /// The PDO is off, or has this identifier, which is its drive's own.
+    OffOrOwn(u32),
     /// The bits of the mask are those of the value.
     Equals {
         /// What this master writes, or would have written.
@@ -85,6 +87,8 @@ pub enum Need {
     Demanded,
     /// It is when it does not have the object: when it refused to read it too.
     IfThere,
+    /// Likewise, and when the object is a PDO's identifier that the drive has fixed to its own: nobody else uses it.
+    IfForeign,
     /// It is.
     Free,
 }
@@ -126,12 +130,19 @@ impl Step {
 
     /// Whether a drive is taken that has refused this step; `there`: it let the object be read.
     #[must_use]
-    pub fn may_be_refused(&self, there: bool) -> bool {
+    pub fn may_be_refused(&self, there: Option<u32>) -> bool {
         match self.need {
             Need::Demanded => false,
-            Need::IfThere => !there,
+            Need::IfThere => there.is_none(),
+            Need::IfForeign => there.is_none_or(|cob_id| self.is_own(cob_id)),
             Need::Free => true,
         }
+    }
+
+    /// Whether the COB-ID that a drive states is the one that this step would switch off.
+    #[must_use]
+    pub fn is_own(&self, cob_id: u32) -> bool {
+        matches!(self.job, SdoJob::Write(_, off) if is_same_identifier(cob_id, off.as_u32()))
     }
 }
 
@@ -207,13 +218,13 @@ impl Steps {
         self.0.push(Step::write(record, cob_id, Parts::COB_ID));
     }
 
-    /// Drives need not have this PDO at all.
+    /// Drives need not have this PDO at all, and one that cannot be switched off does no harm under its drive's own identifier.
     pub(super) fn no_pdo(&mut self, communication: u16, base: u16, node: u8, number: u16) {
         let cob_id = cob_id(communication, base + number * COB_PDO_STEP, node);
         let record = Address::new(communication + number, object::PDO_COB_ID);
         let off = SdoBytes::from_u32(cob_id | PDO_DISABLED);
         self.compare(record, off, Parts::VALUE, true);
-        self.0.push(Step::write(record, off, Parts::VALUE).needed(Need::IfThere));
+        self.0.push(Step::write(record, off, Parts::VALUE).needed(Need::IfForeign));
     }
 }
 
@@ -225,7 +236,11 @@ pub(super) fn verification(steps: &[Step]) -> Vec<Step> {
         let read = match (step.job, step.check) {
             (SdoJob::Write(address, bytes), _) => {
                 let value = bytes.as_u32();
-                let check = Check::Equals { value, mask: significant(address, value) };
+                let check = if step.need == Need::IfForeign {
+                    Check::OffOrOwn(value)
+                } else {
+                    Check::Equals { value, mask: significant(address, value) }
+                };
                 let need = if step.need == Need::Demanded { Need::Demanded } else { Need::Free };
                 Step::read(address, bytes.as_slice().len(), check).needed(need)
             }
@@ -252,9 +267,13 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
             if mode == object::MODE_CSP.cast_unsigned() { BringUpFault::NoCsp } else { BringUpFault::NoMode }
         }
         Check::Equals { value, mask } if number & mask != value & mask => BringUpFault::NotTaken,
+        Check::OffOrOwn(off) if number & PDO_DISABLED == 0 && !is_same_identifier(number, off) => {
+            BringUpFault::NotTaken
+        }
         Check::Profile402
         | Check::Offers(_)
         | Check::Equals { .. }
+        | Check::OffOrOwn(_)
         | Check::Present
         | Check::NotEnergised
         | Check::Becomes(_)
@@ -264,6 +283,11 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
         | Check::Compare { .. } => return Ok(()),
     };
     Err(fault)
+}
+
+/// Identifier and format of two COB-IDs agree, whether their PDOs are on or off, and whatever they say of remote requests.
+fn is_same_identifier(a: u32, b: u32) -> bool {
+    (a ^ b) & !(PDO_DISABLED | PDO_NO_RTR) == 0
 }
 
 /// Bits of an object that a drive gives back as they were written: of an identifier's parameter not the remote request

@@ -365,6 +365,7 @@ impl ServoDriver for Cia402Driver {
             velocity_rad_s: f64::NAN,
             torque_nm: f64::NAN,
             homing: node.homing(),
+            fixed_pdos: node.fixed_pdos(),
             hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
             status_word: u32::from(node.status()),

@@ -7,7 +7,9 @@ use super::{AnsweringMotor, Outbox, fault};
 use crate::bring_up::timing::{self, StepTimer, Timeouts};
 use crate::frame::{CanFrame, CanId, FrameBatch};
 use crate::protocols::DriverError;
-use crate::servo::{DriveTarget, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
+use crate::servo::{
+    DriveTarget, FixedPdos, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused,
+};
 use taustream_arm::{Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
@@ -144,6 +146,7 @@ impl<M: AnsweringMotor> ServoDriver for MotorDriver<M> {
             torque_nm: measured.torque_nm * joint.mapping.sign,
             hold_position_rad: f64::NAN,
             homing: HomingState::None,
+            fixed_pdos: FixedPdos::NONE,
             received: joint.received,
             status_word: joint.machine.status_word(),
             error_code,

@@ -77,6 +77,31 @@ fn configuration_that_is_there_already_is_left_alone() {
     }
 }
 
+/// Goal: unused PDOs that are fixed under their drive's own identifiers stay on and are named; under any other they are refused.
+#[test]
+fn unused_pdos_that_are_fixed_are_tolerated_where_they_do_no_harm() {
+    let fixed = |identifiers: &[((u16, u8), u32)]| {
+        let mut bench = Bench::new(1);
+        configured(&mut bench);
+        bench.drives[0].keeps = true;
+        for (at, identifier) in identifiers {
+            bench.drives[0].objects.insert(*at, (4, *identifier));
+            bench.drives[0].fixed.push(*at);
+        }
+        bench
+    };
+    let mut bench = fixed(&[((0x1401, 1), 0x301), ((0x1801, 1), 0x4000_0281), ((0x1803, 1), 0x481)]);
+    bench.until(DriveState::Disabled, 2_000);
+    assert_eq!(bench.status(0).fixed_pdos.words(), "RPDO 2, TPDO 2 and TPDO 4");
+    // The identifier of another drive, of a 29-bit frame, and of SYNC.
+    for identifier in [0x302, 0x2000_0301, 0x080] {
+        let mut bench = fixed(&[((0x1401, 1), identifier)]);
+        bench.until(DriveState::Refused, 2_000);
+        assert!(refusal(&bench).contains("0x1401:01"), "{}", refusal(&bench));
+    }
+    assert_eq!(Bench::new(1).status(0).fixed_pdos.words(), "");
+}
+
 /// Goal: one part of a PDO that differs is changed alone, with the PDO switched off before and on after.
 #[test]
 fn pdo_that_differs_in_one_part_is_switched_off_changed_there_and_switched_on() {

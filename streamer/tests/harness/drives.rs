@@ -3,8 +3,8 @@ use super::{HOME_RAD, JOINTS};
 use std::sync::{Arc, Mutex};
 use taustream_drivers::link::{OpenError, Sent};
 use taustream_drivers::{
-    CanFrame, CanId, CanLink, DriveState, DriveTarget, FrameBatch, HomingState, JointCommand, JointSet,
-    LinkFault, Nanos, ServoDriver, ServoStatus,
+    CanFrame, CanId, CanLink, DriveState, DriveTarget, FixedPdos, FrameBatch, HomingState, JointCommand,
+    JointSet, LinkFault, Nanos, ServoDriver, ServoStatus,
 };
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -190,6 +190,7 @@ impl ServoDriver for FakeDriver {
             velocity_rad_s: f64::NAN,
             torque_nm: f64::NAN,
             homing: HomingState::None,
+            fixed_pdos: FixedPdos::NONE,
             hold_position_rad: if world.states[joint] == DriveState::Adopted {
                 world.hold_position_rad[joint] - world.revolution_rad[joint]
             } else {

@@ -6,7 +6,7 @@ use super::axis::{Axis, AxisPlan, AxisTarget};
 use super::frames::{Command, Message};
 use crate::bring_up::timing::{StepTimer, Timeouts};
 use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
-use crate::servo::{DriveTarget, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus};
+use crate::servo::{DriveTarget, FixedPdos, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus};
 use std::f64::consts::TAU;
 use taustream_motion::MAX_JOINTS;
 
@@ -134,6 +134,7 @@ impl ServoDriver for OdriveDriver {
             torque_nm: f64::NAN,
             hold_position_rad: f64::NAN,
             homing: HomingState::None,
+            fixed_pdos: FixedPdos::NONE,
             received: *received,
             status_word: axis.status_word(),
             error_code,

@@ -6,7 +6,9 @@ use super::controller::{ArmPlan, Controller};
 use super::frames::{Command, JOINTS, Message, from_millidegrees, millidegrees};
 use crate::bring_up::timing::{StepTimer, Timeouts};
 use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
-use crate::servo::{DriveTarget, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused};
+use crate::servo::{
+    DriveTarget, FixedPdos, HomingState, JointCommand, Nanos, ServoDriver, ServoStatus, ZeroRefused,
+};
 use taustream_motion::MAX_JOINTS;
 
 /// How link angles and a joint of the arm belong together, and when it was received last.
@@ -123,6 +125,7 @@ impl ServoDriver for PiperDriver {
             torque_nm: f64::NAN,
             hold_position_rad: f64::NAN,
             homing: HomingState::None,
+            fixed_pdos: FixedPdos::NONE,
             received: self.received.get(place).copied().flatten(),
             status_word: self.controller.status_word(place),
             error_code,
