@@ -33,6 +33,12 @@ pub const ALL: &[Scenario] = &[
         needs_gripper: false,
     },
     Scenario {
+        name: "motor_replanned_in_motion_new_goal_reached",
+        run: replanned_in_motion,
+        kills: false,
+        needs_gripper: false,
+    },
+    Scenario {
         name: "motor_silent_mid_motion_fast_stop_names_joint",
         run: motor_silent,
         kills: false,
@@ -47,6 +53,12 @@ pub const ALL: &[Scenario] = &[
     Scenario {
         name: "motor_streamer_killed_mid_motion_servos_react_by_themselves",
         run: streamer_killed,
+        kills: true,
+        needs_gripper: false,
+    },
+    Scenario {
+        name: "motor_streamer_restarted_after_kill_goes_on_by_command",
+        run: streamer_restarted,
         kills: true,
         needs_gripper: false,
     },
@@ -67,6 +79,8 @@ pub const ALL: &[Scenario] = &[
 fn goals_with_pause(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     enable(bench)?;
     for index in 0..goals.0.len() {
+        // Slow enough to be paused on the way, by a command line that takes its time.
+        bench.cli_done(&["speed", if index == 1 { "30" } else { "100" }])?;
         let motion = set_off(bench, goals, index, 0.3)?;
         if index == 1 {
             bench.cli_done(&["pause"])?;
@@ -77,6 +91,18 @@ fn goals_with_pause(bench: &mut TestBench, goals: &Goals) -> Result<()> {
         let report = arrive_within(bench, motion, goals.rad(index)?, AT_GOAL_RAD)?;
         ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
     }
+    bench.cli_done(&["disable"])?;
+    bench.await_phase(Phase::Disabled)?;
+    Ok(())
+}
+
+fn replanned_in_motion(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    enable(bench)?;
+    bench.cli_done(&["speed", "50"])?;
+    set_off(bench, goals, 0, 0.2)?;
+    let motion = bench.replan(&goals.text(1)?)?;
+    let report = arrive_within(bench, motion, goals.rad(1)?, AT_GOAL_RAD)?;
+    ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
     bench.cli_done(&["disable"])?;
     bench.await_phase(Phase::Disabled)?;
     Ok(())
@@ -149,7 +175,7 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
         let said = bench.simulator.said();
         let angles = said.lines().filter_map(|line| line.split("position_rad=").nth(1));
         let mut angles: Vec<f64> = angles.filter_map(|rest| rest.split(' ').next()?.parse().ok()).collect();
-        angles.split_off(angles.len().saturating_sub(6))
+        angles.split_off(angles.len().saturating_sub(bench.settings.slots()))
     };
     bench.simulator.show("status")?;
     std::thread::sleep(Duration::from_millis(200));
@@ -158,7 +184,39 @@ fn streamer_killed(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     bench.simulator.show("status")?;
     std::thread::sleep(Duration::from_millis(200));
     let still = at(bench).iter().zip(&rest_rad).all(|(now, then)| (now - then).abs() < 1e-6);
-    ensure!(still && rest_rad.len() == 6, "brakes do not hold: {rest_rad:?}, then {:?}", at(bench));
+    ensure!(
+        still && rest_rad.len() == bench.settings.slots(),
+        "brakes do not hold: {rest_rad:?}, then {:?}",
+        at(bench)
+    );
+    Ok(())
+}
+
+fn streamer_restarted(bench: &mut TestBench, goals: &Goals) -> Result<()> {
+    enable(bench)?;
+    bench.cli_done(&["speed", "20"])?;
+    set_off(bench, goals, 0, 0.1)?;
+    bench.streamer.signal(Signal::KILL)?;
+    bench.streamer.await_end()?;
+    // Longer than any motor's watchdog.
+    std::thread::sleep(Duration::from_millis(1500));
+    bench.restart_streamer()?;
+    let ready = [Phase::Disabled, Phase::Fault, Phase::Locked];
+    let (_, phase) = bench.report()?;
+    let phase = if ready.contains(&phase) {
+        phase
+    } else {
+        bench.await_report("the motors to be looked at", |_, phase| ready.contains(&phase))?;
+        bench.report()?.1
+    };
+    bench.cli_refused(&["replan", "--goal", &goals.text(1)?], "")?;
+    // Motors that hold by themselves are taken over by `enable`; the others come back by command only.
+    if phase != Phase::Locked {
+        bring_back(bench)?;
+    }
+    enable(bench)?;
+    let motion = bench.replan(&goals.text(1)?)?;
+    arrive_within(bench, motion, goals.rad(1)?, AT_GOAL_RAD)?;
     Ok(())
 }
 

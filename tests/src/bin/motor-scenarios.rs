@@ -3,7 +3,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use taustream_arm::{Damiao, Settings};
+use taustream_arm::{Bus, Damiao, Servo, Settings};
 use taustream_tests::demo_file::{DemoFile, programs_beside};
 use taustream_tests::mit_setpoints::{self, LogEnds, check_setpoints};
 use taustream_tests::motor_commands;
@@ -47,8 +47,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read(arguments)?;
-    let has_axes = !Settings::load(&place.settings)?.axes.is_empty();
-    let fits = |s: &&Scenario| s.name.contains(&arguments.only) && (has_axes || !s.needs_gripper);
+    let has_gripper = Settings::load(&place.settings)?.axes.iter().any(|axis| axis.output.name == "gripper");
+    let fits = |s: &&Scenario| s.name.contains(&arguments.only) && (has_gripper || !s.needs_gripper);
     let chosen: Vec<&Scenario> = ALL.iter().filter(fits).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
     let mut passed = 0;
@@ -64,24 +64,11 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     let mut bench = TestBench::open(place, &format!("{}-{attempt}", scenario.name))?;
     let settings = bench.settings.clone();
     let period_s = f64::from(bench.settings.cycle.period_us) * 1e-6;
-    let bus = bench.settings.buses.first().context("no bus")?.clone();
-    let interface = bus.interface.clone();
     if let Err(error) = (scenario.run)(&mut bench, goals) {
         return Err(bench.failed(error));
     }
     let (recording, log) = bench.close_whatever_became_of_the_streamer()?;
-    let seen = |record: candump::Record| BusFrame {
-        id: record.frame.id().raw(),
-        data: record.frame.data().to_vec(),
-    };
-    let records = candump::parse(&recording)?.into_iter().filter(|record| record.interface == interface);
-    let records: Vec<candump::Record> = records.collect();
-    let is_fd = bus.kind.data_bitrate_bit_s().is_some();
-    if let Some(other) = records.iter().find(|record| record.frame.is_fd() != is_fd) {
-        let (got, bus) = if is_fd { ("classic", "CAN FD") } else { ("CAN FD", "classic") };
-        return Err(anyhow!("a {got} frame on a {bus} bus: {:?}", other.frame).into());
-    }
-    let frames: Vec<BusFrame> = records.into_iter().map(seen).collect();
+    let records = candump::parse(&recording)?;
     let mut text = std::fs::read_to_string(&log).with_context(|| format!("cannot read {}", log.display()))?;
     if scenario.kills {
         // The last line may be half a line, and the last cycles none.
@@ -89,17 +76,40 @@ fn perform(scenario: &Scenario, place: &Place, goals: &Goals, attempt: usize) ->
     }
     let ends = if scenario.kills { LogEnds::Early } else { LogEnds::WithTheStreamer };
     let log = cycle_log::parse(&text)?;
-    // Damiao motors have a checker that compares gains and velocities too.
-    let are_damiao = settings.servos.iter().all(|servo| servo.protocol.get::<Damiao>().is_some());
-    let check_result = match mit_setpoints::encodings(&settings).filter(|_| are_damiao) {
-        Some(motors) => check_setpoints((&frames, &log), 0, (&motors, period_s), ends)?,
-        None => motor_commands::check(&frames, &log, &settings, ends)?,
-    };
-    // A recording without motion would pass every comparison.
-    if check_result.on_trajectory == 0 || check_result.setpoints == 0 {
-        return Err(anyhow!("nothing was compared with a trajectory").into());
+    let mut checked = Vec::new();
+    for (bus, described) in settings.buses.iter().enumerate() {
+        let frames = frames_of(described, &records)?;
+        let of_bus = |servo: &&Servo| servo.bus == bus;
+        // Damiao motors have a checker that compares gains and velocities too.
+        let are_damiao = settings.servos.iter().all(|servo| servo.protocol.get::<Damiao>().is_some());
+        let alone =
+            Settings { servos: settings.servos.iter().filter(of_bus).cloned().collect(), ..settings.clone() };
+        let result = match mit_setpoints::encodings(&alone).filter(|_| are_damiao) {
+            Some(motors) => check_setpoints((&frames, &log), bus, (&motors, period_s), ends)?,
+            None => motor_commands::check(&frames, &log, &alone, ends)?,
+        };
+        // A recording without motion would pass every comparison.
+        if result.on_trajectory == 0 || result.setpoints == 0 {
+            return Err(anyhow!("nothing was compared with a trajectory").into());
+        }
+        checked.push(result.to_string());
     }
-    Ok(check_result.to_string())
+    Ok(checked.join("; "))
+}
+
+/// The frames of a bus, all of which are of its kind.
+fn frames_of(bus: &Bus, records: &[candump::Record]) -> Result<Vec<BusFrame>> {
+    let is_fd = bus.kind.data_bitrate_bit_s().is_some();
+    let records: Vec<_> = records.iter().filter(|record| record.interface == bus.interface).collect();
+    if let Some(other) = records.iter().find(|record| record.frame.is_fd() != is_fd) {
+        let (got, bus) = if is_fd { ("classic", "CAN FD") } else { ("CAN FD", "classic") };
+        return Err(anyhow!("a {got} frame on a {bus} bus: {:?}", other.frame));
+    }
+    let frame = |record: &&candump::Record| BusFrame {
+        id: record.frame.id().raw(),
+        data: record.frame.data().to_vec(),
+    };
+    Ok(records.iter().map(frame).collect())
 }
 
 fn read(arguments: &Arguments) -> Result<(Place, Goals)> {

@@ -31,6 +31,7 @@ pub(super) const STEPS: &[Step] = &[
     step("scenarios of CubeMars motors", |place| motor_goals(place, "ak6")),
     step("scenarios of ODrive drives", |place| motor_goals(place, "odrive6")),
     step("scenarios of a gripper beside the path", gripper),
+    step("scenarios of two arms as one", two_arms),
     step("figures", figures),
 ];
 
@@ -99,6 +100,12 @@ fn motor_goals(place: &Place, settings: &str) -> Result<Outcome> {
 fn gripper(place: &Place) -> Result<Outcome> {
     let file = "config/settings/damiao6-gripper.toml";
     scenarios(place, "motor-scenarios", &["--settings", file, "--only", "gripper"])
+}
+
+/// Fourteen joints and two grippers on two buses of CAN FD: goals, a replan in motion, a silent and a faulted motor, a killed streamer.
+fn two_arms(place: &Place) -> Result<Outcome> {
+    let (file, demo) = ("config/settings/openarm.toml", "config/demo-openarm.toml");
+    scenarios(place, "motor-scenarios", &["--settings", file, "--demo", demo])
 }
 
 fn scenarios(place: &Place, program: &str, further: &[&str]) -> Result<Outcome> {
