@@ -47,8 +47,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<usize> {
     let (place, goals) = read(arguments)?;
-    let has_gripper = Settings::load(&place.settings)?.axes.iter().any(|axis| axis.output.name == "gripper");
-    let fits = |s: &&Scenario| s.name.contains(&arguments.only) && (has_gripper || !s.needs_gripper);
+    let settings = Settings::load(&place.settings)?;
+    let fits = |s: &&Scenario| s.name.contains(&arguments.only) && (s.fits)(&settings);
     let chosen: Vec<&Scenario> = ALL.iter().filter(fits).collect();
     ensure!(!chosen.is_empty(), "no scenario is called `{}`", arguments.only);
     let mut passed = 0;
