@@ -20,6 +20,8 @@ pub(crate) const ROOT: &str = "iceoryx2";
 /// End of the name of the segment in which iceoryx2 counts nodes. It stays when everybody has gone, so it says nothing
 /// about who is there; and it is the only segment whose name is known beforehand.
 pub(crate) const NODE_COUNTER: &str = ".global_mgmt";
+/// What starts and claims the names.
+const SERVICES: [&str; 2] = ["streamer", "planner"];
 /// A service that starts holds the lock alone for as long as it takes to delete a few files.
 const LOCK_WITHIN: Duration = Duration::from_secs(2);
 
@@ -58,9 +60,18 @@ impl ArmFiles {
         entries.filter(|entry| ours(&entry.file_name())).map(|entry| entry.path()).collect()
     }
 
-    /// Deletes every name of the arm, and nothing of another arm. What is mapped stays usable for whoever has it mapped. A file
-    /// that cannot be deleted stays; whoever opens it says so.
+    /// Deletes every name of the arm, and nothing of another arm, when nobody is about to open services. What is mapped stays usable
+    /// for whoever has it mapped. A file that cannot be deleted stays; whoever opens it says so.
     pub fn clear(&self) {
+        // Whoever holds it for longer hangs: then the names go all the same.
+        let _nobody_opens = self.lock_file(&self.opening_path()).and_then(|file| {
+            self.lock_within(&file, File::try_lock)?;
+            Ok(file)
+        });
+        self.delete_names();
+    }
+
+    fn delete_names(&self) {
         let root = self.runtime.join(ROOT);
         let nodes = root.join("nodes");
         let mut found = self.segments();
@@ -106,6 +117,21 @@ impl ArmFiles {
         self.runtime.join(format!("{}.users.lock", self.arm))
     }
 
+    fn opening_path(&self) -> PathBuf {
+        self.runtime.join(format!("{}.opening.lock", self.arm))
+    }
+
+    /// For a service that opens its ports: nobody clears names away until this is dropped. Names that went while some ports were open
+    /// and others not would leave a service that nobody finds and that misses nothing.
+    ///
+    /// # Errors
+    /// When the lock cannot be had.
+    pub fn opening(&self) -> Result<Opening, ServiceError> {
+        let file = self.lock_file(&self.opening_path())?;
+        self.lock_within(&file, File::try_lock_shared)?;
+        Ok(Opening { _lock: file })
+    }
+
     fn lock_file(&self, path: &Path) -> Result<File, ServiceError> {
         // Neither a link nor a pipe in its place leads anywhere, or waits.
         let flags = OFlags::NOFOLLOW.union(OFlags::NONBLOCK).bits();
@@ -123,10 +149,19 @@ impl ArmFiles {
     /// Joins the users of the names.
     pub(crate) fn lock_shared(&self) -> Result<UsersLock, ServiceError> {
         let file = self.lock_file(&self.lock_path())?;
+        self.lock_within(&file, File::try_lock_shared)?;
+        Ok(UsersLock { file, files: self.clone() })
+    }
+
+    fn lock_within(
+        &self,
+        file: &File,
+        lock: fn(&File) -> Result<(), TryLockError>,
+    ) -> Result<(), ServiceError> {
         let since = Instant::now();
         loop {
-            match file.try_lock_shared() {
-                Ok(()) => return Ok(UsersLock { file, files: self.clone() }),
+            match lock(file) {
+                Ok(()) => return Ok(()),
                 Err(TryLockError::WouldBlock) if since.elapsed() < LOCK_WITHIN => {
                     thread::sleep(Duration::from_millis(5));
                 }
@@ -147,15 +182,25 @@ impl ArmFiles {
     pub fn claim(&self, service: &'static str) -> Result<Claim, ServiceError> {
         let role = self.take_role(service)?;
         let file = self.lock_file(&self.lock_path())?;
-        let starting = self.runtime.join(format!("{}.{service}.starting", self.arm));
-        let alone = file.try_lock().is_ok();
-        if alone || starting.symlink_metadata().is_ok() {
+        let starting = self.starting_path(service);
+        if file.try_lock().is_ok() {
+            self.delete_names();
+            // Nothing is left of any start that did not come to its end.
+            for service in SERVICES {
+                let _none = fs::remove_file(self.starting_path(service));
+            }
+        } else if starting.symlink_metadata().is_ok() {
             self.clear();
         }
+        drop(file);
+        let lock = self.lock_shared()?;
         // A start that ends in the middle leaves this behind.
         let _without_it = File::create(&starting);
-        drop(file);
-        Ok(Claim { lock: self.lock_shared()?, starting, _role: role })
+        Ok(Claim { lock, starting, _role: role })
+    }
+
+    fn starting_path(&self, service: &str) -> PathBuf {
+        self.runtime.join(format!("{}.{service}.starting", self.arm))
     }
 
     /// The right to be the one service of its kind.
@@ -179,6 +224,12 @@ impl ArmFiles {
     }
 }
 
+/// Held while a service opens its ports: see [`ArmFiles::opening`].
+#[derive(Debug)]
+pub struct Opening {
+    _lock: File,
+}
+
 /// A share in the names of an arm, held until dropped or dead. The last one who leaves clears them.
 #[derive(Debug)]
 pub(crate) struct UsersLock {
@@ -190,7 +241,7 @@ impl Drop for UsersLock {
     fn drop(&mut self) {
         let last = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
         if last {
-            self.files.clear();
+            self.files.delete_names();
         }
     }
 }

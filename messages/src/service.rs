@@ -16,8 +16,10 @@ use iceoryx2::prelude::{
     FileName, LogLevel, Path as IceoryxPath, SemanticString, SignalHandlingMode, ipc,
     set_log_level_from_env_or,
 };
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use rustix::net::sockopt::socket_peercred;
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
+use std::cell::OnceCell;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -157,11 +159,19 @@ pub enum ServiceError {
     },
 }
 
+/// A service that a process opens once: iceoryx2 0.10 ends a process that opens a service again when somebody has deleted its files
+/// in between, because it finds its first share in it where the new one belongs.
+type Opened<P> = OnceCell<PortFactory<ipc::Service, P, ()>>;
+
 /// One process's access to the services of one arm of one user.
 #[derive(Debug)]
 pub struct Wire {
     arm: String,
     uid: u32,
+    // Before the node, which they are parts of.
+    trajectory: Opened<TrajectoryMessage>,
+    receipt: Opened<Receipt>,
+    report: Opened<Report>,
     node: Node<ipc::Service>,
     files: ArmFiles,
     // After the node: its files go first.
@@ -256,7 +266,16 @@ impl Wire {
             .create::<ipc::Service>()
             .map_err(|e| refused(format!("{e:?}")))?;
         close_node_counter(&prefix(arm, uid));
-        Ok(Self { arm: arm.to_owned(), uid, node, files, _users: users })
+        Ok(Self {
+            arm: arm.to_owned(),
+            uid,
+            trajectory: OnceCell::new(),
+            receipt: OnceCell::new(),
+            report: OnceCell::new(),
+            node,
+            files,
+            _users: users,
+        })
     }
 
     /// The files that this process's services stand on now; take it when every port is open.
@@ -326,17 +345,16 @@ fn config(arm: &str, uid: u32, root: &Path) -> Result<Config, String> {
 }
 
 macro_rules! publish_subscribe {
-    ($factory:ident, $sender:ident, $receiver:ident, $payload:ty, $name:literal, $publishers:expr, $subscribers:expr, $buffer:expr) => {
+    ($opened:ident, $factory:ident, $sender:ident, $receiver:ident, $payload:ty, $name:literal, $publishers:expr, $subscribers:expr, $buffer:expr) => {
         impl Wire {
-            fn $factory(
-                &self,
-            ) -> Result<
-                iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, $payload, ()>,
-                ServiceError,
-            > {
+            fn $factory(&self) -> Result<&PortFactory<ipc::Service, $payload, ()>, ServiceError> {
+                if let Some(opened) = self.$opened.get() {
+                    return Ok(opened);
+                }
                 let what = concat!("open the ", $name, " service");
                 let name = $name.try_into().map_err(|e| self.refused(what, &e))?;
-                self.node
+                let opened = self
+                    .node
                     .service_builder(&name)
                     .publish_subscribe::<$payload>()
                     .max_publishers($publishers)
@@ -347,7 +365,8 @@ macro_rules! publish_subscribe {
                     .history_size(0)
                     .enable_safe_overflow(true)
                     .open_or_create()
-                    .map_err(|e| self.refused(what, &e))
+                    .map_err(|e| self.refused(what, &e))?;
+                Ok(self.$opened.get_or_init(|| opened))
             }
 
             #[doc = concat!("A sender of the ", $name, " service.")]
@@ -376,6 +395,7 @@ macro_rules! publish_subscribe {
 }
 
 publish_subscribe!(
+    trajectory,
     trajectory_service,
     trajectory_publisher,
     trajectory_subscriber,
@@ -386,6 +406,7 @@ publish_subscribe!(
     TRAJECTORY_BUFFER
 );
 publish_subscribe!(
+    receipt,
     receipt_service,
     receipt_publisher,
     receipt_subscriber,
@@ -396,6 +417,7 @@ publish_subscribe!(
     RECEIPT_BUFFER
 );
 publish_subscribe!(
+    report,
     report_service,
     report_publisher,
     report_subscriber,

@@ -264,3 +264,54 @@ fn name_of_another_user_is_refused_at_once_with_file_owner_and_remedy() {
     let error = Wire::join(&arm.name, "test", &arm.runtime).expect_err("a pipe");
     assert!(error.to_string().contains("a pipe"), "{error}");
 }
+
+/// Goal: two services that start at once after both were killed do not clear each other's names: what one of them clears alone is all that
+/// a start that did not come to its end has left, whoever's it was.
+#[test]
+fn mark_of_a_start_that_ended_in_the_middle_goes_with_the_names_it_speaks_of() {
+    let arm = Arm::new("both");
+    let files = ArmFiles::of(&arm.name, &arm.runtime);
+    // Killed soon after their starts: both marks stay.
+    for service in ["streamer", "planner"] {
+        std::fs::write(arm.runtime.join(format!("{}.{service}.starting", arm.name)), "").expect("written");
+    }
+    let planner = files.claim("planner").expect("claims");
+    let wire = arm.join("planner");
+    let _server = wire.plan_server().expect("server");
+    let footprint = wire.footprint();
+    let streamer = files.claim("streamer").expect("claims");
+    assert_eq!(footprint.missing(), None, "the streamer's start has cleared the planner's names");
+    drop((planner, streamer));
+}
+
+/// Goal: names are not cleared while another process is about to open its services.
+#[test]
+fn clearing_waits_for_services_that_are_being_opened() {
+    let arm = Arm::new("opening");
+    let files = ArmFiles::of(&arm.name, &arm.runtime);
+    let opening = files.opening().expect("lock");
+    let wire = arm.join("planner");
+    let _server = wire.plan_server().expect("server");
+    let footprint = wire.footprint();
+    let clears = std::thread::spawn(move || files.clear());
+    std::thread::sleep(Duration::from_millis(200));
+    assert_eq!(footprint.missing(), None, "cleared in the middle of it");
+    drop(opening);
+    clears.join().expect("no panic");
+    assert!(footprint.missing().is_some(), "not cleared at all");
+}
+
+/// Goal: a second port of a service survives that somebody has deleted the service's files since the first one was opened (iceoryx2 ends the
+/// process when it makes a service whose first share it still holds).
+#[test]
+fn second_port_of_a_service_whose_files_were_deleted_is_no_panic() {
+    let arm = Arm::new("again");
+    let wire = arm.join("planner");
+    let subscriber = wire.report_subscriber().expect("subscriber");
+    ArmFiles::of(&arm.name, &arm.runtime).clear();
+    let publisher = wire.report_publisher();
+    if let Ok(publisher) = publisher {
+        publisher.send_copy(report(5)).expect("sent");
+    }
+    assert!(subscriber.receive().is_ok());
+}

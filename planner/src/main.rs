@@ -91,8 +91,10 @@ fn serve(
     claim: &Claim,
     said_ready: &mut bool,
 ) -> Result<Ending, OpenError> {
+    let opening = claim.files().opening()?;
     let wire = Wire::join(&settings.name, "taustream-planner", runtime)?;
     let mut service = Service::open(&wire, &settings.robot, &settings.scene, stop)?;
+    drop(opening);
     if let Some(path) = keep_scene {
         service.keep_scene(path)?;
     }

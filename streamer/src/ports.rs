@@ -180,6 +180,7 @@ impl PortWatch {
     }
 
     fn open(&mut self) -> Result<(), PortError> {
+        let _nobody_clears = self.files.opening()?;
         self.footprints = self.all(Directive::Open)?;
         Ok(())
     }
