@@ -1,5 +1,6 @@
 //! One collision shape as a core and a radius, and its pose.
 use crate::closed_form::{segment_to_box_m, segment_to_segment_m};
+use crate::cloud::{Cloud, PointTree};
 use crate::scene::Shape;
 use parry3d_f64::math::{Pose, Rot3, Vector};
 use parry3d_f64::query::details::closest_points_support_map_support_map;
@@ -34,6 +35,8 @@ pub enum Core {
     Convex,
     /// Triangles; the solid is what they enclose.
     Mesh(Arc<TriMesh>),
+    /// Points.
+    Cloud(Arc<Cloud>),
 }
 
 /// A shape in the frame that it is rigid with.
@@ -107,6 +110,13 @@ impl Body {
                 let (centre, bound_m) = (aabb.center(), aabb.half_extents().length());
                 Self { core: Core::Mesh(mesh.clone()), radius_m: 0.0, local, centre, bound_m, parry: mesh }
             }
+            Shape::Cloud(cloud) => {
+                let (centre, half) = cloud.tree().bounds();
+                let (radius_m, bound_m) = (cloud.radius_m, half.length() + cloud.radius_m);
+                // Never asked: distances to points have a form of their own.
+                let parry = Arc::new(Cuboid::new(half));
+                Self { core: Core::Cloud(cloud.clone()), radius_m, local, centre, bound_m, parry }
+            }
         })
     }
 
@@ -125,7 +135,9 @@ impl Body {
         let centre = pose.transform_point(self.centre);
         let ends = match self.core {
             Core::Segment(a, b) => [pose.transform_point(a), pose.transform_point(b)],
-            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) => [centre; 2],
+            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) | Core::Cloud(_) => {
+                [centre; 2]
+            }
         };
         Posed { pose, centre, ends }
     }
@@ -161,6 +173,7 @@ impl Body {
             Core::Segment(a, b) => (0.5 * (a + b), (0.5 * (b - a)).abs()),
             Core::Box(half) => (Vector::ZERO, half),
             Core::Cylinder { half_m, radius_m } => (Vector::ZERO, Vector::new(radius_m, half_m, radius_m)),
+            Core::Cloud(ref cloud) => cloud.tree().bounds(),
             Core::Convex | Core::Mesh(_) => {
                 let around = self.parry.compute_local_aabb();
                 (around.center(), around.half_extents())
@@ -191,6 +204,7 @@ impl Body {
             Core::Segment(..) | Core::Convex | Core::Mesh(_) => {
                 -self.parry.distance_to_local_point(point, false)
             }
+            Core::Cloud(_) => -self.to_point_m(point),
         }
     }
 
@@ -201,10 +215,20 @@ impl Body {
         match self.core {
             // The distance to a line is convex: the ends of a segment are the furthest.
             Core::Segment(..) => distance_m(at.ends[0]).max(distance_m(at.ends[1])) + self.radius_m,
-            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) => {
+            Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) | Core::Cloud(_) => {
                 distance_m(at.centre) + self.bound_m
             }
         }
+    }
+
+    /// Lower bound of the distance between the surfaces by the balls around them, and by a cloud's grid; cheap.
+    #[must_use]
+    pub fn distance_bound_m(&self, at: &Posed, other: &Self, other_at: &Posed) -> f64 {
+        if let Core::Cloud(cloud) = &other.core {
+            let middle = other_at.pose.inverse_transform_point(at.centre);
+            return cloud.least_m(middle) - self.bound_m - other.radius_m;
+        }
+        (at.centre - other_at.centre).length() - self.bound_m - other.bound_m
     }
 
     /// Distance between the surfaces: exact when positive, negative when capsules or spheres overlap by less than
@@ -237,7 +261,40 @@ impl Body {
             (Core::Cylinder { half_m, radius_m }, Core::Segment(a, b)) if a == b => {
                 point_to_cylinder_m(at.pose.inverse_transform_point(other_at.centre), *half_m, *radius_m)
             }
+            (_, Core::Cloud(cloud)) => self.to_points_m(at, cloud.tree(), other_at),
+            (Core::Cloud(cloud), _) => other.to_points_m(other_at, cloud.tree(), at),
             _ => self.iterated_distance_m(&at.pose, other, &other_at.pose),
+        }
+    }
+
+    /// The least distance of the core to points.
+    fn to_points_m(&self, at: &Posed, points: &PointTree, points_at: &Posed) -> f64 {
+        let found = match &self.core {
+            Core::Segment(..) => {
+                let [a, b] = at.ends.map(|end| points_at.pose.inverse_transform_point(end));
+                points.nearest(f64::INFINITY, |p| point_to_segment_m(p, a, b))
+            }
+            _ => {
+                let into = at.pose.inv_mul(&points_at.pose);
+                points.nearest(f64::INFINITY, |p| self.to_point_m(into.transform_point(p)))
+            }
+        };
+        found.map_or(f64::INFINITY, |(distance_m, _)| distance_m)
+    }
+
+    /// Lower bound of the distance of the core to a point in its axes.
+    fn to_point_m(&self, point: Vector) -> f64 {
+        match &self.core {
+            Core::Segment(a, b) => point_to_segment_m(point, *a, *b),
+            Core::Box(half) => (point.abs() - *half).max(Vector::ZERO).length(),
+            Core::Cylinder { half_m, radius_m } => point_to_cylinder_m(point, *half_m, *radius_m),
+            Core::Convex | Core::Mesh(_) => {
+                (self.parry.distance_to_local_point(point, true) - ITERATION_SLACK_M).max(0.0)
+            }
+            Core::Cloud(cloud) => {
+                let found = cloud.tree().nearest(f64::INFINITY, |p| (p - point).length());
+                found.map_or(f64::INFINITY, |(distance_m, _)| distance_m)
+            }
         }
     }
 
@@ -257,6 +314,7 @@ impl Body {
             let Core::Mesh(triangles) = &mesh.core else { return false };
             let point = match &body.core {
                 Core::Mesh(m) => m.vertices().first().map(|v| body_at.pose.transform_point(*v)),
+                Core::Cloud(cloud) => cloud.tree().points().first().map(|p| body_at.pose.transform_point(*p)),
                 Core::Segment(..) | Core::Box(_) | Core::Cylinder { .. } | Core::Convex => {
                     Some(body_at.ends[0])
                 }
@@ -289,6 +347,12 @@ fn convex_distance_m(a: &dyn SupportMap, b: &dyn SupportMap, at: &Pose) -> f64 {
     let back = at.rotation.inverse() * -towards_b;
     let begin_of_b_m = at.transform_point(b.local_support_point(back)).dot(towards_b);
     (begin_of_b_m - end_of_a_m).max(0.0)
+}
+
+fn point_to_segment_m(point: Vector, a: Vector, b: Vector) -> f64 {
+    let (from, along) = (point - a, b - a);
+    let share = (from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (from - along * share).length()
 }
 
 /// Distance of a point to a solid cylinder around the origin, along y.
@@ -440,5 +504,41 @@ mod tests {
             }
         }
         assert!(apart > 500 && worst_m < 1e-6, "{apart} apart, at worst {worst_m:e} m too low");
+    }
+
+    /// Goal: a cloud is as far as the nearest of its balls, whatever comes near it.
+    #[test]
+    fn distance_to_a_cloud_is_that_to_its_nearest_ball() {
+        const RADIUS_M: f64 = 0.01;
+        let id = chain::Pose::identity();
+        for seed in 0..400 {
+            let mut rng = SeededRng::new(seed, 23);
+            let mut point = || [rng.within(-0.3, 0.3), rng.within(-0.3, 0.3), rng.within(-0.05, 0.05)];
+            let points_m: Vec<[f64; 3]> = (0..100).map(|_| point()).collect();
+            let cloud = Cloud::new(points_m.clone(), RADIUS_M).unwrap();
+            let cloud = Body::new(&Shape::Cloud(Arc::new(cloud)), &id).unwrap();
+            let others = [
+                Shape::Capsule { radius_m: 0.03, length_m: 0.2 },
+                Shape::Box { size_m: [0.1, 0.2, 0.05] },
+                Shape::Cylinder { radius_m: 0.04, length_m: 0.2 },
+                hull(&mut rng),
+            ];
+            let cloud_at = cloud.placed(&random_pose(&mut rng));
+            for shape in others {
+                let body = Body::new(&shape, &id).unwrap();
+                let at = body.placed(&random_pose(&mut rng));
+                let to_ball_m = |p: &[f64; 3]| {
+                    let ball = Body::capsule(0.0, RADIUS_M, Pose::from_translation(Vector::from_array(*p)));
+                    body.distance_m(&at, &ball, &ball.placed(&cloud_at.pose))
+                };
+                let truth_m = points_m.iter().map(to_ball_m).fold(f64::INFINITY, f64::min);
+                for found_m in
+                    [body.distance_m(&at, &cloud, &cloud_at), cloud.distance_m(&cloud_at, &body, &at)]
+                {
+                    let near = found_m <= truth_m + 1e-9 && found_m >= truth_m - 2.0 * ITERATION_SLACK_M;
+                    assert!(near, "seed {seed}, {shape:?}: {found_m} for {truth_m}");
+                }
+            }
+        }
     }
 }

@@ -10,6 +10,7 @@ pub mod body;
 pub mod bus_load;
 mod capsule;
 pub mod closed_form;
+pub mod cloud;
 mod consistency;
 mod contact;
 mod convex_parts;

@@ -54,7 +54,7 @@ fn volume_m3_of(shape: &Shape) -> f64 {
         Shape::Box { size_m } => size_m.iter().product(),
         Shape::Cylinder { radius_m, length_m } => PI * radius_m.powi(2) * length_m,
         Shape::Capsule { radius_m, length_m } => PI * radius_m.powi(2) * (length_m + 4.0 / 3.0 * radius_m),
-        Shape::Mesh { .. } => 0.0,
+        Shape::Mesh { .. } | Shape::Cloud(_) => 0.0,
         Shape::Hull { vertices_m, triangles, .. } => {
             let corner = |i: u32| {
                 let vertex = usize::try_from(i).ok().and_then(|i| vertices_m.get(i));

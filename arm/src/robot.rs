@@ -399,7 +399,11 @@ impl LinkShape {
         let (half_m, radius_m) = match self.shape {
             Shape::Capsule { radius_m, length_m } => (0.5 * length_m, radius_m),
             Shape::Sphere { radius_m } => (0.0, radius_m),
-            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } | Shape::Hull { .. } => {
+            Shape::Box { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Mesh { .. }
+            | Shape::Hull { .. }
+            | Shape::Cloud(_) => {
                 return None;
             }
         };

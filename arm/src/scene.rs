@@ -1,5 +1,6 @@
 //! A scene: obstacles around the arm.
 use crate::Faults;
+use crate::cloud::{self, Cloud};
 use crate::document::{self, Node};
 use crate::mesh;
 use crate::reader::{Bounds, FaultList, Table};
@@ -7,6 +8,7 @@ use nalgebra::{Point3, Translation3, UnitQuaternion};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use taustream_motion::chain::Pose;
 
 /// A collision shape in its own frame; axes of cylinders and capsules are local z, centred.
@@ -52,6 +54,8 @@ pub enum Shape {
         /// How far the body goes beyond the polyhedron: what its few corners leave out of the mesh it was made of.
         rounding_m: f64,
     },
+    /// Points with a ball around each, shared by whoever holds the shape.
+    Cloud(Arc<Cloud>),
 }
 
 /// One obstacle.
@@ -86,6 +90,7 @@ const MARGIN_M: Bounds = Bounds::within(0.0, 1.0, "m");
 const CENTER_M: Bounds = Bounds::within(-100.0, 100.0, "m");
 const SIZE_M: Bounds = Bounds::above(0.0, 100.0, "m");
 const RPY_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
+const POINT_RADIUS_M: Bounds = Bounds::within(1e-4, 1.0, "m");
 const SCALE: Bounds = Bounds::above(0.0, 1e4, "");
 
 impl Scene {
@@ -110,7 +115,7 @@ impl Scene {
         let margin_m = top.number_or("margin_m", MARGIN_M_DEFAULT, &MARGIN_M);
         let mut obstacles = Vec::new();
         let mut complete = true;
-        for kind in ["sphere", "box", "cylinder", "capsule", "mesh"] {
+        for kind in ["sphere", "box", "cylinder", "capsule", "mesh", "cloud"] {
             for (i, table) in top.tables(kind).into_iter().enumerate() {
                 let obstacle = read_obstacle(table, kind, format!("{kind}[{i}]"));
                 complete &= obstacle.is_some();
@@ -144,6 +149,7 @@ fn read_shape(table: &mut Table<'_>, kind: &str) -> Option<Shape> {
         "sphere" => Some(Shape::Sphere { radius_m: table.number("radius_m", &SIZE_M)? }),
         "box" => Some(Shape::Box { size_m: table.numbers("size_m", &SIZE_M)? }),
         "mesh" => read_mesh(table),
+        "cloud" => read_cloud(table),
         _ => {
             let (radius_m, length_m) = (table.number("radius_m", &SIZE_M), table.number("length_m", &SIZE_M));
             let (radius_m, length_m) = (radius_m?, length_m?);
@@ -163,6 +169,21 @@ fn read_mesh(table: &mut Table<'_>) -> Option<Shape> {
     let path = document::beside(table.fault_list().file(), &file);
     match mesh::load(&path, mesh::Scale { factor, is_stated }) {
         Ok(mesh) => Some(Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }),
+        Err((value, expected)) => {
+            table.fault("file", &value, &expected);
+            None
+        }
+    }
+}
+
+fn read_cloud(table: &mut Table<'_>) -> Option<Shape> {
+    let file = table.text("file", "the path of a .ply, .pcd or .xyz file, relative to this file");
+    let radius_m = table.number("point_radius_m", &POINT_RADIUS_M);
+    let scale = table.number_or("scale", 1.0, &SCALE);
+    let (file, radius_m, scale) = (file?, radius_m?, scale?);
+    let path = document::beside(table.fault_list().file(), &file);
+    match cloud::load(&path, scale, radius_m) {
+        Ok(cloud) => Some(Shape::Cloud(Arc::new(cloud))),
         Err((value, expected)) => {
             table.fault("file", &value, &expected);
             None

@@ -255,6 +255,14 @@ const SCENE_CASES: &[Case] = &[
         "none of .stl, .obj and .dae",
     ),
     (Scene, "margin_m = 0.02", "[[mesh]]\nfile = \"/dev/zero.stl\"\nscale = 0", "mesh[0].scale", "above 0"),
+    (Scene, "margin_m = 0.02", "[[cloud]]\nfile = \"scan.ply\"", "cloud[0].point_radius_m", "missing"),
+    (
+        Scene,
+        "margin_m = 0.02",
+        "[[cloud]]\npoint_radius_m = 0.01\nfile = \"shelf.toml\"",
+        "cloud[0].file",
+        "none of .ply, .pcd and .xyz",
+    ),
     (Scene, "margin_m = 0.02", "[[plane]]\nname = \"floor\"", "plane", "no such key"),
 ];
 

@@ -127,11 +127,12 @@ const AXIS_IN_RAD: &[(&str, &str)] = &[
     ("tracking_error_m_max = 0.012", "tracking_error_rad_max = 0.6"),
 ];
 
-/// A scene with every kind of obstacle, beside the mesh that it names.
+/// A scene with every kind of obstacle, beside the mesh and the points that it names.
 fn scene() -> (PathBuf, String) {
     let folder = std::env::temp_dir().join(format!("taustream-keys-{}", std::process::id()));
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("tile.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fs::write(folder.join("scan.xyz"), "0 0 0\n").unwrap();
     (folder.join("scene.toml"), SCENE.to_owned())
 }
 
@@ -154,6 +155,10 @@ length_m = 0.1
 [[mesh]]
 center_m = [1, 0, 0]
 file = "tile.obj"
+[[cloud]]
+center_m = [1, 0, 0]
+file = "scan.xyz"
+point_radius_m = 0.01
 "#;
 
 /// A table of a file: its path with `[0]` for the first of a list, as faults name it.

@@ -77,6 +77,8 @@ pub enum ObjectShape {
     },
     /// Triangles of the scene file, which no message carries; in a list only.
     Mesh,
+    /// Points of the scene file, which no message carries; in a list only.
+    Cloud,
 }
 
 impl ObjectShape {
@@ -87,6 +89,7 @@ impl ObjectShape {
             Self::Cylinder { radius_m, length_m } => (3, [radius_m, length_m, 0.0]),
             Self::Capsule { radius_m, length_m } => (4, [radius_m, length_m, 0.0]),
             Self::Mesh => (5, [0.0; 3]),
+            Self::Cloud => (6, [0.0; 3]),
         }
     }
 
@@ -99,6 +102,7 @@ impl ObjectShape {
             3 => (Self::Cylinder { radius_m: a, length_m: b }, &[a, b]),
             4 => (Self::Capsule { radius_m: a, length_m: b }, &[a, b]),
             5 => (Self::Mesh, &[]),
+            6 => (Self::Cloud, &[]),
             got => return Err(What::Shape { got }),
         };
         match sizes.iter().find(|size| !(**size > 0.0 && **size <= FAR_M)) {
@@ -388,7 +392,7 @@ impl WireChange {
             ADD | PUT => SceneChange::Add {
                 name,
                 shape: Some(ObjectShape::read(self.shape, self.size_m)?)
-                    .filter(|shape| *shape != ObjectShape::Mesh)
+                    .filter(|shape| !matches!(shape, ObjectShape::Mesh | ObjectShape::Cloud))
                     .ok_or(What::Mesh)?,
                 pose: self.pose()?,
                 fixed_to: self.fixed_to()?,

@@ -72,6 +72,7 @@ impl KeptObject {
             ObjectShape::Cylinder { radius_m, length_m } => ("cylinder", vec![radius_m, length_m]),
             ObjectShape::Capsule { radius_m, length_m } => ("capsule", vec![radius_m, length_m]),
             ObjectShape::Mesh => ("mesh", Vec::new()),
+            ObjectShape::Cloud => ("cloud", Vec::new()),
         };
         let fixed_to = if object.fixed_to == FixedTo::Tip { "tip" } else { "base" };
         Self {
@@ -93,10 +94,10 @@ impl KeptObject {
             ("box", &[x, y, z]) => ObjectShape::Box { size_m: [x, y, z] },
             ("cylinder", &[radius_m, length_m]) => ObjectShape::Cylinder { radius_m, length_m },
             ("capsule", &[radius_m, length_m]) => ObjectShape::Capsule { radius_m, length_m },
-            ("mesh", &[]) => return Ok(SceneChange::Move { name, pose }),
+            ("mesh" | "cloud", &[]) => return Ok(SceneChange::Move { name, pose }),
             (other, sizes) => {
                 return Err(format!(
-                    "object {name:?}: shape {other:?} with {} sizes; sphere (1), box (3), cylinder (2), capsule (2) or mesh (0)",
+                    "object {name:?}: shape {other:?} with {} sizes; sphere (1), box (3), cylinder (2), capsule (2), mesh (0) or cloud (0)",
                     sizes.len()
                 ));
             }

@@ -110,9 +110,9 @@ pub enum SceneChangeError {
         /// What it holds.
         held: String,
     },
-    /// Triangles are no part of an arm.
+    /// Triangles and point clouds are no part of an arm.
     #[error(
-        "{name:?} is a mesh, and none can be fixed to the tip; replace it by boxes, balls and capsules that cover it"
+        "{name:?} is a mesh or a point cloud, and none can be fixed to the tip; replace it by boxes, balls and capsules that cover it"
     )]
     Mesh {
         /// The name.
@@ -330,7 +330,7 @@ impl Draft<'_> {
             return Err(SceneChangeError::Attached { name: name.to_owned() });
         }
         self.check_tip(name)?;
-        if matches!(object.shape, Shape::Mesh { .. } | Shape::Hull { .. }) {
+        if matches!(object.shape, Shape::Mesh { .. } | Shape::Hull { .. } | Shape::Cloud(_)) {
             return Err(SceneChangeError::Mesh { name: name.to_owned() });
         }
         object.pose = self.tip(name)?.inverse() * object.pose;
@@ -469,7 +469,7 @@ fn shape_to(shape: &ObjectShape) -> Option<Shape> {
         ObjectShape::Box { size_m } => Shape::Box { size_m },
         ObjectShape::Cylinder { radius_m, length_m } => Shape::Cylinder { radius_m, length_m },
         ObjectShape::Capsule { radius_m, length_m } => Shape::Capsule { radius_m, length_m },
-        ObjectShape::Mesh => return None,
+        ObjectShape::Mesh | ObjectShape::Cloud => return None,
     })
 }
 
@@ -480,5 +480,6 @@ fn shape_of(shape: &Shape) -> ObjectShape {
         Shape::Cylinder { radius_m, length_m } => ObjectShape::Cylinder { radius_m, length_m },
         Shape::Capsule { radius_m, length_m } => ObjectShape::Capsule { radius_m, length_m },
         Shape::Mesh { .. } | Shape::Hull { .. } => ObjectShape::Mesh,
+        Shape::Cloud(_) => ObjectShape::Cloud,
     }
 }

@@ -365,7 +365,7 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn distance_bound_m(&self, pair: &Pair, snapshot: &Snapshot) -> f64 {
         let (a, a_at, b, b_at) = self.sides(pair, snapshot);
-        (a_at.centre - b_at.centre).length() - a.bound_m() - b.bound_m()
+        a.distance_bound_m(a_at, b, b_at)
     }
 
     /// The paper's hinge for a pair: max(1 - d / (radii + margin), 0) with d between the cores; for a sphere it is

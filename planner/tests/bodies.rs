@@ -84,6 +84,7 @@ fn points(rng: &mut SeededRng, shape: &Shape) -> Vec<Point3<f64>> {
             .collect(),
         Shape::Mesh { vertices_m, .. } => vertices_m.clone(),
         Shape::Hull { vertices_m, rounding_m, .. } => balls(vertices_m, *rounding_m, &mut direction),
+        Shape::Cloud(_) => Vec::new(),
     }
 }
 
@@ -128,6 +129,8 @@ fn kind(shape: &Shape) -> usize {
         Shape::Box { .. } => 3,
         Shape::Mesh { .. } => 4,
         Shape::Hull { .. } => 5,
+        // No part of a robot.
+        Shape::Cloud(_) => KINDS,
     }
 }
 

@@ -2,6 +2,8 @@
 #![expect(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use taustream_arm::cloud::Cloud;
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, MAX_JOINTS};
@@ -25,7 +27,7 @@ fn file(name: &str) -> PathBuf {
 fn shape(rng: &mut SeededRng) -> Shape {
     let mut size = || rng.within(0.02, 0.3);
     let sizes = [size(), size(), size()];
-    match rng.index(6) {
+    match rng.index(7) {
         0 => Shape::Sphere { radius_m: sizes[0] },
         1 => Shape::Capsule { radius_m: 0.5 * sizes[0], length_m: 2.0 * sizes[1] },
         2 => Shape::Cylinder { radius_m: 0.5 * sizes[0], length_m: 2.0 * sizes[1] },
@@ -49,6 +51,13 @@ fn shape(rng: &mut SeededRng) -> Shape {
                 [3, 7, 5],
             ];
             Shape::Mesh { vertices_m: (0..8).map(corner).collect(), triangles: triangles.to_vec() }
+        }
+        4 => {
+            // A bent sheet, as cameras see surfaces.
+            let mut point = || [rng.within(-1.0, 1.0), rng.within(-1.0, 1.0), rng.within(-0.02, 0.02)];
+            let scaled = |[x, y, z]: [f64; 3]| [x * sizes[0], y * sizes[1], z + x * y * sizes[2]];
+            let points_m = (0..300).map(|_| scaled(point())).collect();
+            Shape::Cloud(Arc::new(Cloud::new(points_m, 0.1 * sizes[2]).expect("finite")))
         }
         _ => Shape::Box { size_m: sizes.map(|s| 2.0 * s) },
     }

@@ -118,7 +118,7 @@ pub struct Row {
     pub set: String,
     /// Problems in the file.
     pub problems: usize,
-    /// Problems whose start and goal keep the margin.
+    /// Problems whose start and goal are within the joints' ranges and keep the margin.
     pub valid: usize,
     /// Numbers of the others.
     pub invalid_ids: Vec<usize>,
@@ -270,8 +270,11 @@ impl Figures {
     }
 }
 
-/// True when start and goal keep what the planner asks of them.
+/// True when start and goal are within the joints' ranges, and keep what the planner asks of them.
 fn are_ends_valid(robot: &Robot, problem: &Problem) -> Result<bool, String> {
+    if ![problem.start_rad, problem.goal_rad].iter().all(|pose| problem_file::is_in_range(robot, pose)) {
+        return Ok(false);
+    }
     let world = World::new(robot, &problem.scene)?;
     let is_free = |pose: &JointArray, extra_m: f64| world.contact_within(pose, extra_m).is_none();
     Ok(is_free(&problem.start_rad, 0.0) && is_free(&problem.goal_rad, SweepRules::EDGE_END_M))

@@ -106,14 +106,21 @@ impl ProblemFile {
                 return Err(format!("robot {} has a joint {}, the file has not", robot.name, joint.name));
             };
             let [low, high] = joint.limits.position_rad;
-            // Rounded in the file, a value may lie beyond the range by its last digit.
-            if !(*value >= low - 1e-6 && *value <= high + 1e-6) {
-                return Err(format!("{} at {value} rad, its range is {low} to {high}", joint.name));
+            if !value.is_finite() {
+                return Err(format!("{} at {value} rad", joint.name));
             }
-            *q = value.clamp(low, high);
+            // Rounded in the file, a value may lie beyond the range by its last digit.
+            let near = value.clamp(low, high);
+            *q = if (near - value).abs() <= 1e-6 { near } else { *value };
         }
         Ok(pose)
     }
+}
+
+/// True when every joint is within its range.
+pub(super) fn is_in_range(robot: &Robot, pose: &JointArray) -> bool {
+    let ranges = robot.joints.iter().map(|joint| joint.limits.position_rad);
+    pose.iter().zip(ranges).all(|(q, [low, high])| (low..=high).contains(q))
 }
 
 /// The robot of a URDF file, and of an SRDF file where there is one; limits of acceleration and jerk as the shipped UR5 has them.

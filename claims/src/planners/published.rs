@@ -48,7 +48,8 @@ fn read(path: &Path, count: usize) -> Result<ProblemSet, String> {
         let problem = file.problem(&set.robot, question, set.problems.len()).map_err(fail)?;
         let world = World::new(&set.robot, &problem.scene).map_err(fail)?;
         let budget = Budget::unbounded();
-        if !(is_clear(&world, &problem.start_rad) && is_clear(&world, &problem.goal_rad)) {
+        let is_valid = |pose| problem_file::is_in_range(&set.robot, pose) && is_clear(&world, pose);
+        if !(is_valid(&problem.start_rad) && is_valid(&problem.goal_rad)) {
             unclear += 1;
         } else if Space::new(&world, &budget).is_edge_free(&problem.start_rad, &problem.goal_rad) {
             set.free_lines += 1;
@@ -57,7 +58,8 @@ fn read(path: &Path, count: usize) -> Result<ProblemSet, String> {
         }
     }
     if unclear > 0 {
-        set.left_out = format!("{unclear} more because start or goal is not clear by {MARGIN_M} m");
+        set.left_out =
+            format!("{unclear} more because start or goal is out of range or not clear by {MARGIN_M} m");
     }
     Ok(set)
 }

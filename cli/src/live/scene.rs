@@ -267,9 +267,9 @@ fn addition(object: Obstacle, replaces: bool) -> Result<SceneChange, Failure> {
         Shape::Box { size_m } => ObjectShape::Box { size_m },
         Shape::Cylinder { radius_m, length_m } => ObjectShape::Cylinder { radius_m, length_m },
         Shape::Capsule { radius_m, length_m } => ObjectShape::Capsule { radius_m, length_m },
-        Shape::Mesh { .. } | Shape::Hull { .. } => {
+        Shape::Mesh { .. } | Shape::Hull { .. } | Shape::Cloud(_) => {
             return Err(Failure::Refused(format!(
-                "{name}: a mesh cannot be added to a running planner; put it into the planner's scene file, or cover it by boxes, \
+                "{name}: a mesh or cloud cannot be added to a running planner; put it into the planner's scene file, or cover it by boxes, \
                  balls and capsules"
             )));
         }
@@ -293,6 +293,7 @@ fn object(of: ListedObject) -> Object {
         ObjectShape::Cylinder { radius_m, length_m } => ("cylinder", vec![radius_m, length_m]),
         ObjectShape::Capsule { radius_m, length_m } => ("capsule", vec![radius_m, length_m]),
         ObjectShape::Mesh => ("mesh", Vec::new()),
+        ObjectShape::Cloud => ("cloud", Vec::new()),
     };
     Object {
         name: of.name,

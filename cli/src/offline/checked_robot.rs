@@ -59,7 +59,7 @@ impl LinkLine {
     }
 }
 
-const KINDS: [&str; 6] = ["sphere", "box", "cylinder", "capsule", "mesh", "hull"];
+const KINDS: [&str; 7] = ["sphere", "box", "cylinder", "capsule", "mesh", "hull", "cloud"];
 
 fn kind_of(shape: &Shape) -> &'static str {
     match shape {
@@ -69,6 +69,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::Capsule { .. } => "capsule",
         Shape::Mesh { .. } => "mesh",
         Shape::Hull { .. } => "hull",
+        Shape::Cloud(_) => "cloud",
     }
 }
 

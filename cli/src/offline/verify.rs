@@ -143,10 +143,16 @@ pub(crate) fn clearance_words(
     at_s: f64,
     between: (&str, &str),
 ) -> String {
-    if clearance_m.is_finite() {
+    let (a, b) = between;
+    if clearance_m < required_m {
+        // Each pair keeps what it must, another one less than this: without the time to look for the least distance, no more is known.
+        let required = Decimals::apart(&[required_m], 4).show(required_m);
+        format!(
+            "more than {required} m at t = {at_s:.3} s, between {a} and {b}, as required; the deadline left no time to find the least distance"
+        )
+    } else if clearance_m.is_finite() {
         let decimals = Decimals::apart(&[clearance_m, required_m], 4);
         let (clearance, required) = (decimals.show(clearance_m), decimals.show(required_m));
-        let (a, b) = between;
         format!("{clearance} m at t = {at_s:.3} s, between {a} and {b} (more than {required} m required)")
     } else {
         "unlimited: nothing in this scene can collide".to_owned()

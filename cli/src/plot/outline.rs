@@ -62,7 +62,22 @@ fn corners(shape: &Shape) -> (Vec<Point3<f64>>, f64) {
         }
         Shape::Mesh { vertices_m, .. } => (vertices_m.clone(), 0.0),
         Shape::Hull { vertices_m, rounding_m, .. } => (vertices_m.clone(), *rounding_m),
+        Shape::Cloud(cloud) => {
+            (cloud.tree().points().iter().map(|p| Point3::new(p.x, p.y, p.z)).collect(), cloud.radius_m)
+        }
     }
+}
+
+/// Most balls of a point cloud that are drawn.
+const BALLS_MAX: usize = 1_500;
+
+/// The outlines of a shape in a pose: of a point cloud some of its balls, because a hull would fill the room between them.
+pub(super) fn outlines(shape: &Shape, pose: &Pose, view: View) -> Vec<Vec<Point>> {
+    let Shape::Cloud(cloud) = shape else { return vec![outline(shape, pose, view)] };
+    let ball = Shape::Sphere { radius_m: cloud.radius_m };
+    let points = cloud.tree().points();
+    let drawn = points.iter().step_by(points.len().div_ceil(BALLS_MAX).max(1));
+    drawn.map(|p| outline(&ball, &(pose * Pose::translation(p.x, p.y, p.z)), view)).collect()
 }
 
 /// The outline of a shape in a pose, counter-clockwise.

@@ -1,5 +1,5 @@
 //! The arm among its obstacles, from above, from the front and from the side, all at one scale.
-use super::outline::{View, clipped, outline};
+use super::outline::{View, clipped, outline, outlines};
 use nalgebra::Point3;
 use plotters::prelude::{ChartBuilder, Circle, Color, IntoFont, LineSeries, Polygon, RGBColor, Text};
 use std::ops::Range;
@@ -101,8 +101,12 @@ impl<'a> Stage<'a> {
                 sticks.push(used.map(|frame| view.of(&Point3::from(origin(frame)))).collect());
             }
         }
-        let obstacle = |o: &taustream_arm::Obstacle| (o.name.clone(), outline(&o.shape, &o.pose, view));
-        let obstacles: Vec<(String, Vec<Point>)> = self.scene.obstacles.iter().map(obstacle).collect();
+        let obstacle = |o: &taustream_arm::Obstacle| {
+            let mut name = Some(o.name.clone());
+            let named = |outline| (name.take().unwrap_or_default(), outline);
+            outlines(&o.shape, &o.pose, view).into_iter().map(named).collect::<Vec<_>>()
+        };
+        let obstacles: Vec<(String, Vec<Point>)> = self.scene.obstacles.iter().flat_map(obstacle).collect();
         let seen = |tip_m: &Vec<Point3<f64>>| tip_m.iter().map(|p| view.of(p)).collect();
         let tips: Vec<Vec<Point>> = self.tips_m.iter().map(seen).collect();
 
@@ -195,7 +199,7 @@ fn draw_view(area: &Area<'_>, seen: &Seen, x_m: Range<f64>, y_m: Range<f64>) -> 
 fn labels(seen: &Seen, (low, high): (Point, Point), m_per_px: f64) -> Vec<(&str, Point)> {
     let height_m = f64::from(LABEL_PX) * m_per_px;
     let mut placed: Vec<(&str, Point, f64)> = Vec::new();
-    for (name, obstacle) in &seen.obstacles {
+    for (name, obstacle) in seen.obstacles.iter().filter(|(name, _)| !name.is_empty()) {
         let shown = clipped(obstacle.clone(), low, high);
         if shown.is_empty() {
             continue;

@@ -106,6 +106,7 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Scene files: cylinder", "Cylinders; their axis is the local z."),
     ("Scene files: capsule", "Capsules; their axis is the local z."),
     ("Scene files: mesh", "Triangle meshes."),
+    ("Scene files: cloud", "Point clouds: a ball around each point."),
     ("Scene files: sphere[].name", "Name in messages; without it its place in the file."),
     ("Scene files: sphere[].center_m", "Centre (mesh: origin) in the base's frame."),
     ("Scene files: box[].name", "Name in messages; without it its place in the file."),
@@ -140,6 +141,18 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Scene files: capsule[].length_m", "Distance between the centres of the two half spheres."),
     ("Scene files: mesh[].file", "Mesh file, relative to this one."),
     ("Scene files: mesh[].scale", "Factor on the file's numbers; 0.001 for millimetres; without it 1."),
+    ("Scene files: cloud[].name", "Name in messages; without it its place in the file."),
+    ("Scene files: cloud[].center_m", "Where the points' origin is in the base's frame."),
+    (
+        "Scene files: cloud[].rpy_rad",
+        "Roll, pitch, yaw about the fixed axes x, y, z, as in URDF; without it 0.",
+    ),
+    ("Scene files: cloud[].file", "File of the points, relative to this one."),
+    (
+        "Scene files: cloud[].point_radius_m",
+        "Radius of the ball around each point: half the distance of neighbours closes a surface.",
+    ),
+    ("Scene files: cloud[].scale", "Factor on the file's coordinates; 0.001 for millimetres; without it 1."),
     (
         "Settings files: name",
         "Name of the arm. It stands in the names of its services, so that two arms on one computer do not meet.",

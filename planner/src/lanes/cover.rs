@@ -36,7 +36,7 @@ pub(super) fn balls(body: &Body) -> Vec<Ball> {
             let (centre, half) = body.core_bounds();
             cells(body, centre, half)
         }
-        Core::Mesh(_) => {
+        Core::Mesh(_) | Core::Cloud(_) => {
             let (centre, half) = body.core_bounds();
             vec![Ball { centre, outer_m: half.length() + body.radius_m() + ITERATED_M, inner_m: -1.0 }]
         }

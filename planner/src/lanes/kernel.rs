@@ -3,8 +3,10 @@ use super::Scratch;
 use super::arithmetic::{Ops, Vector, Vector3};
 use super::grid::Bounds;
 use super::model::{Form, Group, GroupPair, Model, Obstacle};
+use super::rounding::down;
 use pulp::{Simd, WithSimd};
 use std::f64::consts::PI;
+use taustream_arm::cloud::Cloud;
 use taustream_motion::{JointArray, MAX_JOINTS, USUAL_JOINTS};
 
 /// Most lanes of any machine.
@@ -157,8 +159,8 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
             // Most groups are clear of everything: one look at the least of all is enough then.
             let mut slack = self.ops.all(f32::MAX);
             for obstacle in &model.obstacles {
-                let apart2 = distance2(self.ops, obstacle, middle);
-                slack = self.less_slack(slack, apart2, self.group_keep(group, obstacle));
+                let keep = self.group_keep(group, obstacle);
+                slack = self.less_slack(slack, distance2(self.ops, obstacle, middle, Wanted::Bound), keep);
             }
             if self.ops.0.reduce_min_f32s(slack) > 0.0 {
                 return false;
@@ -201,7 +203,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
     #[inline(always)]
     fn is_near(&self, group: &Group, middle: Vector3<S>, obstacle: &Obstacle) -> bool {
         let keep = self.group_keep(group, obstacle);
-        self.ops.0.reduce_min_f32s(distance2(self.ops, obstacle, middle)) <= keep * keep
+        self.ops.0.reduce_min_f32s(distance2(self.ops, obstacle, middle, Wanted::Bound)) <= keep * keep
     }
 
     /// The least of a slack and of what some squared distances have beyond the square of what they must keep.
@@ -251,8 +253,10 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
         let keep = obstacle.radius + model.margin + self.extra + obstacle.tolerance;
         let mut slack = self.ops.all(f32::MAX);
         for sphere in group.spheres.clone() {
-            let apart2 = distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
-            slack = self.less_slack(slack, apart2, keep + model.spheres[sphere].outer);
+            let keep = keep + model.spheres[sphere].outer;
+            let apart2 =
+                distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere), Wanted::Within(keep));
+            slack = self.less_slack(slack, apart2, keep);
         }
         if self.ops.0.reduce_min_f32s(slack) > 0.0 {
             return false;
@@ -260,8 +264,14 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
         for cover in &model.covers[group.bodies.clone()] {
             let mut open = 0_u32;
             for sphere in cover.spheres.clone() {
-                let apart2 = distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere));
-                let Some(least2) = self.below(apart2, keep + model.spheres[sphere].outer, &mut open) else {
+                let keep = keep + model.spheres[sphere].outer;
+                let apart2 = distance2(
+                    self.ops,
+                    obstacle,
+                    Self::centre(&scratch.centres, sphere),
+                    Wanted::Within(keep),
+                );
+                let Some(least2) = self.below(apart2, keep, &mut open) else {
                     continue;
                 };
                 if obstacle.is_coarse {
@@ -397,9 +407,18 @@ fn is_below(square: f32, limit: f32) -> bool {
     limit > 0.0 && square < limit * limit
 }
 
+/// What shall be known of a distance.
+#[derive(Clone, Copy)]
+enum Wanted {
+    /// A lower bound, if that is quicker.
+    Bound,
+    /// The distance itself, if it is not more than this; any larger number otherwise.
+    Within(f32),
+}
+
 /// Squared distance of points from an obstacle's core: a root costs as much as all the rest.
 #[inline(always)]
-fn distance2<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Vector<S> {
+fn distance2<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>, wanted: Wanted) -> Vector<S> {
     let from = ops.sub3(point, ops.all3(obstacle.centre));
     match &obstacle.form {
         Form::AlignedBox(half) => outside(ops, from, *half),
@@ -432,6 +451,35 @@ fn distance2<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>) -> Ve
             ];
             ops.dot(across, across)
         }
+        Form::Cloud(cloud) => {
+            let rows = &obstacle.rows;
+            let seen = [along(ops, from, rows[0]), along(ops, from, rows[1]), along(ops, from, rows[2])];
+            let mut lanes = [[0.0_f32; LANES_MAX]; 3];
+            for (lane, seen) in lanes.iter_mut().zip(seen) {
+                S::as_mut_simd_f32s(lane).0[0] = seen;
+            }
+            let mut apart2 = [0.0; LANES_MAX];
+            to_points(cloud, &lanes, wanted, &mut apart2[..S::F32_LANES]);
+            S::as_simd_f32s(&apart2).0[0]
+        }
+    }
+}
+
+/// Squared distances to the nearest points of a cloud.
+fn to_points(cloud: &Cloud, lanes: &[[f32; LANES_MAX]; 3], wanted: Wanted, apart2: &mut [f32]) {
+    let [x, y, z] = lanes;
+    for (lane, apart2) in apart2.iter_mut().enumerate() {
+        let at = parry3d_f64::math::Vector::new(f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane]));
+        let mut apart_m = cloud.least_m(at);
+        if let Wanted::Within(keep) = wanted
+            && apart_m <= f64::from(keep)
+        {
+            // What is as far as that to the last bit is found too.
+            let found = cloud.tree().nearest(f64::from(keep.next_up()), |p| (p - at).length());
+            apart_m = found.map_or(f64::from(keep.next_up()), |(apart_m, _)| apart_m);
+        }
+        let apart = down(apart_m);
+        *apart2 = apart * apart;
     }
 }
 

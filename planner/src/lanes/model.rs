@@ -8,7 +8,9 @@ use parry3d_f64::math::{Pose, Vector};
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 use taustream_arm::body::{Body, Core, Posed};
+use taustream_arm::cloud::Cloud;
 
 /// Fewer obstacles than this are looked at one by one.
 const TREE_MIN: usize = 24;
@@ -59,6 +61,8 @@ pub(super) enum Form {
     Cylinder([f32; 2]),
     /// From the centre: a half of the segment, and 1 / its length squared.
     Segment([f32; 3], f32),
+    /// Points, asked for each lane.
+    Cloud(Arc<Cloud>),
 }
 
 /// An obstacle.
@@ -314,6 +318,7 @@ fn obstacle(body: &Body, at: &Posed, (joints, reach_m): (usize, f64)) -> Obstacl
         Core::Cylinder { half_m, radius_m } => {
             (Form::Cylinder([up(*half_m), up(*radius_m)]), origin, Some(axes[1]), false)
         }
+        Core::Cloud(cloud) => (Form::Cloud(cloud.clone()), origin, None, false),
         Core::Convex | Core::Mesh(_) => {
             let (middle, half) = body.core_bounds();
             (of_box(half), at.pose.transform_point(middle), None, true)
@@ -324,7 +329,7 @@ fn obstacle(body: &Body, at: &Posed, (joints, reach_m): (usize, f64)) -> Obstacl
         None => axes.map(single),
     };
     let iterated_m = match body.core() {
-        Core::Segment(..) | Core::Box(_) => 0.0,
+        Core::Segment(..) | Core::Box(_) | Core::Cloud(_) => 0.0,
         Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) => ITERATED_M,
     };
     let away_m = centre.length() + body.bound_m();

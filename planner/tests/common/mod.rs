@@ -129,7 +129,11 @@ fn ur5_capsules(robot: &Robot, q: &JointArray) -> Vec<Capsule> {
         let (radius_m, length_m) = match shape.shape {
             Shape::Capsule { radius_m, length_m } => (radius_m, length_m),
             Shape::Sphere { radius_m } => (radius_m, 0.0),
-            Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Mesh { .. } | Shape::Hull { .. } => {
+            Shape::Box { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Mesh { .. }
+            | Shape::Hull { .. }
+            | Shape::Cloud(_) => {
                 panic!("capsules only")
             }
         };

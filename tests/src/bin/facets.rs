@@ -29,7 +29,11 @@ fn main() -> Result<()> {
                 writeln!(out, "hull {name} {rounding_m:e}")?;
                 (vertices_m, triangles)
             }
-            Shape::Sphere { .. } | Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Capsule { .. } => {
+            Shape::Sphere { .. }
+            | Shape::Box { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Capsule { .. }
+            | Shape::Cloud(_) => {
                 continue;
             }
         };
