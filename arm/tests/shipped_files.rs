@@ -113,7 +113,7 @@ fn distance_m(obstacle: &Obstacle, point: &Point3<f64>) -> f64 {
             let here = to_parry(&Pose::identity());
             mesh.distance_m(&mesh.placed(&here), &point, &point.placed(&here))
         }
-        Shape::Hull { .. } => panic!("scenes have no hulls"),
+        Shape::Hull { .. } | Shape::Cloud(_) => panic!("shipped scenes have none"),
     }
 }
 

@@ -16,6 +16,7 @@ pub mod operator;
 pub mod pause;
 pub mod phase;
 pub mod plan;
+pub mod plan_detail;
 pub mod receipt;
 pub mod reference_state;
 pub mod report;

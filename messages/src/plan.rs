@@ -1,4 +1,5 @@
 //! Replan requests to the planner and its answers (request-response).
+use crate::plan_detail::{PlanDetail, WireDetail};
 use crate::tip_goal::{TipGoal, TipGoalWire};
 use crate::way_points::{Blend, WAY_POINTS_MAX, WayPointsWire};
 use crate::{LAYOUT_VERSION, Receipt, Text};
@@ -280,6 +281,7 @@ pub struct PlanReply {
     stages: PlanStages,
     receipt: Receipt,
     text: Text,
+    detail: WireDetail,
 }
 
 /// The answer, read.
@@ -314,7 +316,7 @@ pub enum PlanOutcome {
 impl PlanReply {
     /// Writes an outcome down.
     #[must_use]
-    pub fn new(outcome: &PlanOutcome) -> Self {
+    pub fn new(outcome: &PlanOutcome, detail: &PlanDetail) -> Self {
         let nothing = Receipt::new(0, 0, &crate::Outcome::Rejected(crate::Rejection::Busy));
         let mut reply = Self {
             layout_version: LAYOUT_VERSION,
@@ -328,6 +330,7 @@ impl PlanReply {
             stages: PlanStages::default(),
             receipt: nothing,
             text: Text::default(),
+            detail: WireDetail::new(detail),
         };
         match outcome {
             PlanOutcome::Failed { reason } => reply.text = Text::new(reason),
@@ -352,6 +355,12 @@ impl PlanReply {
             }
         }
         reply
+    }
+
+    /// What the planner says beside it.
+    #[must_use]
+    pub fn detail(&self) -> PlanDetail {
+        if self.layout_version == LAYOUT_VERSION { self.detail.read() } else { PlanDetail::default() }
     }
 
     /// The typed answer.
@@ -379,4 +388,4 @@ impl PlanReply {
 }
 
 const _: () = assert!(size_of::<PlanRequest>() == 528 + 16 + 2048);
-const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248);
+const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248 + size_of::<WireDetail>());

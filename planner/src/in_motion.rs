@@ -15,7 +15,7 @@ use crate::plan::{
 use crate::replacement::{replacement, to_rest};
 use crate::timing::Path;
 use crate::timing::onward::Onward;
-use crate::verify::{Proof, Stretch, Violation, verify_stretches};
+use crate::verify::{LeastDistance, Proof, Stretch, Violation, verify_stretches};
 use crate::world::World;
 use std::sync::atomic::AtomicBool;
 use std::thread;
@@ -68,7 +68,7 @@ pub struct Replacement {
     /// Kept and new strokes.
     pub trajectory: Trajectory,
     /// What was proven of it from the cut on.
-    pub clearance_m: f64,
+    pub least: LeastDistance,
     /// What it is, in a few words.
     pub how: String,
     /// When its strokes were there and its proof began, by `CLOCK_MONOTONIC`, ns.
@@ -138,8 +138,8 @@ impl Surroundings<'_> {
         let planned_ns = now_ns();
         let proof = self.prove(&tapered, cut, options)?;
         let how = "taper to rest".to_owned();
-        let (trajectory, clearance_m, replaces) = (tapered, proof.clearance_m, cut.replaces());
-        Ok(Replacement { trajectory, clearance_m, how, planned_ns, replaces })
+        let (trajectory, least, replaces) = (tapered, LeastDistance::of(&proof, 0.0), cut.replaces());
+        Ok(Replacement { trajectory, least, how, planned_ns, replaces })
     }
 
     /// A taper to rest, and an ordinary plan from there to the goal.
@@ -155,7 +155,7 @@ impl Surroundings<'_> {
         let proof = self.prove(&tapered, cut, options)?;
         let plan = self.plan(&tapered.end_rad(), points_rad, options)?;
         let how = format!("to rest at {:.3} s, then {}", tapered.duration_s(), plan.how);
-        stopping((&tapered, proof.clearance_m), &plan, (cut, how))
+        stopping((&tapered, &proof), &plan, (cut, how))
     }
 
     /// What runs goes on to its end, and an ordinary plan leads on from there.
@@ -206,7 +206,7 @@ impl Surroundings<'_> {
                     let (off_rad, how) = (timed.deviation_rad, &plan.how);
                     return Ok(Replacement {
                         trajectory: timed.trajectory,
-                        clearance_m: proof.clearance_m,
+                        least: LeastDistance::of(&proof, 0.0),
                         how: format!("on past {end_s:.3} s, rounded by at most {off_rad:.3} rad: {how}"),
                         planned_ns,
                         replaces: cut.replaces(),
@@ -238,15 +238,15 @@ impl Surroundings<'_> {
         let how = "straight on from the motion";
         if others_rad.is_empty() {
             let planned_ns = now_ns();
-            let clearance_m = self.prove(&trajectory, cut, options)?.clearance_m;
+            let least = LeastDistance::of(&self.prove(&trajectory, cut, options)?, 0.0);
             let (how, replaces) = (how.to_owned(), cut.replaces());
-            return Ok(Replacement { trajectory, clearance_m, how, planned_ns, replaces });
+            return Ok(Replacement { trajectory, least, how, planned_ns, replaces });
         }
         let plan = self.plan(&first_rad, others_rad, options)?;
         self.rounded(cut, (&trajectory, &plan), options).or_else(|_| {
             let proof = self.prove(&trajectory, cut, options)?;
             let how = format!("{how}, at {:.3} s at rest; {}", trajectory.duration_s(), plan.how);
-            stopping((&trajectory, proof.clearance_m), &plan, (cut, how))
+            stopping((&trajectory, &proof), &plan, (cut, how))
         })
     }
 
@@ -364,7 +364,7 @@ fn after(cut: &CutPoint, plan: &Plan) -> Result<Replacement, NoReplacement> {
     };
     Ok(Replacement {
         trajectory,
-        clearance_m: plan.proof.clearance_m,
+        least: LeastDistance::of(&plan.proof, cut.end_s),
         how: format!("after {:.3} s: {}", cut.end_s, plan.how),
         planned_ns: now_ns(),
         replaces: cut.replaces(),
@@ -373,13 +373,13 @@ fn after(cut: &CutPoint, plan: &Plan) -> Result<Replacement, NoReplacement> {
 
 /// A motion from the cut to rest, whose clearance is proven, and a plan that begins when it has ended.
 fn stopping(
-    (first, clearance_m): (&Trajectory, f64),
+    (first, proof): (&Trajectory, &Proof),
     plan: &Plan,
     (cut, how): (&CutPoint, String),
 ) -> Result<Replacement, NoReplacement> {
     let trajectory = continued(first.base_rad(), first.strokes(), (&plan.trajectory, first.duration_s()))?;
-    let clearance_m = clearance_m.min(plan.proof.clearance_m);
-    Ok(Replacement { trajectory, clearance_m, how, planned_ns: now_ns(), replaces: cut.replaces() })
+    let least = LeastDistance::of(proof, 0.0).min(LeastDistance::of(&plan.proof, first.duration_s()));
+    Ok(Replacement { trajectory, least, how, planned_ns: now_ns(), replaces: cut.replaces() })
 }
 
 /// Kept strokes, and a motion from rest to rest that begins at `from_s`, where they have ended.

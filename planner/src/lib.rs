@@ -3,6 +3,30 @@
 //! [`plan()`] goes from two poses to a verified motion; [`verify()`] proves any trajectory; the service
 //! (`taustream-planner`) answers replan requests and hands motions to the streamer. An ordinary process: it may
 //! allocate and use every core, and it never touches a bus.
+//!
+//! From files to a verified motion:
+//!
+//! ```
+//! use std::path::Path;
+//! use taustream_arm::{Robot, Scene};
+//! use taustream_motion::MAX_JOINTS;
+//! use taustream_planner::{PlanOptions, plan, verify};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+//! let robot = Robot::load(&config.join("robots/ur5.toml"))?;
+//! let scene = Scene::load(&config.join("scenes/pillars.toml"))?;
+//! let (mut start_rad, mut goal_rad) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+//! start_rad[..6].copy_from_slice(&[0.0, -1.57, 1.57, -1.57, -1.57, 0.0]);
+//! goal_rad[..6].copy_from_slice(&[1.2, -1.3, 1.4, -1.6, -1.57, 0.0]);
+//!
+//! let found = plan(&robot, &scene, &start_rad, &goal_rad, &PlanOptions::default())?;
+//! let proof = verify(&robot, &scene, &found.trajectory)?;
+//! assert!(proof.clearance_m > 0.0);
+//! println!("{:.3} s, {:.4} m clear", proof.duration_s, proof.clearance_m);
+//! # Ok(())
+//! # }
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod arguments;

@@ -98,22 +98,28 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Length of the path in joint space, rad: the sum of the differences of all joints, by dense samples.
+    /// Length of the path in joint space, rad; see [`path_length_rad`].
     #[must_use]
     pub fn path_length_rad(&self) -> f64 {
-        const SAMPLES: u32 = 2_000;
-        let (course, duration_s) = (Course::new(&self.trajectory), self.trajectory.duration_s());
-        let at = |i: u32| course.at(duration_s * f64::from(i) / f64::from(SAMPLES));
-        let mut before_rad = at(0);
-        let mut length_rad = 0.0;
-        for i in 1..=SAMPLES {
-            let now_rad = at(i);
-            let square: f64 = now_rad.iter().zip(&before_rad).map(|(a, b)| (a - b).powi(2)).sum();
-            length_rad += square.sqrt();
-            before_rad = now_rad;
-        }
-        length_rad
+        path_length_rad(&self.trajectory, 0.0)
     }
+}
+
+/// Length of a motion's path in joint space from an instant on, rad: the sum of the norms of the differences of all joints, by dense samples.
+#[must_use]
+pub fn path_length_rad(trajectory: &Trajectory, from_s: f64) -> f64 {
+    const SAMPLES: u32 = 2_000;
+    let (course, left_s) = (Course::new(trajectory), trajectory.duration_s() - from_s);
+    let at = |i: u32| course.at(from_s + left_s * f64::from(i) / f64::from(SAMPLES));
+    let mut before_rad = at(0);
+    let mut length_rad = 0.0;
+    for i in 1..=SAMPLES {
+        let now_rad = at(i);
+        let square: f64 = now_rad.iter().zip(&before_rad).map(|(a, b)| (a - b).powi(2)).sum();
+        length_rad += square.sqrt();
+        before_rad = now_rad;
+    }
+    length_rad
 }
 
 /// Which of the two given poses.

@@ -10,6 +10,7 @@ mod scene;
 mod scene_effect;
 mod streaming;
 mod tip;
+mod told;
 
 use crate::held::check_held;
 use crate::kept_scene::{SceneFile, restore};
@@ -17,6 +18,7 @@ use crate::kind::PlannerKind;
 use crate::live_scene::LiveScene;
 use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_through_until, plan_until};
 use crate::send::{Outbox, RECEIPT_TAKES, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
+use crate::verify::LeastDistance;
 use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
@@ -35,10 +37,12 @@ use taustream_messages::clock::now_ns;
 use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
+use taustream_messages::plan_detail::PlanDetail;
 use taustream_messages::service::{CommandClient, PlanServer, SceneServer, ServiceError, TargetServer, Wire};
 use taustream_messages::tip_goal::TipGoal;
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
+use told::Told;
 use tracing::{info, warn};
 
 /// How long the service waits for a request before it looks at targets, reports and files again: targets come without events.
@@ -126,6 +130,7 @@ pub struct Service<'a> {
     targets: TargetServer,
     stream: Stream,
     promise: Promise,
+    told: Told,
     footprint: Footprint,
 }
 
@@ -179,6 +184,7 @@ impl<'a> Service<'a> {
             targets: wire.target_server()?,
             stream: Stream::new(robot),
             promise,
+            told: Told::default(),
             footprint: wire.footprint(),
         })
     }
@@ -234,13 +240,14 @@ impl<'a> Service<'a> {
 
     fn take(&mut self, request: &Request) {
         self.received_ns = now_ns();
+        self.told.begin();
         // Copied out before it is checked.
         let copy = *request.payload();
         let outcome = match CheckedPlanRequest::try_from(&copy) {
             Ok(checked) => self.answer(request, &checked).unwrap_or_else(|reason| failed(&reason)),
             Err(e) => failed(&e.to_string()),
         };
-        self.reply(request, &outcome);
+        self.reply(request, (&outcome, &self.told.detail()));
     }
 
     fn answer(&mut self, request: &Request, requested: &CheckedPlanRequest) -> Result<PlanOutcome, String> {
@@ -320,7 +327,11 @@ impl<'a> Service<'a> {
             let all_rad: Vec<JointArray> = std::iter::once(start_rad).chain(points_rad).collect();
             plan_through_until((robot, scene, StartMargin::AsItStands), &all_rad, options, Some(cancel))
         })?;
-        let plan = planned.map_err(|e: PlanError| e.to_string())?;
+        let plan = planned.map_err(|e: PlanError| {
+            self.told.stages(e.stages());
+            e.to_string()
+        })?;
+        self.told.stages(&plan.stages);
         check_held(robot, &plan.trajectory, requested.held_joints).map_err(|e| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)
@@ -373,14 +384,12 @@ impl<'a> Service<'a> {
                 cancel.store(true, Ordering::Relaxed);
             }
             while let Ok(Some(other)) = self.server.receive() {
-                self.reply(
-                    &other,
-                    &failed(&format!(
-                        "the planner plans for another request, for {:.1} s of at most {:.1} s; ask again after it",
-                        since.elapsed().as_secs_f64(),
-                        deadline.as_secs_f64()
-                    )),
-                );
+                let refused = failed(&format!(
+                    "the planner plans for another request, for {:.1} s of at most {:.1} s; ask again after it",
+                    since.elapsed().as_secs_f64(),
+                    deadline.as_secs_f64()
+                ));
+                self.reply(&other, (&refused, &PlanDetail::default()));
             }
         }
     }
@@ -390,7 +399,10 @@ impl<'a> Service<'a> {
             return failed("the client has disconnected; motion not sent");
         }
         let proven_ns = now_ns();
-        match self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN) {
+        let sent = self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN);
+        // After it was sent: nobody moves later for it.
+        self.told.motion((&plan.trajectory, 0.0), LeastDistance::of(&plan.proof, 0.0));
+        match sent {
             Ok(sent) => PlanOutcome::Planned {
                 trajectory_id: sent.trajectory_id,
                 planning_s: plan.planning_s,
@@ -413,9 +425,9 @@ impl Service<'_> {
         PlanStages { received_ns, planned_ns, proven_ns, sent_ns: sent.sent_ns, receipt_ns: now_ns() }
     }
 
-    fn reply(&self, request: &Request, outcome: &PlanOutcome) {
+    fn reply(&self, request: &Request, (outcome, detail): (&PlanOutcome, &PlanDetail)) {
         // A requester that has gone needs no answer.
-        if let Err(e) = request.send_copy(PlanReply::new(outcome)) {
+        if let Err(e) = request.send_copy(PlanReply::new(outcome, detail)) {
             info!("the answer was not taken: {e:?}");
         }
         self.events.notify();

@@ -29,6 +29,38 @@ pub struct Proof {
     pub peaks: Peaks,
 }
 
+/// The least distance of a motion, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeastDistance {
+    /// See [`Proof::clearance_m`].
+    pub clearance_m: f64,
+    /// When, in trajectory time.
+    pub at_s: f64,
+    /// Between what. Empty when nothing can collide.
+    pub between: (String, String),
+    /// What these two must keep.
+    pub required_m: f64,
+}
+
+impl LeastDistance {
+    /// The one of a motion that begins at `from_s` of another.
+    #[must_use]
+    pub fn of(proof: &Proof, from_s: f64) -> Self {
+        Self {
+            clearance_m: proof.clearance_m,
+            at_s: proof.clearance_at_s + from_s,
+            between: proof.clearance_between.clone(),
+            required_m: proof.clearance_required_m,
+        }
+    }
+
+    /// The lesser of two.
+    #[must_use]
+    pub fn min(self, other: Self) -> Self {
+        if other.clearance_m < self.clearance_m { other } else { self }
+    }
+}
+
 /// Two things that are closer than they may be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use taustream_arm::{Robot, Scene, runtime};
 use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, When};
+use taustream_messages::plan_detail::PlanDetail;
 use taustream_messages::service::Wire;
 use taustream_messages::target::{CheckedTargets, Target, TargetOutcome};
 use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
@@ -195,6 +196,14 @@ fn request(when: When, planner: &str, goal_rad: JointArray) -> CheckedPlanReques
 
 /// Asks and waits for the answer.
 fn ask(arm: &str, requested: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> PlanOutcome {
+    ask_in_detail(arm, requested, meanwhile).0
+}
+
+fn ask_in_detail(
+    arm: &str,
+    requested: &CheckedPlanRequest,
+    meanwhile: impl FnOnce(),
+) -> (PlanOutcome, PlanDetail) {
     let wire = join(arm, "client");
     let client = wire.plan_client().expect("port");
     let pending = client.send_copy(PlanRequest::from(requested)).expect("sent");
@@ -202,7 +211,7 @@ fn ask(arm: &str, requested: &CheckedPlanRequest, meanwhile: impl FnOnce()) -> P
     let since = Instant::now();
     loop {
         if let Some(reply) = pending.receive().expect("received") {
-            return reply.payload().outcome();
+            return (reply.payload().outcome(), reply.payload().detail());
         }
         assert!(since.elapsed() < Duration::from_secs(20), "no answer");
         thread::sleep(Duration::from_millis(2));
@@ -242,6 +251,31 @@ fn service_replan_at_rest_is_planned_from_the_commanded_pose_and_sent() {
         assert!(matches!(error, SendError::WrongRobot { .. }), "{error}");
     });
     assert_eq!(played.accepted.load(Ordering::SeqCst), 3);
+}
+
+/// Goal: an answer says what was tried and where the motion is nearest to something; a refusal says what was tried.
+#[test]
+fn service_answer_says_what_was_tried_and_where_the_motion_is_nearest() {
+    let played = Played::new(Phase::Holding);
+    let wall = sphere("wall", [-0.6, -0.2, 0.3], 0.15);
+    let scene = Scene { obstacles: vec![wall], ..scene("open") };
+    with_service_in(&scene, "detail", &played, |arm, robot| {
+        let (outcome, detail) = ask_in_detail(arm, &request(When::AtOnce, "", pose(THERE)), || ());
+        let PlanOutcome::Planned { clearance_m, duration_s, .. } = outcome else { panic!("{outcome:?}") };
+        let nearest = detail.nearest.expect("a scene with an obstacle");
+        assert!((0.0..=duration_s).contains(&nearest.at_s) && clearance_m >= nearest.required_m);
+        assert!(robot.links.contains(&nearest.between[0]), "{nearest:?}");
+        assert!(detail.path_length_rad > 0.1, "{}", detail.path_length_rad);
+        assert!(detail.steps.iter().any(|step| step.what.contains("straight line")), "{:?}", detail.steps);
+        assert!(detail.steps.iter().any(|step| step.motion_s.is_some()), "{:?}", detail.steps);
+    });
+    with_service_in(&ringed(), "detail-of-none", &played, |arm, _| {
+        let one = CheckedPlanRequest { deadline_ms: 100, ..request(When::AtOnce, "", pose(THERE)) };
+        let (outcome, detail) = ask_in_detail(arm, &one, || ());
+        assert!(matches!(outcome, PlanOutcome::Failed { .. }), "{outcome:?}");
+        assert!(detail.steps.iter().any(|step| step.what.contains("blocked")), "{:?}", detail.steps);
+        assert_eq!(detail.nearest, None);
+    });
 }
 
 /// The operator's way on after a stop: the arm stands nearer to a ball than the margin, and is led away from it.

@@ -39,6 +39,7 @@ impl Field {
 #[derive(Debug)]
 struct Grid {
     low: Vector,
+    cell_m: f64,
     per_m: f64,
     size: [usize; 3],
     /// Half of a cell's diagonal.
@@ -63,7 +64,14 @@ impl Grid {
             cells.max(1)
         });
         let cells = (0..size.iter().product()).map(|_| AtomicU32::new(UNKNOWN)).collect();
-        Self { low: middle - half, per_m: 1.0 / cell_m, size, half_m: 0.5 * cell_m * 3.0_f64.sqrt(), cells }
+        Self {
+            low: middle - half,
+            cell_m,
+            per_m: 1.0 / cell_m,
+            size,
+            half_m: 0.5 * cell_m * 3.0_f64.sqrt(),
+            cells,
+        }
     }
 
     fn least_m(&self, tree: &PointTree, at: Vector) -> f64 {
@@ -100,6 +108,6 @@ impl Grid {
             index = index * size + cell;
             centre[axis] = cell as f64 + 0.5;
         }
-        Some((index, self.low + Vector::from_array(centre) / self.per_m))
+        Some((index, self.low + Vector::from_array(centre) * self.cell_m))
     }
 }

@@ -143,6 +143,9 @@ pub(crate) struct ReplanArgs {
     /// Planner.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = planner_kind())]
     pub(crate) planner: PlannerKind,
+    /// Say what was tried, step by step: how long each took, and what came of it.
+    #[arg(long)]
+    pub(crate) explain: bool,
     /// Return only when the motion has ended.
     #[arg(long)]
     pub(crate) wait: bool,

@@ -4,7 +4,7 @@ use super::follow::{Executed, follow, say_pauses};
 use crate::args::{Goal, ReplanArgs};
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
-use crate::offline::verify::Unmodelled;
+use crate::offline::verify::{Unmodelled, clearance_words};
 use crate::output::Form;
 use crate::progress::Waiting;
 use crate::started_ns;
@@ -17,9 +17,11 @@ use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_messages::clock::now_ns;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
+use taustream_messages::plan_detail::{PlanDetail, PlanStep};
 use taustream_messages::tip_goal::{TipGoal, TipLine, TipOrientation};
 use taustream_messages::{Outcome, Phase, PlanRequest, Receipt, Report};
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::explain::Stage;
 use taustream_planner::goals::TipSpeed;
 use taustream_planner::{PlanOptions, TipTarget};
 
@@ -35,14 +37,47 @@ pub(crate) struct Planned {
     pub(crate) planning_s: f64,
     pub(crate) duration_s: f64,
     pub(crate) clearance_m: f64,
+    /// Where the motion is nearest to something, in trajectory time; null when nothing can collide.
+    clearance_at_s: Option<f64>,
+    clearance_between: Option<[String; 2]>,
+    clearance_required_m: Option<f64>,
+    /// Of the path in joint space that is still to go.
+    path_length_rad: f64,
+    /// What was tried, in its order.
+    steps: Vec<StepLine>,
     pub(crate) strokes: u32,
     pub(crate) accepted: bool,
     pub(crate) from_s: f64,
     pub(crate) tick: u64,
+    /// True when people shall see the steps, too.
+    #[serde(skip)]
+    explain: bool,
     #[serde(skip)]
     asked_ns: u64,
     #[serde(skip)]
     planner_stages: PlanStages,
+}
+
+/// One step of planning.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct StepLine {
+    what: String,
+    took_s: f64,
+    /// Duration of the best verified motion after it.
+    motion_s: Option<f64>,
+}
+
+impl From<PlanStep> for StepLine {
+    fn from(PlanStep { what, took_s, motion_s }: PlanStep) -> Self {
+        Self { what, took_s, motion_s }
+    }
+}
+
+impl fmt::Display for StepLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let stage = Stage { what: self.what.clone(), took_s: self.took_s, motion_s: self.motion_s };
+        write!(f, "  {stage}")
+    }
 }
 
 /// When what was done, s after the request was sent.
@@ -110,13 +145,20 @@ impl Planned {
 impl fmt::Display for Planned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "planned by    {} in {:.3} s", self.planner, self.planning_s)?;
+        if self.explain {
+            self.steps.iter().try_for_each(|step| writeln!(f, "{step}"))?;
+        }
         writeln!(
             f,
-            "duration      {:.3} s at full speed, {}",
+            "duration      {:.3} s at full speed, {}, {:.3} rad long",
             self.duration_s,
-            counted(self.strokes, "stroke")
+            counted(self.strokes, "stroke"),
+            self.path_length_rad
         )?;
-        writeln!(f, "clearance     {:.4} m", self.clearance_m)?;
+        let [a, b] = self.clearance_between.clone().unwrap_or_default();
+        let (at_s, required_m) = (self.clearance_at_s, self.clearance_required_m);
+        let (at_s, required_m) = (at_s.unwrap_or_default(), required_m.unwrap_or_default());
+        writeln!(f, "clearance     {}", clearance_words((self.clearance_m, required_m), at_s, (&a, &b)))?;
         let (id, generation) = (self.trajectory_id, self.generation);
         write!(
             f,
@@ -171,7 +213,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         planner: args.planner.name().to_owned(),
         ..CheckedPlanRequest::to_pose(robot.joints.len(), goal_rad)
     };
-    go(form, (&client, &settings), &request, args.wait).map_err(|failure| {
+    go(form, (&client, &settings), &request, (args.wait, args.explain)).map_err(|failure| {
         let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot, group));
         match hint {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
@@ -214,14 +256,20 @@ pub(crate) fn go(
     form: Form,
     (client, settings): (&Client, &Settings),
     request: &CheckedPlanRequest,
-    wait: bool,
+    (wait, explain): (bool, bool),
 ) -> Result<(), Failure> {
     let arm = ArmName::of(settings);
     let (mut waiting, words) = (Waiting::begin(), format!("planning, {:.1} s at most", deadline_s(request)));
-    let planned = ask_while(client, &arm, request, &mut || {
+    let mut say = || {
         waiting.say(form, &words);
         Ok(())
-    })?;
+    };
+    let mut tell = |steps: &[StepLine]| {
+        if explain {
+            steps.iter().for_each(|step| form.progress(step));
+        }
+    };
+    let planned = Planned { explain, ..ask_while(client, &arm, request, (&mut say, &mut tell))? };
     let answered_ns = now_ns();
     let mut first_setpoint_ns = None;
     let executed = if wait {
@@ -249,12 +297,12 @@ fn deadline_s(request: &CheckedPlanRequest) -> f64 {
 }
 
 /// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
-/// planner plans.
+/// planner plans; `told` is given what was tried in vain.
 pub(crate) fn ask_while(
     client: &Client,
     arm: &ArmName,
     request: &CheckedPlanRequest,
-    meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+    (meanwhile, told): (&mut dyn FnMut() -> Result<(), Failure>, &mut dyn FnMut(&[StepLine])),
 ) -> Result<Planned, Failure> {
     let remaining_s = match request.when {
         // The planner looks at the streamer by itself, and at once.
@@ -264,8 +312,11 @@ pub(crate) fn ask_while(
     let limit_s = deadline_s(request) + ANSWER_S + remaining_s;
     let asked_ns = now_ns();
     let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
+    let PlanDetail { path_length_rad, nearest, steps } = reply.detail();
+    let steps: Vec<StepLine> = steps.into_iter().map(StepLine::from).collect();
     match reply.outcome() {
         PlanOutcome::Failed { reason } => {
+            told(&steps);
             // A planner without a streamer has no pose to start from.
             client.report()?;
             Err(Failure::Refused(format!("no plan: {reason}")))
@@ -291,10 +342,16 @@ pub(crate) fn ask_while(
                 planning_s,
                 duration_s,
                 clearance_m,
+                clearance_at_s: nearest.as_ref().map(|n| n.at_s),
+                clearance_required_m: nearest.as_ref().map(|n| n.required_m),
+                clearance_between: nearest.map(|n| n.between),
+                path_length_rad,
+                steps,
                 strokes,
                 accepted: true,
                 from_s,
                 tick,
+                explain: false,
                 asked_ns,
                 planner_stages: stages,
             })

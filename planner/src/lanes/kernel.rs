@@ -254,8 +254,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
         let mut slack = self.ops.all(f32::MAX);
         for sphere in group.spheres.clone() {
             let keep = keep + model.spheres[sphere].outer;
-            let apart2 =
-                distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere), Wanted::Within(keep));
+            let apart2 = distance2(self.ops, obstacle, Self::centre(&scratch.centres, sphere), Wanted::Bound);
             slack = self.less_slack(slack, apart2, keep);
         }
         if self.ops.0.reduce_min_f32s(slack) > 0.0 {

@@ -70,6 +70,18 @@ enum Way {
     End,
 }
 
+impl std::fmt::Display for Way {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Taper => "to rest as soon as possible",
+            Self::Direct => "straight on to the goal",
+            Self::RestFirst => "to rest, and on to the goal",
+            Self::PastEnd => "past the end of the motion",
+            Self::End => "from the end of the motion",
+        })
+    }
+}
+
 /// What became of a try.
 enum Tried {
     /// The answer.
@@ -105,15 +117,18 @@ impl Service<'_> {
         for way in ways {
             let tries = if *way == Way::End { END_TRIES } else { TRIES };
             for number in 0..tries {
+                let begun = Instant::now();
                 match self.try_way(request, (requested, options), &report, (*way, number))? {
                     Tried::Done(outcome) => return Ok(outcome),
                     Tried::NoWay(reason) => {
                         info!("{way:?}: {reason}");
+                        self.told.step(format!("{way}: {reason}"), begun.elapsed().as_secs_f64(), None);
                         why = reason;
                         break;
                     }
                     Tried::TooLate(rejection) => {
                         info!("{way:?}: {rejection}");
+                        self.told.step(format!("{way}: {rejection}"), begun.elapsed().as_secs_f64(), None);
                         why = rejection.to_string();
                     }
                 }
@@ -199,6 +214,9 @@ impl Service<'_> {
         {
             return Ok(Tried::TooLate(rejection));
         }
+        let motion_s = made.trajectory.duration_s() - from_s;
+        self.told.step(format!("{way}: {}", made.how), planning_s, Some(motion_s));
+        self.told.motion((&made.trajectory, from_s), made.least.clone());
         let stages = PlanStages { planned_ns: made.planned_ns, ..self.stages(&sent, proven_ns) };
         Ok(Tried::Done(outcome(&sent, made, (planning_s, stages))))
     }
@@ -277,7 +295,7 @@ fn outcome(sent: &SentTrajectory, made: Replacement, (planning_s, stages): (f64,
         trajectory_id: sent.trajectory_id,
         planning_s,
         duration_s: made.trajectory.duration_s() - at_s,
-        clearance_m: made.clearance_m,
+        clearance_m: made.least.clearance_m,
         strokes: u32::try_from(made.trajectory.strokes().len()).unwrap_or(u32::MAX),
         how: made.how,
         receipt: sent.receipt.map(Box::new),
