@@ -1,6 +1,6 @@
 //! A scene: obstacles around the arm.
 use crate::Faults;
-use crate::cloud::{self, Cloud};
+use crate::cloud::Cloud;
 use crate::document::{self, Node};
 use crate::mesh;
 use crate::reader::{Bounds, FaultList, Table};
@@ -182,7 +182,7 @@ fn read_cloud(table: &mut Table<'_>) -> Option<Shape> {
     let scale = table.number_or("scale", 1.0, &SCALE);
     let (file, radius_m, scale) = (file?, radius_m?, scale?);
     let path = document::beside(table.fault_list().file(), &file);
-    match cloud::load(&path, scale, radius_m) {
+    match Cloud::load(&path, scale, radius_m) {
         Ok(cloud) => Some(Shape::Cloud(Arc::new(cloud))),
         Err((value, expected)) => {
             table.fault("file", &value, &expected);

@@ -8,6 +8,7 @@
 pub mod axis;
 pub mod bus;
 pub mod clock;
+pub mod cloud;
 pub mod command;
 pub mod event;
 pub mod fault;

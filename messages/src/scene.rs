@@ -122,7 +122,7 @@ pub struct ObjectPose {
 }
 
 impl ObjectPose {
-    fn check(self) -> Result<Self, What> {
+    pub(crate) fn check(self) -> Result<Self, What> {
         if let Some(&value_m) = self.position_m.iter().find(|x| !(-FAR_M..=FAR_M).contains(*x)) {
             return Err(What::Position { value_m });
         }

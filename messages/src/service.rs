@@ -3,6 +3,7 @@
 //! Segments lie in one flat name space of the host, so the arm's name and the user's id stand in the prefix:
 //! two arms, or two users, on one host do not meet. Nothing is read from an iceoryx2 file, and segments belong
 //! to one uid only.
+use crate::cloud::CloudRequest;
 use crate::files::{ArmFiles, Footprint, NODE_COUNTER, ROOT, SEGMENTS, UsersLock};
 use crate::operator::abstract_name;
 use crate::{
@@ -47,6 +48,10 @@ pub type PlanClient = Client<ipc::Service, PlanRequest, (), PlanReply, ()>;
 pub type SceneClient = Client<ipc::Service, SceneRequest, (), SceneReply, ()>;
 /// Takes changes of the scene.
 pub type SceneServer = Server<ipc::Service, SceneRequest, (), SceneReply, ()>;
+/// Sends point clouds to the planner's scene.
+pub type CloudClient = Client<ipc::Service, CloudRequest, (), SceneReply, ()>;
+/// Takes point clouds.
+pub type CloudServer = Server<ipc::Service, CloudRequest, (), SceneReply, ()>;
 /// Sends targets to the planner.
 pub type TargetClient = Client<ipc::Service, TargetRequest, (), TargetReply, ()>;
 /// Takes targets.
@@ -483,4 +488,5 @@ macro_rules! request_response {
 request_response!(command_service, command_client, command_server, CommandRequest, CommandReply, "command");
 request_response!(plan_service, plan_client, plan_server, PlanRequest, PlanReply, "plan");
 request_response!(target_service, target_client, target_server, TargetRequest, TargetReply, "target");
+request_response!(cloud_service, cloud_client, cloud_server, CloudRequest, SceneReply, "cloud");
 request_response!(scene_service, scene_client, scene_server, SceneRequest, SceneReply, "scene");

@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 use taustream_messages::command::CommandError;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanRequestError, PlanStages, When};
+use taustream_messages::plan_detail::PlanDetail;
 use taustream_messages::scene::{
     CHANGES_MAX, FAR_M, FixedTo, MASS_KG_MAX, ObjectPose, ObjectShape, PAGE, SceneChange, SceneRequestError,
     What, is_object_name,
@@ -334,7 +335,7 @@ fn plan_request_and_answer_survive_the_wire() {
         },
     ];
     for outcome in outcomes {
-        assert_eq!(PlanReply::new(&outcome).outcome(), outcome);
+        assert_eq!(PlanReply::new(&outcome, &PlanDetail::default()).outcome(), outcome);
     }
 }
 

@@ -10,9 +10,11 @@ use crate::world::World;
 use nalgebra::{Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
+use taustream_arm::cloud::Cloud;
 use taustream_arm::mass::LinkMass;
 use taustream_arm::scene::OBSTACLES_MAX;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene, Shape};
+use taustream_messages::cloud::CheckedCloud;
 use taustream_messages::scene::{FixedTo, ObjectPose, ObjectShape, SceneChange};
 use taustream_messages::scene_reply::ListedObject;
 use taustream_motion::JointArray;
@@ -128,6 +130,16 @@ pub enum SceneChangeError {
         /// How many.
         tips: usize,
     },
+    /// Points that make no cloud.
+    #[error("the cloud {name:?} {value}; {expected}")]
+    Points {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        value: String,
+        /// What was expected.
+        expected: String,
+    },
     /// Nobody knows where the tip is.
     #[error(
         "where the tip is must be known, and the arm at rest, to attach or detach {name:?}: wait until it rests, or pause it"
@@ -239,6 +251,30 @@ impl LiveScene {
         changes: &[SceneChange],
         at_rest: Option<&JointArray>,
     ) -> Result<Changed, SceneChangeError> {
+        self.revise(at_rest, |draft| changes.iter().try_for_each(|change| draft.make(change)))
+    }
+
+    /// Puts a point cloud into the scene.
+    ///
+    /// # Errors
+    /// When its points make no sense, or its name is taken.
+    pub fn put_cloud(&mut self, cloud: &CheckedCloud) -> Result<Changed, SceneChangeError> {
+        let name = || cloud.name.clone();
+        let points = Cloud::new(cloud.points_m.clone(), cloud.point_radius_m)
+            .map_err(|(value, expected)| SceneChangeError::Points { name: name(), value, expected })?;
+        self.revise(None, |draft| {
+            draft.clear_for(&cloud.name, cloud.replaces)?;
+            let shape = Shape::Cloud(Arc::new(points));
+            draft.put(Obstacle { name: name(), pose: pose_to(&cloud.pose), shape }, FixedTo::Base, 0.0);
+            Ok(())
+        })
+    }
+
+    fn revise(
+        &mut self,
+        at_rest: Option<&JointArray>,
+        make: impl FnOnce(&mut Draft) -> Result<(), SceneChangeError>,
+    ) -> Result<Changed, SceneChangeError> {
         let SceneRevision { number, robot, scene, world } = &self.current;
         let mut draft = Draft {
             robot: &self.settings_robot,
@@ -249,9 +285,7 @@ impl LiveScene {
             reshaped: BTreeSet::new(),
             tip_changed: false,
         };
-        for change in changes {
-            draft.make(change)?;
-        }
+        make(&mut draft)?;
         let count = draft.obstacles.len() + draft.attached.len();
         if count > OBSTACLES_MAX && count > scene.obstacles.len() + self.attached.len() {
             return Err(SceneChangeError::Full { count });
@@ -285,14 +319,7 @@ impl Draft<'_> {
     fn make(&mut self, change: &SceneChange) -> Result<(), SceneChangeError> {
         match change {
             SceneChange::Add { name, shape, pose, fixed_to, mass_kg, replaces } => {
-                if self.robot.links.contains(name) {
-                    let (name, robot) = (name.clone(), self.robot.name.clone());
-                    return Err(SceneChangeError::Link { name, robot });
-                }
-                let was_there = self.take(name).is_some();
-                if was_there && !replaces {
-                    return Err(SceneChangeError::Exists { name: name.clone() });
-                }
+                self.clear_for(name, *replaces)?;
                 let shape = shape_to(shape).ok_or_else(|| SceneChangeError::Mesh { name: name.clone() })?;
                 if *fixed_to == FixedTo::Tip {
                     self.check_tip(name)?;
@@ -308,6 +335,16 @@ impl Draft<'_> {
             SceneChange::Detach { name } => self.detach(name)?,
         }
         Ok(())
+    }
+
+    /// Makes way for a new object of a name.
+    fn clear_for(&mut self, name: &str, replaces: bool) -> Result<(), SceneChangeError> {
+        let name = name.to_owned();
+        if self.robot.links.contains(&name) {
+            return Err(SceneChangeError::Link { name, robot: self.robot.name.clone() });
+        }
+        let was_there = self.take(&name).is_some();
+        if was_there && !replaces { Err(SceneChangeError::Exists { name }) } else { Ok(()) }
     }
 
     fn relocate(&mut self, name: &str, pose: Pose) -> Result<(), SceneChangeError> {

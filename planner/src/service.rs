@@ -38,7 +38,9 @@ use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::plan_detail::PlanDetail;
-use taustream_messages::service::{CommandClient, PlanServer, SceneServer, ServiceError, TargetServer, Wire};
+use taustream_messages::service::{
+    CloudServer, CommandClient, PlanServer, SceneServer, ServiceError, TargetServer, Wire,
+};
 use taustream_messages::tip_goal::TipGoal;
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
@@ -113,6 +115,7 @@ pub struct Service<'a> {
     live_scene: RefCell<LiveScene>,
     scene_file: Option<SceneFile>,
     scene_server: SceneServer,
+    cloud_server: CloudServer,
     /// What became of a motion by a change of the scene last.
     last_effect: RefCell<String>,
     foreign: Foreign,
@@ -169,6 +172,7 @@ impl<'a> Service<'a> {
             live_scene: RefCell::new(live_scene),
             scene_file: None,
             scene_server: wire.scene_server()?,
+            cloud_server: wire.cloud_server()?,
             last_effect: RefCell::default(),
             foreign: Foreign::open(wire)?,
             commands: wire.command_client()?,

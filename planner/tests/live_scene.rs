@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use taustream_arm::rng::SeededRng;
 use taustream_arm::{Obstacle, Robot, Scene, runtime};
 use taustream_messages::clock::now_ns;
+use taustream_messages::cloud::{CheckedCloud, CloudRequest};
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome};
 use taustream_messages::scene::{FixedTo, ObjectPose, ObjectShape, SceneChange};
 use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
@@ -211,6 +212,19 @@ impl Asker {
     fn scene(&self, request: &CheckedSceneRequest) -> SceneOutcome {
         let client = self.wire.scene_client().expect("port");
         let pending = client.send_copy(SceneRequest::from(request)).expect("sent");
+        let since = Instant::now();
+        loop {
+            if let Some(reply) = pending.receive().expect("received") {
+                return SceneReply::outcome(reply.payload());
+            }
+            assert!(since.elapsed() < Duration::from_secs(20), "no answer");
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn cloud(&self, cloud: &CheckedCloud) -> SceneOutcome {
+        let client = self.wire.cloud_client().expect("port");
+        let pending = client.send_copy(*CloudRequest::new(cloud)).expect("sent");
         let since = Instant::now();
         loop {
             if let Some(reply) = pending.receive().expect("received") {
@@ -434,6 +448,48 @@ fn attached_object_moves_with_the_tip_and_counts_in_plans() {
             *when > since && (q[1] - FROM[1]).abs() + (q[2] - FROM[2]).abs() + (q[3] - FROM[3]).abs() > 0.05
         });
         assert!(goes_out, "the rod went through the hindrance");
+    });
+}
+
+/// Goal: points that a camera saw count in plans as any obstacle does, and a later message takes the place of an earlier one.
+#[test]
+fn points_of_a_message_count_in_plans_and_are_replaced_by_later_ones() {
+    let played = Played::default();
+    with_service("cloud", &empty(), &played, |asker| {
+        let side = |i: usize| (i as f64 - 4.5) * 0.02;
+        let sheet = (0..100).map(|i| [side(i % 10), side(i / 10), 0.0]).chain([[f64::NAN; 3]]).collect();
+        let mut seen = CheckedCloud {
+            name: "seen".to_owned(),
+            pose: at(on_the_way(0.0)),
+            point_radius_m: 0.012,
+            points_m: sheet,
+            replaces: true,
+        };
+        let outcome = asker.cloud(&seen);
+        assert!(matches!(outcome, SceneOutcome::Changed { total: 1, .. }), "{outcome:?}");
+        let mut half_way = TO;
+        half_way[0] = 0.0;
+        let PlanOutcome::Failed { reason } = asker.go(pose(half_way)) else { panic!("into the points") };
+        assert!(reason.contains("seen"), "{reason}");
+        let listed = asker.objects().pop().expect("one object");
+        assert_eq!((listed.name.as_str(), listed.shape), ("seen", ObjectShape::Cloud));
+
+        seen.pose = at([0.0, 0.0, 3.0]);
+        let outcome = asker.cloud(&seen);
+        assert!(matches!(outcome, SceneOutcome::Changed { total: 1, .. }), "{outcome:?}");
+        let PlanOutcome::Planned { .. } = asker.go(pose(half_way)) else { panic!("the points have gone") };
+
+        let refused = |cloud: &CheckedCloud| match asker.cloud(cloud) {
+            SceneOutcome::Refused { reason } => reason,
+            outcome @ (SceneOutcome::Listed { .. } | SceneOutcome::Changed { .. }) => panic!("{outcome:?}"),
+        };
+        seen.replaces = false;
+        assert!(refused(&seen).contains("already"));
+        seen.replaces = true;
+        seen.points_m = vec![[f64::NAN; 3]; 4];
+        assert!(refused(&seen).contains("no point"), "{}", refused(&seen));
+        seen.points_m = vec![[0.0, 0.0, 2e3]];
+        assert!(refused(&seen).contains("2000"), "{}", refused(&seen));
     });
 }
 

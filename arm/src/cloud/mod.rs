@@ -71,6 +71,31 @@ impl Cloud {
         self.field.least_m(&self.tree, at)
     }
 
+    /// Reads the points of a file (`.ply`, `.pcd` or `.xyz`), each coordinate times `scale`.
+    ///
+    /// # Errors
+    /// What is wrong and what was expected.
+    pub fn load(file: &Path, scale: f64, radius_m: f64) -> Result<Self, Refusal> {
+        let refusal = |(value, expected): Refusal| (format!("{} {value}", file.display()), expected);
+        let ending = file.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        let read = match ending.as_str() {
+            "ply" => ply::read,
+            "pcd" => pcd::read,
+            "xyz" => text,
+            _ => {
+                let expected = "a point cloud named .ply, .pcd or .xyz (text: x y z a line)";
+                return Err(refusal(("is none of .ply, .pcd and .xyz".to_owned(), expected.to_owned())));
+            }
+        };
+        let bytes = read_file(file, BYTES_MAX, "a point cloud").map_err(|faults| match faults.0.first() {
+            Some(fault) => refusal((format!("is {}", fault.value), fault.expected.clone())),
+            None => refusal(("cannot be read".to_owned(), "a point cloud".to_owned())),
+        })?;
+        let mut points = read(&bytes).map_err(refusal)?;
+        points.iter_mut().flatten().for_each(|x| *x *= scale);
+        Self::new(points, radius_m).map_err(refusal)
+    }
+
     /// The points, by place.
     #[must_use]
     pub fn tree(&self) -> &PointTree {
@@ -82,28 +107,6 @@ impl PartialEq for Cloud {
     fn eq(&self, other: &Self) -> bool {
         self.tree == other.tree && self.radius_m.to_bits() == other.radius_m.to_bits()
     }
-}
-
-/// Reads the points of a file; the ending of its name says which format it is.
-pub(crate) fn load(file: &Path, scale: f64, radius_m: f64) -> Result<Cloud, Refusal> {
-    let refusal = |(value, expected): Refusal| (format!("{} {value}", file.display()), expected);
-    let ending = file.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let read = match ending.as_str() {
-        "ply" => ply::read,
-        "pcd" => pcd::read,
-        "xyz" => text,
-        _ => {
-            let expected = "a point cloud named .ply, .pcd or .xyz (text: x y z a line)";
-            return Err(refusal(("is none of .ply, .pcd and .xyz".to_owned(), expected.to_owned())));
-        }
-    };
-    let bytes = read_file(file, BYTES_MAX, "a point cloud").map_err(|faults| match faults.0.first() {
-        Some(fault) => refusal((format!("is {}", fault.value), fault.expected.clone())),
-        None => refusal(("cannot be read".to_owned(), "a point cloud".to_owned())),
-    })?;
-    let mut points = read(&bytes).map_err(refusal)?;
-    points.iter_mut().flatten().for_each(|x| *x *= scale);
-    Cloud::new(points, radius_m).map_err(refusal)
 }
 
 /// Three numbers a line; what follows them (intensity, colour) is left out.

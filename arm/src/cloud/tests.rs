@@ -9,6 +9,7 @@ const POINTS: [[f64; 3]; 2] = [[0.5, -1.25, 2.0], [3.0, 0.0, -0.125]];
 
 #[test]
 fn every_kind_of_file_gives_the_same_points() {
+    #[expect(clippy::cast_possible_truncation, reason = "the numbers are short")]
     let little = |x: f64| (x as f32).to_le_bytes().to_vec();
     let mut pcd = b"# .PCD v0.7\nVERSION 0.7\nFIELDS rgb x y z\nSIZE 4 4 4 4\nTYPE U F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary\n".to_vec();
     let mut ply = b"ply\nformat binary_big_endian 1.0\nelement vertex 2\nproperty uchar red\nproperty double x\nproperty double y\nproperty double z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n".to_vec();
@@ -49,7 +50,7 @@ fn cut_and_spoiled_files_are_refused() {
         }
         let cut = rng.index(bytes.len());
         // What comes of it does not matter; that it comes does.
-        let _ = (pcd::read(&bytes), ply::read(&bytes), super::text(&bytes), pcd::read(&bytes[..cut]));
+        let _ = (pcd::read(&bytes), ply::read(&bytes), text(&bytes), pcd::read(&bytes[..cut]));
     }
 }
 
@@ -81,7 +82,7 @@ fn nearest_point_is_the_nearest_of_all() {
         let (found_m, index) = tree.nearest(f64::INFINITY, distance_m).expect("some point");
         assert_eq!(found_m.to_bits(), truth_m.to_bits(), "seed {seed}");
         assert_eq!(distance_m(tree.points()[index]).to_bits(), truth_m.to_bits());
-        let field = field::Field::around(&tree);
+        let field = Field::around(&tree);
         for _ in 0..100 {
             let at = 2.0 * point();
             let nearest_m = points.iter().map(|p| (*p - at).length()).fold(f64::INFINITY, f64::min);

@@ -11,6 +11,7 @@ Examples:
   taustream scene attach crate --mass-kg 1.2      the tip takes it where it is; the arm must be at rest
   taustream scene detach crate                    the tip leaves it where it is
   taustream scene add tool --capsule 0.02,0.1 --at 0,0,0.05 --tip --mass-kg 0.4
+  taustream scene add bin --cloud bin.pcd --point-radius-m 0.005 --at 0.5,0,0.1 --replace
   taustream scene remove crate
 
 Every change is checked at once against the motion that runs: what is in its way makes the planner lead the arm to its goal by
@@ -29,7 +30,7 @@ pub(crate) struct SceneArgs {
 impl SceneArgs {
     /// True when a file of the caller is read.
     pub(crate) fn reads_a_file(&self) -> bool {
-        matches!(&self.action, SceneAction::Add(AddArgs { file: Some(_), .. }))
+        matches!(&self.action, SceneAction::Add(AddArgs { file, cloud, .. }) if file.is_some() || cloud.is_some())
     }
 }
 
@@ -60,7 +61,7 @@ pub(crate) struct NameArgs {
 
 /// `taustream scene add`
 #[derive(Args, Debug)]
-#[command(group = ArgGroup::new("shape").args(["sphere", "box", "cylinder", "capsule"]), group = ArgGroup::new("what").required(true).args(["name", "file"]))]
+#[command(group = ArgGroup::new("shape").args(["sphere", "box", "cylinder", "capsule", "cloud"]), group = ArgGroup::new("what").required(true).args(["name", "file"]))]
 pub(crate) struct AddArgs {
     /// Its name: letters, digits, '_', '-' and '.'.
     #[arg(value_name = "NAME", value_parser = name, requires = "shape")]
@@ -80,6 +81,12 @@ pub(crate) struct AddArgs {
     /// A capsule along its z axis: radius, and length between the centres of its ends, m.
     #[arg(long, value_name = "R,L", allow_hyphen_values = true, value_parser = capsule)]
     pub(crate) capsule: Option<ObjectShape>,
+    /// Points that a camera saw: a .ply, .pcd or .xyz file of up to 32768 points; --at is where its origin is.
+    #[arg(long, value_name = "FILE", requires = "point_radius_m", conflicts_with_all = ["tip", "mass_kg"])]
+    pub(crate) cloud: Option<PathBuf>,
+    /// Radius of the ball around each point of --cloud, m: half the distance of neighbours closes a surface.
+    #[arg(long, value_name = "M", requires = "cloud", allow_negative_numbers = true, value_parser = point_radius_m)]
+    pub(crate) point_radius_m: Option<f64>,
     /// Where its centre is, in the frame of the base, or of the tip with --tip, m.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = position, required_unless_present = "file")]
     pub(crate) at: Option<Triple>,
@@ -168,6 +175,11 @@ fn cylinder(text: &str) -> Result<ObjectShape, String> {
 fn capsule(text: &str) -> Result<ObjectShape, String> {
     numbers::<2>(text, "radius and length, above 0 and up to 100 m", size)
         .map(|[radius_m, length_m]| ObjectShape::Capsule { radius_m, length_m })
+}
+
+fn point_radius_m(text: &str) -> Result<f64, String> {
+    let radius_m = text.trim().parse().ok().filter(|radius_m| *radius_m > 0.0 && *radius_m <= 1.0);
+    radius_m.ok_or_else(|| "expected m, above 0 and up to 1".to_owned())
 }
 
 fn position(text: &str) -> Result<Triple, String> {

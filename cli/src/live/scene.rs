@@ -5,14 +5,18 @@ use crate::arm::{self, ArmName};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Form;
+use iceoryx2::pending_response::PendingResponse;
+use iceoryx2::prelude::{ZeroCopySend, ipc};
 use nalgebra::UnitQuaternion;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 use std::thread;
 use std::time::Duration;
+use taustream_arm::cloud::Cloud;
 use taustream_arm::text::counted;
 use taustream_arm::{Obstacle, Shape};
+use taustream_messages::cloud::{CLOUD_POINTS_MAX, CheckedCloud, CloudRequest};
 use taustream_messages::event::{Events, Topic};
 use taustream_messages::scene::{CHANGES_MAX, FixedTo, ObjectPose, ObjectShape, SceneChange};
 use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
@@ -108,7 +112,10 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &SceneArgs) -> Resu
     let mut port = ScenePort::open(&client)?;
     let changes = match &args.action {
         SceneAction::List => return form.print(&port.list(arm.name)?),
-        SceneAction::Add(add) => additions(add)?,
+        SceneAction::Add(add) => match &add.cloud {
+            Some(file) => return form.print(&port.put(&arm.name, &cloud(file, add)?)?),
+            None => additions(add)?,
+        },
         SceneAction::Remove(of) => vec![SceneChange::Remove { name: of.name.clone() }],
         SceneAction::Move(to) => vec![port.relocation(to)?],
         SceneAction::Attach(of) => {
@@ -146,6 +153,13 @@ impl<'a> ScenePort<'a> {
         if pending.number_of_server_connections() == 0 {
             return Err(self.client.wire().not_running(PLANNER).into());
         }
+        self.answer_to(&pending)
+    }
+
+    fn answer_to<P: fmt::Debug + ZeroCopySend>(
+        &mut self,
+        pending: &PendingResponse<ipc::Service, P, (), SceneReply, ()>,
+    ) -> Result<SceneOutcome, Failure> {
         self.events.notify();
         let limit = Limit::after_s(ANSWER_S_MAX);
         loop {
@@ -212,29 +226,69 @@ impl<'a> ScenePort<'a> {
 
     /// Sends changes, up to 16 of them.
     pub(crate) fn change(&mut self, arm: &str, changes: &[SceneChange]) -> Result<Changed, Failure> {
-        let request = CheckedSceneRequest::Change(changes.to_vec());
-        let SceneOutcome::Changed { revision, total, effect, note, times_ns } = self.ask(&request)? else {
-            return Err(no_sense());
-        };
-        let [received_ns, checked_ns, acted_ns] = times_ns;
-        let after_s = |ns: u64| Duration::from_nanos(ns.saturating_sub(received_ns)).as_secs_f64();
-        let trajectory_id = match effect {
-            MotionEffect::Rerouted { trajectory_id } => Some(trajectory_id),
-            MotionEffect::Rests | MotionEffect::Free | MotionEffect::Stopped | MotionEffect::StoppedLate => {
-                None
-            }
-        };
-        Ok(Changed {
-            arm: arm.to_owned(),
-            revision,
-            objects: total,
-            effect: effect.word(),
-            trajectory_id,
-            note: Some(note).filter(|note| !note.is_empty()),
-            checked_s: after_s(checked_ns),
-            acted_s: after_s(acted_ns),
-        })
+        let outcome = self.ask(&CheckedSceneRequest::Change(changes.to_vec()))?;
+        changed(arm, outcome)
     }
+
+    /// Sends a point cloud.
+    fn put(&mut self, arm: &str, cloud: &CheckedCloud) -> Result<Changed, Failure> {
+        let clouds = self.client.wire().cloud_client()?;
+        let sent = clouds.send_copy(*CloudRequest::new(cloud));
+        let pending = sent.map_err(|e| self.client.refused("send the point cloud", &e))?;
+        if pending.number_of_server_connections() == 0 {
+            return Err(self.client.wire().not_running(PLANNER).into());
+        }
+        changed(arm, self.answer_to(&pending)?)
+    }
+}
+
+/// What became of a change.
+fn changed(arm: &str, outcome: SceneOutcome) -> Result<Changed, Failure> {
+    let SceneOutcome::Changed { revision, total, effect, note, times_ns } = outcome else {
+        return Err(no_sense());
+    };
+    let [received_ns, checked_ns, acted_ns] = times_ns;
+    let after_s = |ns: u64| Duration::from_nanos(ns.saturating_sub(received_ns)).as_secs_f64();
+    let trajectory_id = match effect {
+        MotionEffect::Rerouted { trajectory_id } => Some(trajectory_id),
+        MotionEffect::Rests | MotionEffect::Free | MotionEffect::Stopped | MotionEffect::StoppedLate => None,
+    };
+    Ok(Changed {
+        arm: arm.to_owned(),
+        revision,
+        objects: total,
+        effect: effect.word(),
+        trajectory_id,
+        note: Some(note).filter(|note| !note.is_empty()),
+        checked_s: after_s(checked_ns),
+        acted_s: after_s(acted_ns),
+    })
+}
+
+/// The points of a file as a message.
+fn cloud(file: &Path, add: &AddArgs) -> Result<CheckedCloud, Failure> {
+    let (Some(name), Some(point_radius_m), Some(Triple(position_m))) =
+        (&add.name, add.point_radius_m, add.at)
+    else {
+        return Err(Failure::Usage("scene add --cloud needs a name, --point-radius-m and --at".to_owned()));
+    };
+    let wrong = |(value, expected)| Failure::Usage(format!("{value}; expected {expected}"));
+    let cloud = Cloud::load(file, 1.0, point_radius_m).map_err(wrong)?;
+    let points = cloud.tree().points();
+    if points.len() > CLOUD_POINTS_MAX {
+        return Err(Failure::Usage(format!(
+            "{} has {} points, and a message takes {CLOUD_POINTS_MAX}: thin them out, send several files, or put the file into the planner's scene",
+            file.display(),
+            points.len()
+        )));
+    }
+    Ok(CheckedCloud {
+        name: name.clone(),
+        pose: ObjectPose { position_m, quaternion_xyzw: quaternion(add.rpy) },
+        point_radius_m,
+        points_m: points.iter().map(|point| point.to_array()).collect(),
+        replaces: add.replace,
+    })
 }
 
 fn no_sense() -> Failure {

@@ -3,13 +3,16 @@
 //! A set of changes becomes the next revision of the scene, or is refused as a whole. Nothing goes away because its
 //! sender has died: an object stays where it was seen last until somebody says otherwise.
 use super::Service;
+use super::scene_effect::Effect;
 use crate::budget::Budget;
 use crate::live_scene::{Changed, SceneRevision};
 use crate::verify::{Stretch, first_contact};
 use iceoryx2::active_request::ActiveRequest;
-use iceoryx2::prelude::ipc;
+use iceoryx2::prelude::{ZeroCopySend, ipc};
+use std::fmt::Debug;
 use std::time::Duration;
 use taustream_messages::clock::now_ns;
+use taustream_messages::cloud::CheckedCloud;
 use taustream_messages::scene::{CheckedSceneRequest, PAGE, SceneChange};
 use taustream_messages::scene_reply::SceneOutcome;
 use taustream_messages::{Phase, SceneReply, SceneRequest};
@@ -18,6 +21,8 @@ use tracing::{info, warn};
 
 /// Most requests of one look: whoever floods the planner does not keep it from planning.
 const REQUESTS_MAX: usize = 64;
+/// Most point clouds of one look.
+const CLOUDS_MAX: usize = 2;
 /// How long what was planned before a change may be checked again.
 const RECHECK_WITHIN: Duration = Duration::from_millis(200);
 
@@ -60,6 +65,7 @@ impl Service<'_> {
                 Err(reason) => self.answer_scene(&request, &SceneOutcome::Refused { reason }),
             }
         }
+        self.take_clouds();
         if accepted.is_empty() {
             return;
         }
@@ -75,6 +81,37 @@ impl Service<'_> {
                 effect: effect.effect,
                 note: effect.note.clone(),
                 times_ns: [received_ns, effect.checked_ns, effect.acted_ns],
+            };
+            self.answer_scene(&request, &outcome);
+        }
+    }
+
+    /// Takes point clouds, few at a time: each takes as long as a tree over its points.
+    fn take_clouds(&self) {
+        for _ in 0..CLOUDS_MAX {
+            let request = match self.cloud_server.receive() {
+                Ok(Some(request)) => request,
+                Ok(None) => return,
+                Err(e) => return warn!("cannot take a point cloud: {e:?}"),
+            };
+            let received_ns = now_ns();
+            // Copied out before it is checked.
+            let copy = Box::new(*request.payload());
+            let read = CheckedCloud::try_from(&*copy).map_err(|e| e.to_string());
+            let put = |cloud: CheckedCloud| self.live_scene.borrow_mut().put_cloud(&cloud);
+            let changed = read.and_then(|cloud| put(cloud).map_err(|e| e.to_string()));
+            let outcome = match changed {
+                Ok(changed) => {
+                    let Effect { effect, note, checked_ns, acted_ns } = self.effect_on_motion(&changed);
+                    if let Some(file) = &self.scene_file {
+                        file.keep(&self.live_scene.borrow());
+                    }
+                    let live = self.live_scene.borrow();
+                    let (revision, total) = (live.current().number, live.objects().len());
+                    let times_ns = [received_ns, checked_ns, acted_ns];
+                    SceneOutcome::Changed { revision, total, effect, note, times_ns }
+                }
+                Err(reason) => SceneOutcome::Refused { reason },
             };
             self.answer_scene(&request, &outcome);
         }
@@ -123,7 +160,11 @@ impl Service<'_> {
         rests.then_some(report.command_rad)
     }
 
-    fn answer_scene(&self, request: &Request, outcome: &SceneOutcome) {
+    fn answer_scene<P: Debug + ZeroCopySend + 'static>(
+        &self,
+        request: &ActiveRequest<ipc::Service, P, (), SceneReply, ()>,
+        outcome: &SceneOutcome,
+    ) {
         // A sender that has gone needs no answer.
         if let Err(e) = request.send_copy(SceneReply::new(outcome)) {
             info!("the answer to a change of the scene was not taken: {e:?}");
