@@ -269,15 +269,12 @@ impl Body {
 
     /// The least distance of the core to points.
     fn to_points_m(&self, at: &Posed, points: &PointTree, points_at: &Posed) -> f64 {
-        let found = match &self.core {
-            Core::Segment(..) => {
-                let [a, b] = at.ends.map(|end| points_at.pose.inverse_transform_point(end));
-                points.nearest(f64::INFINITY, |p| point_to_segment_m(p, a, b))
-            }
-            _ => {
-                let into = at.pose.inv_mul(&points_at.pose);
-                points.nearest(f64::INFINITY, |p| self.to_point_m(into.transform_point(p)))
-            }
+        let found = if let Core::Segment(..) = self.core {
+            let [a, b] = at.ends.map(|end| points_at.pose.inverse_transform_point(end));
+            points.nearest(f64::INFINITY, |p| point_to_segment_m(p, a, b))
+        } else {
+            let into = at.pose.inv_mul(&points_at.pose);
+            points.nearest(f64::INFINITY, |p| self.to_point_m(into.transform_point(p)))
         };
         found.map_or(f64::INFINITY, |(distance_m, _)| distance_m)
     }

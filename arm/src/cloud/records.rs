@@ -3,7 +3,7 @@ use super::no_fields;
 use crate::mesh::Refusal;
 
 /// The header of a PLY or PCD file, line by line, and where the points begin.
-pub(super) fn header<'a>(bytes: &'a [u8], is_last: fn(&str) -> bool) -> Option<(Vec<&'a str>, &'a [u8])> {
+pub(super) fn header(bytes: &[u8], is_last: fn(&str) -> bool) -> Option<(Vec<&str>, &[u8])> {
     /// No header is longer.
     const LINES_MAX: usize = 1_000;
     let mut lines = Vec::new();

@@ -23,7 +23,7 @@ fn every_kind_of_file_gives_the_same_points() {
     let text = b"# x y z intensity\n0.5, -1.25, 2, 17\n\n3 0 -0.125\n";
     let written =
         b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nDATA ascii\n0.5 -1.25 2\n3 0 -0.125\n";
-    let read = [pcd::read(&pcd), ply::read(&ply), ply::read(ascii), super::text(text), pcd::read(written)];
+    let read = [pcd::read(&pcd), ply::read(&ply), ply::read(ascii), self::text(text), pcd::read(written)];
     for (i, points) in read.into_iter().enumerate() {
         assert_eq!(bits(&points.unwrap_or_else(|e| panic!("{i}: {e:?}"))), bits(&POINTS), "reader {i}");
     }
