@@ -4,7 +4,7 @@ use crate::scene::{ObjectPose, What, WireName};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Most points of a message; a larger cloud goes in several, each with a name of its own.
-pub const CLOUD_POINTS_MAX: usize = 32_768;
+pub const CLOUD_POINTS_MAX: usize = 16_384;
 /// Largest radius of the ball around a point.
 const RADIUS_M_MAX: f64 = 1.0;
 
@@ -65,7 +65,7 @@ pub enum CloudRequestError {
 }
 
 impl CloudRequest {
-    /// A cloud as a message, in the heap: it has some 400 kB. Points beyond [`CLOUD_POINTS_MAX`] are counted and not carried, so that the
+    /// A cloud as a message, in the heap: it has some 200 kB. Points beyond [`CLOUD_POINTS_MAX`] are counted and not carried, so that the
     /// reader refuses them.
     #[must_use]
     pub fn new(cloud: &CheckedCloud) -> Box<Self> {
@@ -92,25 +92,27 @@ impl CloudRequest {
 impl TryFrom<&CloudRequest> for CheckedCloud {
     type Error = CloudRequestError;
 
+    /// Takes every field once before it is checked, so that the message itself can be handed over: a copy of it is much for a stack.
     fn try_from(r: &CloudRequest) -> Result<Self, CloudRequestError> {
-        if r.layout_version != LAYOUT_VERSION {
-            return Err(CloudRequestError::Layout { got: r.layout_version });
+        let &CloudRequest { layout_version, count: got, replaces, name, .. } = r;
+        let &CloudRequest { position_m, quaternion_xyzw, point_radius_m: value_m, .. } = r;
+        if layout_version != LAYOUT_VERSION {
+            return Err(CloudRequestError::Layout { got: layout_version });
         }
-        let count = usize::try_from(r.count).unwrap_or(usize::MAX);
+        let count = usize::try_from(got).unwrap_or(usize::MAX);
         let points = r.points_m.get(..count).filter(|points| !points.is_empty());
-        let points = points.ok_or(CloudRequestError::Count { got: r.count })?;
-        let value_m = r.point_radius_m;
+        let points = points.ok_or(CloudRequestError::Count { got })?;
         if !(value_m > 0.0 && value_m <= RADIUS_M_MAX) {
             return Err(CloudRequestError::Radius { value_m });
         }
-        let name = r.name.read().ok_or(CloudRequestError::Object(What::Name))?;
-        let pose = ObjectPose { position_m: r.position_m, quaternion_xyzw: r.quaternion_xyzw };
+        let name = name.read().ok_or(CloudRequestError::Object(What::Name))?;
+        let pose = ObjectPose { position_m, quaternion_xyzw };
         Ok(Self {
             name,
             pose: pose.check().map_err(CloudRequestError::Object)?,
             point_radius_m: value_m,
             points_m: points.iter().map(|point| point.map(f64::from)).collect(),
-            replaces: r.replaces == 1,
+            replaces: replaces == 1,
         })
     }
 }

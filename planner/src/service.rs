@@ -6,11 +6,11 @@
 //! no client waits for the arm to move.
 mod foreign;
 mod moving;
+mod reported;
 mod scene;
 mod scene_effect;
 mod streaming;
 mod tip;
-mod told;
 
 use crate::held::check_held;
 use crate::kept_scene::{SceneFile, restore};
@@ -23,6 +23,7 @@ use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
+use reported::Reported;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::path::Path;
@@ -44,7 +45,6 @@ use taustream_messages::service::{
 use taustream_messages::tip_goal::TipGoal;
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
-use told::Told;
 use tracing::{info, warn};
 
 /// How long the service waits for a request before it looks at targets, reports and files again: targets come without events.
@@ -133,7 +133,7 @@ pub struct Service<'a> {
     targets: TargetServer,
     stream: Stream,
     promise: Promise,
-    told: Told,
+    reported: Reported,
     footprint: Footprint,
 }
 
@@ -188,7 +188,7 @@ impl<'a> Service<'a> {
             targets: wire.target_server()?,
             stream: Stream::new(robot),
             promise,
-            told: Told::default(),
+            reported: Reported::default(),
             footprint: wire.footprint(),
         })
     }
@@ -244,14 +244,14 @@ impl<'a> Service<'a> {
 
     fn take(&mut self, request: &Request) {
         self.received_ns = now_ns();
-        self.told.begin();
+        self.reported.begin();
         // Copied out before it is checked.
         let copy = *request.payload();
         let outcome = match CheckedPlanRequest::try_from(&copy) {
             Ok(checked) => self.answer(request, &checked).unwrap_or_else(|reason| failed(&reason)),
             Err(e) => failed(&e.to_string()),
         };
-        self.reply(request, (&outcome, &self.told.detail()));
+        self.reply(request, (&outcome, &self.reported.detail()));
     }
 
     fn answer(&mut self, request: &Request, requested: &CheckedPlanRequest) -> Result<PlanOutcome, String> {
@@ -332,10 +332,10 @@ impl<'a> Service<'a> {
             plan_through_until((robot, scene, StartMargin::AsItStands), &all_rad, options, Some(cancel))
         })?;
         let plan = planned.map_err(|e: PlanError| {
-            self.told.stages(e.stages());
+            self.reported.stages(e.stages());
             e.to_string()
         })?;
-        self.told.stages(&plan.stages);
+        self.reported.stages(&plan.stages);
         check_held(robot, &plan.trajectory, requested.held_joints).map_err(|e| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)
@@ -405,7 +405,7 @@ impl<'a> Service<'a> {
         let proven_ns = now_ns();
         let sent = self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN);
         // After it was sent: nobody moves later for it.
-        self.told.motion((&plan.trajectory, 0.0), LeastDistance::of(&plan.proof, 0.0));
+        self.reported.motion((&plan.trajectory, 0.0), LeastDistance::of(&plan.proof, 0.0));
         match sent {
             Ok(sent) => PlanOutcome::Planned {
                 trajectory_id: sent.trajectory_id,

@@ -81,7 +81,7 @@ pub(crate) struct AddArgs {
     /// A capsule along its z axis: radius, and length between the centres of its ends, m.
     #[arg(long, value_name = "R,L", allow_hyphen_values = true, value_parser = capsule)]
     pub(crate) capsule: Option<ObjectShape>,
-    /// Points that a camera saw: a .ply, .pcd or .xyz file of up to 32768 points; --at is where its origin is.
+    /// Points that a camera saw: a .ply, .pcd or .xyz file of up to 16384 points; --at is where its origin is.
     #[arg(long, value_name = "FILE", requires = "point_radius_m", conflicts_with_all = ["tip", "mass_kg"])]
     pub(crate) cloud: Option<PathBuf>,
     /// Radius of the ball around each point of --cloud, m: half the distance of neighbours closes a surface.

@@ -297,12 +297,12 @@ fn deadline_s(request: &CheckedPlanRequest) -> f64 {
 }
 
 /// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
-/// planner plans; `told` is given what was tried in vain.
+/// planner plans; `said` is given what was tried in vain.
 pub(crate) fn ask_while(
     client: &Client,
     arm: &ArmName,
     request: &CheckedPlanRequest,
-    (meanwhile, told): (&mut dyn FnMut() -> Result<(), Failure>, &mut dyn FnMut(&[StepLine])),
+    (meanwhile, said): (&mut dyn FnMut() -> Result<(), Failure>, &mut dyn FnMut(&[StepLine])),
 ) -> Result<Planned, Failure> {
     let remaining_s = match request.when {
         // The planner looks at the streamer by itself, and at once.
@@ -316,7 +316,7 @@ pub(crate) fn ask_while(
     let steps: Vec<StepLine> = steps.into_iter().map(StepLine::from).collect();
     match reply.outcome() {
         PlanOutcome::Failed { reason } => {
-            told(&steps);
+            said(&steps);
             // A planner without a streamer has no pose to start from.
             client.report()?;
             Err(Failure::Refused(format!("no plan: {reason}")))

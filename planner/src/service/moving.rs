@@ -122,13 +122,17 @@ impl Service<'_> {
                     Tried::Done(outcome) => return Ok(outcome),
                     Tried::NoWay(reason) => {
                         info!("{way:?}: {reason}");
-                        self.told.step(format!("{way}: {reason}"), begun.elapsed().as_secs_f64(), None);
+                        self.reported.step(format!("{way}: {reason}"), begun.elapsed().as_secs_f64(), None);
                         why = reason;
                         break;
                     }
                     Tried::TooLate(rejection) => {
                         info!("{way:?}: {rejection}");
-                        self.told.step(format!("{way}: {rejection}"), begun.elapsed().as_secs_f64(), None);
+                        self.reported.step(
+                            format!("{way}: {rejection}"),
+                            begun.elapsed().as_secs_f64(),
+                            None,
+                        );
                         why = rejection.to_string();
                     }
                 }
@@ -215,8 +219,8 @@ impl Service<'_> {
             return Ok(Tried::TooLate(rejection));
         }
         let motion_s = made.trajectory.duration_s() - from_s;
-        self.told.step(format!("{way}: {}", made.how), planning_s, Some(motion_s));
-        self.told.motion((&made.trajectory, from_s), made.least.clone());
+        self.reported.step(format!("{way}: {}", made.how), planning_s, Some(motion_s));
+        self.reported.motion((&made.trajectory, from_s), made.least.clone());
         let stages = PlanStages { planned_ns: made.planned_ns, ..self.stages(&sent, proven_ns) };
         Ok(Tried::Done(outcome(&sent, made, (planning_s, stages))))
     }

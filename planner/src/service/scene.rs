@@ -95,9 +95,7 @@ impl Service<'_> {
                 Err(e) => return warn!("cannot take a point cloud: {e:?}"),
             };
             let received_ns = now_ns();
-            // Copied out before it is checked.
-            let copy = Box::new(*request.payload());
-            let read = CheckedCloud::try_from(&*copy).map_err(|e| e.to_string());
+            let read = CheckedCloud::try_from(request.payload()).map_err(|e| e.to_string());
             let put = |cloud: CheckedCloud| self.live_scene.borrow_mut().put_cloud(&cloud);
             let changed = read.and_then(|cloud| put(cloud).map_err(|e| e.to_string()));
             let outcome = match changed {

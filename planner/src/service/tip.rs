@@ -77,7 +77,7 @@ impl Service<'_> {
         let line = planned.map_err(|e| e.to_string())?;
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);
         let plan = line.into_plan(how, started.elapsed().as_secs_f64());
-        self.told.stages(&plan.stages);
+        self.reported.stages(&plan.stages);
         check_held(&robot, &plan.trajectory, held_joints).map_err(|e| e.to_string())?;
         self.still_free(&revision, (&plan.trajectory, 0.0))?;
         Ok(plan)

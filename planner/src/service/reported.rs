@@ -1,4 +1,4 @@
-//! What the requester of a motion is told beside the answer.
+//! What the requester of a motion gets beside the answer.
 use crate::explain::Stage;
 use crate::plan::path_length_rad;
 use crate::verify::LeastDistance;
@@ -8,9 +8,9 @@ use taustream_motion::Trajectory;
 
 /// Collected while a request is answered.
 #[derive(Debug, Default)]
-pub(super) struct Told(RefCell<PlanDetail>);
+pub(super) struct Reported(RefCell<PlanDetail>);
 
-impl Told {
+impl Reported {
     /// Another request.
     pub(super) fn begin(&self) {
         self.0.replace(PlanDetail::default());
@@ -33,7 +33,7 @@ impl Told {
         let mut detail = self.0.borrow_mut();
         detail.path_length_rad = path_length_rad(trajectory, from_s);
         let LeastDistance { at_s, between: (a, b), required_m, clearance_m } = least;
-        detail.nearest = clearance_m.is_finite().then(|| Nearest { at_s, required_m, between: [a, b] });
+        detail.nearest = clearance_m.is_finite().then_some(Nearest { at_s, required_m, between: [a, b] });
     }
 
     /// Everything.
