@@ -269,6 +269,7 @@ fn service_answer_says_what_was_tried_and_where_the_motion_is_nearest() {
         assert!(detail.steps.iter().any(|step| step.what.contains("straight line")), "{:?}", detail.steps);
         assert!(detail.steps.iter().any(|step| step.motion_s.is_some()), "{:?}", detail.steps);
     });
+    let played = Played::new(Phase::Holding);
     with_service_in(&ringed(), "detail-of-none", &played, |arm, _| {
         let one = CheckedPlanRequest { deadline_ms: 100, ..request(When::AtOnce, "", pose(RINGED)) };
         let (outcome, detail) = ask_in_detail(arm, &one, || ());

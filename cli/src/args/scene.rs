@@ -30,7 +30,7 @@ pub(crate) struct SceneArgs {
 impl SceneArgs {
     /// True when a file of the caller is read.
     pub(crate) fn reads_a_file(&self) -> bool {
-        matches!(&self.action, SceneAction::Add(AddArgs { file, cloud, .. }) if file.is_some() || cloud.is_some())
+        matches!(&self.action, SceneAction::Add(add) if add.file.is_some() || add.cloud.is_some())
     }
 }
 
@@ -40,7 +40,7 @@ pub(crate) enum SceneAction {
     /// List the objects.
     List,
     /// Add an object, or all of a scene file.
-    Add(AddArgs),
+    Add(Box<AddArgs>),
     /// Remove an object.
     Remove(NameArgs),
     /// Move an object.

@@ -53,7 +53,7 @@ impl Session<'_> {
         number: usize,
     ) -> Result<Move, Failure> {
         let mut scene = ScenePort::open(&self.client)?;
-        let planned = ask_while(&self.client, self.arm, request, (&mut || self.look(), &mut |_| ()))?;
+        let planned = ask_while(&self.client, self.arm, request, &mut || self.look(), &mut |_| ())?;
         let effect = Cell::new(None);
         let followed = follow(&self.client, self.arm, planned.trajectory_id, |report, phase| {
             self.see(report, phase)?;

@@ -118,7 +118,7 @@ impl<'a> Session<'a> {
 
     /// Plans and executes a move.
     pub(super) fn go(&self, request: &CheckedPlanRequest, number: usize) -> Result<Move, Failure> {
-        let planned = ask_while(&self.client, self.arm, request, (&mut || self.look(), &mut |_| ()))?;
+        let planned = ask_while(&self.client, self.arm, request, &mut || self.look(), &mut |_| ())?;
         let executed = self.follow_to_its_end(planned.trajectory_id)?;
         Ok(Move::new(number, planned, executed))
     }

@@ -269,7 +269,7 @@ pub(crate) fn go(
             steps.iter().for_each(|step| form.progress(step));
         }
     };
-    let planned = Planned { explain, ..ask_while(client, &arm, request, (&mut say, &mut tell))? };
+    let planned = Planned { explain, ..ask_while(client, &arm, request, &mut say, &mut tell)? };
     let answered_ns = now_ns();
     let mut first_setpoint_ns = None;
     let executed = if wait {
@@ -302,7 +302,8 @@ pub(crate) fn ask_while(
     client: &Client,
     arm: &ArmName,
     request: &CheckedPlanRequest,
-    (meanwhile, said): (&mut dyn FnMut() -> Result<(), Failure>, &mut dyn FnMut(&[StepLine])),
+    meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+    said: &mut dyn FnMut(&[StepLine]),
 ) -> Result<Planned, Failure> {
     let remaining_s = match request.when {
         // The planner looks at the streamer by itself, and at once.

@@ -286,7 +286,7 @@ fn cloud(file: &Path, add: &AddArgs) -> Result<CheckedCloud, Failure> {
         name: name.clone(),
         pose: ObjectPose { position_m, quaternion_xyzw: quaternion(add.rpy) },
         point_radius_m,
-        points_m: points.iter().map(|point| point.to_array()).collect(),
+        points_m: points.iter().map(|p| [p.x, p.y, p.z]).collect(),
         replaces: add.replace,
     })
 }
