@@ -3,6 +3,7 @@ use crate::looks::Looks;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use taustream_optimizers::Refusal;
 use taustream_optimizers::papers::spline::SplineError;
+use taustream_planner::plan::STACK_BYTES;
 
 /// How much work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -170,7 +171,10 @@ impl<'a> RunContext<'a> {
         };
         let helpers = self.effort.jobs.clamp(1, JOBS_MAX).min(count.max(1)) - 1;
         let mut all = std::thread::scope(|scope| {
-            let helpers: Vec<_> = (0..helpers).map(|_| scope.spawn(work)).collect();
+            let thread = || std::thread::Builder::new().stack_size(STACK_BYTES);
+            // Where there are no more threads, fewer do the work.
+            let helpers: Vec<_> =
+                (0..helpers).filter_map(|_| thread().spawn_scoped(scope, work).ok()).collect();
             let mut all = work();
             for helper in helpers {
                 match helper.join() {

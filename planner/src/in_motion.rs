@@ -9,8 +9,8 @@ use crate::budget::Budget;
 use crate::held::held;
 use crate::pipeline::blends_rad;
 use crate::plan::{
-    Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, nearest_inside, plan_through_until,
-    plan_until,
+    Plan, PlanError, PlanOptions, PoseOf, STACK_BYTES, StartMargin, Task, check_pose, nearest_inside,
+    plan_through_until, plan_until,
 };
 use crate::replacement::{replacement, to_rest};
 use crate::timing::Path;
@@ -284,9 +284,15 @@ impl Surroundings<'_> {
         options: &PlanOptions,
     ) -> Result<Replacement, NoReplacement> {
         let (from_rest, from_end) = thread::scope(|scope| {
-            let from_end = scope.spawn(|| self.after_end((end, points_rad), options));
+            let beside = thread::Builder::new().stack_size(STACK_BYTES);
+            let from_end = beside.spawn_scoped(scope, || self.after_end((end, points_rad), options));
             let from_rest = self.rest_first((cut, points_rad), options);
-            (from_rest, from_end.join().unwrap_or(Err(NoReplacement::Panicked)))
+            let from_end = match from_end {
+                Ok(from_end) => from_end.join().unwrap_or(Err(NoReplacement::Panicked)),
+                // Without a thread one after the other.
+                Err(_) => self.after_end((end, points_rad), options),
+            };
+            (from_rest, from_end)
         });
         shorter(from_rest, from_end)
     }

@@ -97,6 +97,9 @@ pub struct Plan {
     pub stages: Vec<Stage>,
 }
 
+/// Stack of a thread that plans: trajectories lie on it by the dozen, 78 kB each, so that the 2 MiB that threads have by default are too few.
+pub const STACK_BYTES: usize = 32 << 20;
+
 impl Plan {
     /// Length of the path in joint space, rad; see [`path_length_rad`].
     #[must_use]

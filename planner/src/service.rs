@@ -16,7 +16,9 @@ use crate::held::check_held;
 use crate::kept_scene::{SceneFile, restore};
 use crate::kind::PlannerKind;
 use crate::live_scene::LiveScene;
-use crate::plan::{Plan, PlanError, PlanOptions, StartMargin, Task, plan_through_until, plan_until};
+use crate::plan::{
+    Plan, PlanError, PlanOptions, STACK_BYTES, StartMargin, Task, plan_through_until, plan_until,
+};
 use crate::send::{Outbox, RECEIPT_TAKES, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
 use crate::verify::LeastDistance;
 use foreign::Foreign;
@@ -352,7 +354,7 @@ impl<'a> Service<'a> {
         self.promise.back_within(deadline + OVERRUN_MAX);
         let cancel = AtomicBool::new(false);
         let result = thread::scope(|scope| {
-            let worker = thread::Builder::new().name("plan".to_owned());
+            let worker = thread::Builder::new().name("plan".to_owned()).stack_size(STACK_BYTES);
             // Dropped at the end, however the work ends: that wakes whoever attends.
             let (working, ended) = channel::<()>();
             let cancelled = &cancel;

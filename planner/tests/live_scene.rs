@@ -451,6 +451,24 @@ fn attached_object_moves_with_the_tip_and_counts_in_plans() {
     });
 }
 
+/// Goal: a request in motion whose way straight on is blocked is answered: ways round it are searched while the arm moves on. (On stacks of
+/// the default size the planner aborted here.)
+#[test]
+fn request_in_motion_whose_straight_way_is_blocked_is_answered() {
+    let played = Played::default();
+    with_service("round", &scene("pillars"), &played, |asker| {
+        for (first, then) in [(0.5, 1.5), (1.5, -1.5), (-1.5, 0.5)] {
+            let PlanOutcome::Planned { .. } = asker.go(pose([first, -0.7, 0.7, -1.57, -1.57, 0.0])) else {
+                panic!("no plan")
+            };
+            thread::sleep(Duration::from_millis(200));
+            let outcome = asker.go(pose([then, -0.6, 0.9, -1.87, -1.57, 0.8]));
+            assert!(matches!(outcome, PlanOutcome::Planned { .. }), "{outcome:?}");
+            wait_until_rest(&played);
+        }
+    });
+}
+
 /// Goal: points that a camera saw count in plans as any obstacle does, and a later message takes the place of an earlier one.
 #[test]
 fn points_of_a_message_count_in_plans_and_are_replaced_by_later_ones() {
