@@ -112,7 +112,7 @@ impl Checker {
                 }
             }
         };
-        thread::Builder::new().name("checker".into()).stack_size(2 << 20).spawn(work)?;
+        thread::Builder::new().name("checker".into()).stack_size(4 << 20).spawn(work)?;
         Ok(Self { messages, results })
     }
 
