@@ -308,7 +308,7 @@ mod tests {
             ("90grad", "value 1 is `90grad`"),
             ("deg", "value 1 is `deg`"),
             ("1e999deg", "value 1 is inf"),
-            ("0,0,0,0,0,0,0,0,0", "9 values"),
+            ("0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0", "17 values"),
         ];
         for (text, expected) in cases {
             let error = text.parse::<Angles>().unwrap_err().to_string();
