@@ -38,6 +38,15 @@ pub(crate) enum Value {
     Other(String),
 }
 
+impl Value {
+    /// The texts of a list that holds nothing else.
+    pub(crate) fn texts(&self) -> Option<Vec<String>> {
+        let Self::List(items) = self else { return None };
+        let text = |item: &Node| if let Self::Text(text) = &item.value { Some(text.clone()) } else { None };
+        items.iter().map(text).collect()
+    }
+}
+
 /// A key of a table and its value.
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {

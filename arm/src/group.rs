@@ -3,7 +3,7 @@
 //! A motion may be asked for by the values of one group; the other joints hold. A joint is in one group at most, so that two groups
 //! never ask the same joint for two things.
 use crate::description::Joint;
-use crate::document::{Value, shown};
+use crate::document::shown;
 use crate::reader::Table;
 use std::fmt::Write as _;
 use taustream_motion::MAX_JOINTS;
@@ -81,17 +81,7 @@ pub(crate) fn read(top: &mut Table<'_>, known: Option<(&[Joint], &Tips)>) -> Vec
 /// Names of joints; `None` where the key is not there.
 fn read_joints(table: &mut Table<'_>) -> Option<Vec<String>> {
     let node = table.take("joints")?;
-    let text = |value: &Value| if let Value::Text(text) = value { Some(text.clone()) } else { None };
-    let names: Option<Vec<String>> = match &node.value {
-        Value::List(items) => items.iter().map(|item| text(&item.value)).collect(),
-        Value::Flag(_)
-        | Value::Integer(_)
-        | Value::Number(_)
-        | Value::Text(_)
-        | Value::Table(_)
-        | Value::Other(_) => None,
-    };
-    let names = names.filter(|names| !names.is_empty());
+    let names = node.value.texts().filter(|names| !names.is_empty());
     if names.is_none() {
         table.fault("joints", &node.to_string(), "a list of names of joints");
     }

@@ -10,7 +10,6 @@ use crate::answer::AnswerReason;
 use crate::cycle_state::{Cause, CycleState};
 use crate::phases::Event;
 use crate::supervise::{Actions, Supervisor};
-use crate::watch::REST_RAD_S;
 use taustream_arm::{Cia402, Settings};
 use taustream_drivers::{DriveState, DriveTarget, HomingState, JointSet, Nanos, ServoStatus};
 use taustream_messages::{FaultReason, Phase};
@@ -111,19 +110,10 @@ impl Supervisor {
     fn measured_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(cycle_state) {
-            let age_s = self.watch.age_s(cycle_state, joint);
-            if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
-                return Err(AnswerReason::NoFeedback { joint, age_s });
-            }
-            if servo.warning {
-                return Err(AnswerReason::Warns { joint, status_word: servo.status_word });
-            }
+            self.check_answers(cycle_state, (joint, servo))?;
             pose_rad[joint] = servo.position_rad;
         }
-        let (joint, speed_rad_s) = self.watch.fastest().ok_or(AnswerReason::SpeedUnknown)?;
-        if speed_rad_s > REST_RAD_S {
-            return Err(AnswerReason::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
-        }
+        self.check_at_rest()?;
         Ok(pose_rad)
     }
 

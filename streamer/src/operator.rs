@@ -151,13 +151,7 @@ impl Supervisor {
     pub(crate) fn trusted_pose(&self, cycle_state: &CycleState) -> Result<JointArray, AnswerReason> {
         let mut pose_rad = [0.0; MAX_JOINTS];
         for (joint, servo) in self.servos(cycle_state) {
-            let age_s = self.watch.age_s(cycle_state, joint);
-            if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
-                return Err(AnswerReason::NoFeedback { joint, age_s });
-            }
-            if servo.warning {
-                return Err(AnswerReason::Warns { joint, status_word: servo.status_word });
-            }
+            self.check_answers(cycle_state, (joint, servo))?;
             self.check_referenced(joint)?;
             let holds = servo.state == DriveState::Adopted;
             let position_rad = if holds { servo.hold_position_rad } else { servo.position_rad };
@@ -168,11 +162,33 @@ impl Supervisor {
             }
             pose_rad[joint] = position_rad;
         }
+        self.check_at_rest()?;
+        Ok(pose_rad)
+    }
+
+    /// That a joint has answered just now, with an angle and without a warning.
+    pub(crate) fn check_answers(
+        &self,
+        cycle_state: &CycleState,
+        (joint, servo): (usize, &ServoStatus),
+    ) -> Result<(), AnswerReason> {
+        let age_s = self.watch.age_s(cycle_state, joint);
+        if age_s > self.rules.feedback_age_s_max || !servo.position_rad.is_finite() {
+            return Err(AnswerReason::NoFeedback { joint, age_s });
+        }
+        if servo.warning {
+            return Err(AnswerReason::Warns { joint, status_word: servo.status_word });
+        }
+        Ok(())
+    }
+
+    /// That every joint stands still.
+    pub(crate) fn check_at_rest(&self) -> Result<(), AnswerReason> {
         let (joint, speed_rad_s) = self.watch.fastest().ok_or(AnswerReason::SpeedUnknown)?;
         if speed_rad_s > REST_RAD_S {
             return Err(AnswerReason::NotAtRest { joint, speed_rad_s, limit_rad_s: REST_RAD_S });
         }
-        Ok(pose_rad)
+        Ok(())
     }
 
     fn check_referenced(&self, joint: usize) -> Result<(), AnswerReason> {

@@ -7,7 +7,7 @@ use super::model::{Inertial, Joint, Kind, Link, Model, Origin, Solid, StatedLimi
 use super::tree::Tree;
 use super::xml::{self, Context, Element};
 use super::{package, srdf};
-use crate::document::{self, Value, shown};
+use crate::document::{self, shown};
 use crate::mass::{LinkMass, Weight};
 use crate::mesh;
 use crate::modelled::Listed;
@@ -389,18 +389,7 @@ fn read_package_dirs(top: &mut Table<'_>) -> Vec<String> {
 /// A list of texts; none when the key is not there.
 fn read_texts(top: &mut Table<'_>, key: &'static str, expected: &str) -> Vec<String> {
     let Some(node) = top.take(key) else { return Vec::new() };
-    let texts: Option<Vec<String>> = match &node.value {
-        Value::List(items) => items
-            .iter()
-            .map(|item| if let Value::Text(text) = &item.value { Some(text.clone()) } else { None })
-            .collect(),
-        Value::Flag(_)
-        | Value::Integer(_)
-        | Value::Number(_)
-        | Value::Text(_)
-        | Value::Table(_)
-        | Value::Other(_) => None,
-    };
+    let texts = node.value.texts();
     if texts.is_none() {
         top.fault(key, &node.to_string(), expected);
     }
