@@ -10,7 +10,7 @@ use crate::settings::{Servo, Settings};
 use std::collections::BTreeSet;
 pub use taustream_motion::axis::AXES_MAX;
 use taustream_motion::brake::{Brake, JointState};
-use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
+use taustream_motion::{JointKind, JointLimits, LimitSet, MAX_JOINTS};
 
 /// Stop limits as multiples of the motion limits, as of joints that state none.
 const STOP_RATIOS: [f64; 2] = [2.0, 4.0];
@@ -260,7 +260,13 @@ fn read_axis(table: &mut Table<'_>, name: Option<String>, robot: Option<&Robot>)
         squeeze_rad: contact.squeeze_rad / scale,
     });
     Some(Axis {
-        output: RobotJoint { name: name?, limits, torque_nm_max: None },
+        output: RobotJoint {
+            name: name?,
+            kind: JointKind::Revolute,
+            limits,
+            stroke: limits.position_rad,
+            torque_nm_max: None,
+        },
         unit,
         unit_per_rad: scale,
         open_rad: open? / scale,

@@ -13,14 +13,15 @@ use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row, RowKind};
 use crate::urdf::{self, JointInfo, StatedLimits, UrdfArm};
-use taustream_motion::{JointLimits, LimitSet, MAX_JOINTS};
+use taustream_motion::{JointKind, JointLimits, LimitSet, MAX_JOINTS};
 
 /// One joint of the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Joint {
     pub(crate) name: String,
+    pub(crate) kind: JointKind,
     pub(crate) limits: JointLimits,
-    /// Nm.
+    /// Nm, or N of a prismatic joint.
     pub(crate) torque_nm_max: Option<f64>,
 }
 
@@ -190,7 +191,12 @@ fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
         let limits = read_limits(&mut table, &Known::Nothing, notices);
         let torque = read_torque(&mut table, &Known::Nothing, notices);
         table.done();
-        let joint = |((name, limits), torque_nm_max)| Joint { name, limits, torque_nm_max };
+        let joint = |((name, limits), torque_nm_max)| Joint {
+            name,
+            kind: JointKind::Revolute,
+            limits,
+            torque_nm_max,
+        };
         read.push(name.zip(limits).zip(torque).map(joint).zip(row));
     }
     check_names(
@@ -255,7 +261,7 @@ fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) 
         .zip(limits)
         .map(|(joint_info, limits)| {
             let (limits, torque_nm_max) = limits?;
-            Some(Joint { name: joint_info.name, limits, torque_nm_max })
+            Some(Joint { name: joint_info.name, kind: JointKind::Revolute, limits, torque_nm_max })
         })
         .collect();
     Read { links, whole: joints.map(|joints| (joints, Geometry::Urdf(Box::new(arm)))) }

@@ -227,7 +227,7 @@ fn put_weight(out: &mut Vec<u8>, weight: &Weight) {
     center_m.iter().for_each(|number| put_number(out, *number));
 }
 
-fn put_joint(out: &mut Vec<u8>, Joint { name, limits, torque_nm_max: _ }: &Joint) {
+fn put_joint(out: &mut Vec<u8>, Joint { name, kind: _, limits, torque_nm_max: _ }: &Joint) {
     // The torque changes no setpoint's meaning: it says which motions a drive can follow.
     put_text(out, name);
     limits.position_rad.iter().for_each(|number| put_number(out, *number));

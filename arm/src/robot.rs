@@ -14,17 +14,22 @@ use nalgebra::{Point3, Vector3};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, JointLimits, MAX_JOINTS};
+use taustream_motion::range::POSITION_TOLERANCE_RAD;
+use taustream_motion::{JointArray, JointKind, JointLimits, MAX_JOINTS};
 
 /// One joint, base to tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotJoint {
     /// Its name; settings bind servos to it.
     pub name: String,
+    /// Whether it turns or slides: with that, what the numbers of it mean (rad, or m).
+    pub kind: JointKind,
     /// What it may do.
     pub limits: JointLimits,
-    /// The greatest torque of its drive at the joint, Nm: `torque_nm_max`, or else the URDF's `effort`; `None` when neither
-    /// is stated.
+    /// Lowest and highest position by the file, which nothing narrows: how far a prismatic joint can extend rests on it.
+    pub stroke: [f64; 2],
+    /// The greatest torque of its drive at the joint, Nm (N for a prismatic one): `torque_nm_max` or `force_n_max`, or else the
+    /// URDF's `effort`; `None` when neither is stated.
     pub torque_nm_max: Option<f64>,
 }
 
@@ -179,7 +184,9 @@ impl Robot {
             joints: joints
                 .map(|j| RobotJoint {
                     name: j.name.clone(),
+                    kind: j.kind,
                     limits: j.limits,
+                    stroke: j.limits.position_rad,
                     torque_nm_max: j.torque_nm_max,
                 })
                 .collect(),
@@ -227,6 +234,21 @@ impl Robot {
             }
         }
         holding
+    }
+    /// How far a prismatic joint can shift what hangs on it from where it stands, anywhere in its stroke (m), with the tolerance of
+    /// poses that count as inside; 0 for a revolute one.
+    #[must_use]
+    pub fn extension_m(&self, joint: usize) -> f64 {
+        let (Some(described), Some(of)) = (self.joints.get(joint), self.chain.joint(joint)) else {
+            return 0.0;
+        };
+        match of.kind {
+            JointKind::Revolute => 0.0,
+            JointKind::Prismatic => {
+                let [low, high] = described.stroke.map(|end| (end + of.offset).abs());
+                low.max(high) + POSITION_TOLERANCE_RAD
+            }
+        }
     }
     /// Limits as the motion crate takes them; unused slots are zero.
     #[must_use]

@@ -1,4 +1,4 @@
-//! Forward kinematics of a tree of revolute joints: a serial arm, or several arms on one base.
+//! Forward kinematics of a tree of revolute and prismatic joints: a serial arm, or several arms on one base.
 //!
 //! Frame 0 is the base and frame i stands behind joint i-1 (counted from 0). Each joint stands in the base or in the frame of an
 //! earlier joint, so that it moves its own frame and those that hang on it, and no other. In a serial arm joint j moves every frame
@@ -8,22 +8,25 @@
 //!
 //! Source: Denavit and Hartenberg 1955 (standard rows); Craig, Introduction to Robotics, 3rd ed., section 3.4
 //! (modified rows).
-use crate::{JointArray, MAX_JOINTS};
+use crate::{JointArray, JointKind, MAX_JOINTS};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A pose: rotation and translation in metres.
 pub type Pose = Isometry3<f64>;
 
-/// One joint: frame = parent * pre * rotation(axis, q + offset) * post. Denavit-Hartenberg rows and the joints of a URDF,
-/// fixed ones before and behind them included, are all of this form.
+/// One joint: frame = parent * pre * motion(axis, q + offset) * post, where the motion is a rotation about the axis or a
+/// translation along it. Denavit-Hartenberg rows and the joints of a URDF, fixed ones before and behind them included, are all
+/// of this form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainJoint {
+    /// Rotation or translation.
+    pub kind: JointKind,
     /// From the parent's frame to the joint.
     pub pre: Pose,
-    /// Axis of rotation in the joint's frame, of unit length.
+    /// Its axis in the joint's frame, of unit length.
     pub axis: Unit<Vector3<f64>>,
-    /// Angle added to the joint's position.
-    pub offset_rad: f64,
+    /// Added to the joint's position; rad, or m for a prismatic joint.
+    pub offset: f64,
     /// From the joint to the link's frame.
     pub post: Pose,
 }
@@ -34,7 +37,8 @@ impl ChainJoint {
     pub fn from_dh(a_m: f64, alpha_rad: f64, d_m: f64, theta_offset_rad: f64) -> Self {
         let post =
             Isometry3::from_parts(Translation3::new(a_m, 0.0, d_m), rotation(&Vector3::x_axis(), alpha_rad));
-        Self { pre: Pose::identity(), axis: Vector3::z_axis(), offset_rad: theta_offset_rad, post }
+        let (pre, axis) = (Pose::identity(), Vector3::z_axis());
+        Self { kind: JointKind::Revolute, pre, axis, offset: theta_offset_rad, post }
     }
     /// Modified (Craig) row: Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(q + theta) Tz(d).
     #[must_use]
@@ -43,16 +47,34 @@ impl ChainJoint {
         let pre =
             Isometry3::from_parts(Translation3::new(a_m, 0.0, 0.0), rotation(&Vector3::x_axis(), alpha_rad));
         let post = Pose::translation(0.0, 0.0, d_m);
-        Self { pre, axis: Vector3::z_axis(), offset_rad: theta_offset_rad, post }
+        let axis = Vector3::z_axis();
+        Self { kind: JointKind::Revolute, pre, axis, offset: theta_offset_rad, post }
+    }
+    /// Standard row of a prismatic joint: Rz(theta) Tz(q + d) Tx(a) Rx(alpha).
+    #[must_use]
+    pub fn prismatic_from_dh(a_m: f64, alpha_rad: f64, d_m: f64, theta_rad: f64) -> Self {
+        let pre = Isometry3::from_parts(Translation3::identity(), rotation(&Vector3::z_axis(), theta_rad));
+        let post =
+            Isometry3::from_parts(Translation3::new(a_m, 0.0, 0.0), rotation(&Vector3::x_axis(), alpha_rad));
+        Self { kind: JointKind::Prismatic, pre, axis: Vector3::z_axis(), offset: d_m, post }
+    }
+    /// Modified row of a prismatic joint: Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta) Tz(q + d).
+    #[must_use]
+    pub fn prismatic_from_mdh(a_m: f64, alpha_rad: f64, d_m: f64, theta_rad: f64) -> Self {
+        let before = rotation(&Vector3::x_axis(), alpha_rad) * rotation(&Vector3::z_axis(), theta_rad);
+        let pre = Isometry3::from_parts(Translation3::new(a_m, 0.0, 0.0), before);
+        let axis = Vector3::z_axis();
+        Self { kind: JointKind::Prismatic, pre, axis, offset: d_m, post: Pose::identity() }
     }
 }
 
-/// What one rad/s of a joint does to the tip, in base coordinates: a column of the geometric Jacobian.
+/// What one rad/s of a joint does to the tip, or one m/s of a prismatic one, in base coordinates: a column of the geometric
+/// Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
-    /// Velocity of the tip's origin, m/s for each rad/s.
+    /// Velocity of the tip's origin, m/s for each rad/s; the axis, of unit length, for a prismatic joint.
     pub linear_m: Vector3<f64>,
-    /// Angular velocity of the tip: the joint's axis, of unit length.
+    /// Angular velocity of the tip: the joint's axis, of unit length; zero for a prismatic joint.
     pub angular: Vector3<f64>,
 }
 
@@ -159,6 +181,18 @@ impl Chain {
         let shared = movers(a) & movers(b);
         (u32::BITS - shared.leading_zeros()) as usize
     }
+    /// How a joint moves; revolute for one that is not there.
+    ///
+    /// Real time: a look-up.
+    #[must_use]
+    pub fn kind(&self, joint: usize) -> JointKind {
+        self.joint(joint).map_or(JointKind::Revolute, |joint| joint.kind)
+    }
+    /// True when some joint is prismatic.
+    #[must_use]
+    pub fn has_prismatic(&self) -> bool {
+        self.joints.iter().take(self.count).any(|joint| joint.kind.is_prismatic())
+    }
     /// The frames that are tips.
     #[must_use]
     pub fn tips(&self) -> &[usize] {
@@ -177,18 +211,26 @@ impl Chain {
     }
     /// The base frame (index 0, identity) and the frame behind each joint; unused ones repeat the last.
     ///
+    /// Positions are in rad, those of prismatic joints in m.
+    ///
     /// Real time: no allocation.
     #[must_use]
     pub fn frames(&self, position_rad: &JointArray) -> [Pose; MAX_JOINTS + 1] {
         let mut frames = [Pose::identity(); MAX_JOINTS + 1];
         let mut last = Pose::identity();
         let moves = self.joints.iter().zip(&self.parents).zip(position_rad).take(self.count).enumerate();
-        for (i, ((joint, parent), angle_rad)) in moves {
-            let turn = rotation(&joint.axis, angle_rad + joint.offset_rad);
+        for (i, ((joint, parent), position)) in moves {
             if *parent != i {
                 last = frames.get(*parent).copied().unwrap_or(last);
             }
-            last = last * joint.pre * turn * joint.post;
+            let by = position + joint.offset;
+            // A rotation alone is cheaper than a pose, and keeps the bits that arms without prismatic joints always had.
+            last = match joint.kind {
+                JointKind::Revolute => last * joint.pre * rotation(&joint.axis, by) * joint.post,
+                JointKind::Prismatic => {
+                    last * joint.pre * Translation3::from(joint.axis.into_inner() * by) * joint.post
+                }
+            };
             if let Some(slot) = frames.get_mut(i + 1) {
                 *slot = last;
             }
@@ -208,7 +250,7 @@ impl Chain {
     ///
     /// Real time: no allocation.
     ///
-    /// Source: Siciliano et al., Robotics: Modelling, Planning and Control, section 3.1.3 (revolute joints).
+    /// Source: Siciliano et al., Robotics: Modelling, Planning and Control, section 3.1.3.
     #[must_use]
     pub fn jacobian(&self, frame: usize, position_rad: &JointArray) -> (Pose, [Column; MAX_JOINTS]) {
         let frames = self.frames(position_rad);
@@ -217,11 +259,14 @@ impl Chain {
         let joints = self.joints.iter().zip(&self.parents).take(self.count);
         for (index, (column, (joint, parent))) in columns.iter_mut().zip(joints).enumerate() {
             let Some(parent) = frames.get(*parent).filter(|_| self.moves(index, frame)) else { continue };
-            // A turn about the axis leaves the axis where it is, so the joint's own angle does not matter.
+            // Neither motion moves the joint's own axis, so its own position does not matter.
             let before = parent * joint.pre;
-            let angular = before.rotation * joint.axis.into_inner();
+            let axis = before.rotation * joint.axis.into_inner();
             let arm_m = tip.translation.vector - before.translation.vector;
-            *column = Column { linear_m: angular.cross(&arm_m), angular };
+            *column = match joint.kind {
+                JointKind::Revolute => Column { linear_m: axis.cross(&arm_m), angular: axis },
+                JointKind::Prismatic => Column { linear_m: axis, angular: Vector3::zeros() },
+            };
         }
         (tip, columns)
     }

@@ -1,6 +1,6 @@
 //! Inverse dynamics and energy of a tree of rigid bodies.
 //!
-//! Torques come from the recursive Newton-Euler equations over the tree, in the base's frame: outward the motion of every
+//! Torques, forces of prismatic joints, come from the recursive Newton-Euler equations over the tree, in the base's frame: outward the motion of every
 //! body, inward the torque at its joint, which bears whatever hangs on it. Gravity enters as an acceleration of the base. Friction, gears and the
 //! motors' own inertia are not part of it.
 //!
@@ -9,7 +9,7 @@
 //! Source: Luh, Walker and Paul, "On-line computational scheme for mechanical manipulators", Journal of Dynamic
 //! Systems, Measurement, and Control 102, 1980.
 use crate::chain::{Chain, Pose};
-use crate::{JointArray, MAX_JOINTS};
+use crate::{JointArray, JointKind, MAX_JOINTS};
 use nalgebra::{Matrix3, Vector3};
 
 /// Everything that moves with one joint, as one rigid body.
@@ -45,7 +45,9 @@ pub struct Dynamics {
 /// One joint and its body in the base's frame.
 #[derive(Clone, Copy)]
 struct Moving {
+    kind: JointKind,
     axis: Vector3<f64>,
+    /// Where the joint stands; a prismatic one with its body.
     at_m: Vector3<f64>,
     spin_rad_s: Vector3<f64>,
     /// Force on the joint's own body, and its moment about the joint.
@@ -55,6 +57,7 @@ struct Moving {
 
 impl Moving {
     const REST: Self = Self {
+        kind: JointKind::Revolute,
         axis: Vector3::new(0.0, 0.0, 0.0),
         at_m: Vector3::new(0.0, 0.0, 0.0),
         spin_rad_s: Vector3::new(0.0, 0.0, 0.0),
@@ -89,18 +92,21 @@ impl Dynamics {
         Self { chain, bodies, gravity_m_s2 }
     }
 
-    /// Torques in Nm that a motion needs at one instant; those of unused joints are zero.
+    /// Torques in Nm that a motion needs at one instant, forces in N of prismatic joints; those of unused joints are zero.
     ///
     /// Real time: no allocation.
     #[must_use]
     pub fn torques_nm(&self, q: &JointArray, v: &JointArray, a: &JointArray) -> JointArray {
-        let mut moving = self.outward(&self.chain.frames(q), v, a);
+        let mut moving = self.outward((&self.chain.frames(q), q), v, a);
         let mut torques = [0.0; MAX_JOINTS];
         for index in (0..self.chain.joints()).rev() {
             let (Some(joint), Some(torque)) = (moving.get(index).copied(), torques.get_mut(index)) else {
                 continue;
             };
-            *torque = joint.axis.dot(&joint.moment_nm);
+            *torque = match joint.kind {
+                JointKind::Revolute => joint.axis.dot(&joint.moment_nm),
+                JointKind::Prismatic => joint.axis.dot(&joint.force_n),
+            };
             // A joint comes after the one that bears it.
             let before = self.chain.parent_frame(index).checked_sub(1);
             if let Some(before) = before.and_then(|before| moving.get_mut(before)) {
@@ -112,7 +118,7 @@ impl Dynamics {
         torques
     }
 
-    /// Torques in Nm that hold the arm at rest in a pose.
+    /// Torques in Nm, forces in N of prismatic joints, that hold the arm at rest in a pose.
     ///
     /// Real time: no allocation.
     #[must_use]
@@ -122,7 +128,12 @@ impl Dynamics {
     }
 
     /// The motion of every joint's body and what it needs, base to tip.
-    fn outward(&self, frames: &[Pose], v: &JointArray, a: &JointArray) -> [Moving; MAX_JOINTS] {
+    fn outward(
+        &self,
+        (frames, q): (&[Pose], &JointArray),
+        v: &JointArray,
+        a: &JointArray,
+    ) -> [Moving; MAX_JOINTS] {
         // An arm at rest on the ground is one that is accelerated upward in free space.
         let base = Carried { push: -self.gravity_m_s2, ..Carried::REST };
         let mut carried = [base; MAX_JOINTS + 1];
@@ -144,13 +155,24 @@ impl Dynamics {
             let step = before.translation.vector - at_m;
             push += spin_up.cross(&step) + spin.cross(&spin.cross(&step));
             at_m = before.translation.vector;
-            spin_up += axis * a[i] + spin.cross(&axis) * v[i];
-            spin += axis * v[i];
+            match joint.kind {
+                JointKind::Revolute => {
+                    spin_up += axis * a[i] + spin.cross(&axis) * v[i];
+                    spin += axis * v[i];
+                }
+                JointKind::Prismatic => {
+                    let slid = axis * (q[i] + joint.offset);
+                    push += spin_up.cross(&slid) + spin.cross(&spin.cross(&slid));
+                    // Coriolis, and the joint's own acceleration.
+                    push += spin.cross(&axis) * (2.0 * v[i]) + axis * a[i];
+                    at_m += slid;
+                }
+            }
             let lever = frame.rotation * body.center_m + frame.translation.vector - at_m;
             let force_n = body.mass_kg * (push + spin_up.cross(&lever) + spin.cross(&spin.cross(&lever)));
             let inertia = turned(frame, &body.inertia_kg_m2);
             let moment_nm = inertia * spin_up + spin.cross(&(inertia * spin)) + lever.cross(&force_n);
-            *slot = Moving { axis, at_m, spin_rad_s: spin, force_n, moment_nm };
+            *slot = Moving { kind: joint.kind, axis, at_m, spin_rad_s: spin, force_n, moment_nm };
             before_joint = Carried { spin, spin_up, at_m, push };
             if let Some(slot) = carried.get_mut(i + 1) {
                 *slot = before_joint;
@@ -163,14 +185,17 @@ impl Dynamics {
     #[must_use]
     pub fn energy_j(&self, q: &JointArray, v: &JointArray) -> [f64; 2] {
         let frames = self.chain.frames(q);
-        let moving = self.outward(&frames, v, &[0.0; MAX_JOINTS]);
+        let moving = self.outward((&frames, q), v, &[0.0; MAX_JOINTS]);
         let (mut kinetic, mut potential) = (0.0, 0.0);
         let bodies = self.bodies.iter().zip(frames.iter().skip(1)).zip(&moving).take(self.chain.joints());
         for (i, ((body, frame), joint)) in bodies.enumerate() {
             let center = frame.rotation * body.center_m + frame.translation.vector;
             let before = moving.iter().zip(v).enumerate().filter(|(j, _)| self.chain.moves(*j, i + 1));
-            let velocity: Vector3<f64> =
-                before.map(|(_, (joint, v))| joint.axis.cross(&(center - joint.at_m)) * *v).sum();
+            let of_one = |joint: &Moving| match joint.kind {
+                JointKind::Revolute => joint.axis.cross(&(center - joint.at_m)),
+                JointKind::Prismatic => joint.axis,
+            };
+            let velocity: Vector3<f64> = before.map(|(_, (joint, v))| of_one(joint) * *v).sum();
             let spin = joint.spin_rad_s;
             kinetic += 0.5 * body.mass_kg * velocity.norm_squared();
             kinetic += 0.5 * spin.dot(&(turned(frame, &body.inertia_kg_m2) * spin));
@@ -217,9 +242,10 @@ mod tests {
 
     fn arm(random: &mut Random, count: usize) -> Dynamics {
         let joint = |random: &mut Random| ChainJoint {
+            kind: if random.next() > 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
             pre: random.pose(),
             axis: Unit::new_normalize(random.vector()),
-            offset_rad: random.next(),
+            offset: random.next(),
             post: random.pose(),
         };
         let joints: std::vec::Vec<ChainJoint> = (0..count).map(|_| joint(random)).collect();

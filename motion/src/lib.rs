@@ -2,7 +2,8 @@
 //!
 //! This crate says where an arm is at an instant, and how fast that may change. It does no I/O, reads no
 //! clock, allocates nothing and does not panic, so the 1 kHz cycle may call every sampling function in it.
-//! Angles are link-side radians, times are seconds, lengths are metres.
+//! Angles are link-side radians, times are seconds, lengths are metres. Where a name of all joints ends in `_rad`, the value of a
+//! prismatic joint is in metres (and its derivatives likewise): see [`JointKind`].
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -17,6 +18,7 @@ pub mod digits;
 pub mod duration;
 pub mod dynamics;
 mod joint_array;
+mod joint_kind;
 pub mod limits;
 pub mod peaks;
 pub mod peaks_ahead;
@@ -34,6 +36,7 @@ pub mod time_scale;
 pub mod trajectory;
 
 pub use joint_array::joint_array;
+pub use joint_kind::JointKind;
 pub use limits::{JointLimits, LimitSet};
 pub use stroke::{Stroke, StrokeError};
 pub use trajectory::{Trajectory, TrajectoryError};
@@ -47,7 +50,7 @@ pub const USUAL_JOINTS: usize = MAX_JOINTS / 2;
 /// Most strokes a trajectory may have.
 pub const MAX_STROKES: usize = 512;
 
-/// One value a joint, base to tip, in the unit that the owner's name states.
+/// One value a joint, base to tip, in the unit that the owner's name states; for a prismatic joint with metres in place of radians.
 pub type JointArray = [f64; MAX_JOINTS];
 
 /// Where all joints are, and how they move, at one instant.

@@ -37,6 +37,7 @@ const IDENTITY: Matrix =
 
 /// a, alpha, d, theta offset.
 type Row = [f64; 4];
+type MakeJoint = fn(f64, f64, f64, f64) -> ChainJoint;
 
 #[rustfmt::skip]
 const UR5: [Row; 6] = [
@@ -73,6 +74,16 @@ fn modified(rows: &[Row]) -> Chain {
     Chain::new(&joints).unwrap()
 }
 
+/// A joint of a row, one in three prismatic.
+fn any_joint(rng: &mut SeededRng, [a, alpha, d, offset]: Row, is_standard: bool) -> ChainJoint {
+    match (rng.whole(0, 2) == 0, is_standard) {
+        (false, true) => ChainJoint::from_dh(a, alpha, d, offset),
+        (false, false) => ChainJoint::from_mdh(a, alpha, d, offset),
+        (true, true) => ChainJoint::prismatic_from_dh(a, alpha, d, offset),
+        (true, false) => ChainJoint::prismatic_from_mdh(a, alpha, d, offset),
+    }
+}
+
 fn gap(pose: &Pose, matrix: &Matrix) -> f64 {
     let ours = pose.to_homogeneous();
     (0..16).map(|i| (ours[(i / 4, i % 4)] - matrix[i / 4][i % 4]).abs()).fold(0.0, f64::max)
@@ -102,6 +113,41 @@ fn chain_at_ten_thousand_poses_agrees_with_plain_matrix_products() {
                 );
             }
             // Frames of joints that do not exist repeat the tip.
+            let gaps = [gap(&by_dh[joint + 1], &dh), gap(&by_mdh[joint + 1], &mdh)];
+            assert!(gaps[0] < 1e-12 && gaps[1] < 1e-12, "seed {seed}, joint {joint}: {gaps:?}");
+        }
+    }
+}
+
+/// Goal: a prismatic row slides along the axis that the same row turns about, and holds its angle.
+#[test]
+fn prismatic_rows_agree_with_plain_matrix_products() {
+    for seed in 0..3_000 {
+        let mut rng = SeededRng::from_seed(seed);
+        let rows: Vec<Row> =
+            (0..rng.whole(1, 8)).map(|_| [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span))).collect();
+        let slides: Vec<bool> = rows.iter().map(|_| rng.whole(0, 1) == 0).collect();
+        let position = rng.joints(rows.len(), PI);
+        let of = |make: [MakeJoint; 2]| {
+            let joints: Vec<ChainJoint> = rows
+                .iter()
+                .zip(&slides)
+                .map(|([a, alpha, d, o], slides)| make[usize::from(*slides)](*a, *alpha, *d, *o))
+                .collect();
+            Chain::new(&joints).unwrap().frames(&position)
+        };
+        let by_dh = of([ChainJoint::from_dh, ChainJoint::prismatic_from_dh]);
+        let by_mdh = of([ChainJoint::from_mdh, ChainJoint::prismatic_from_mdh]);
+        let (mut dh, mut mdh) = (IDENTITY, IDENTITY);
+        for (joint, ([a, alpha, d, offset], slides)) in rows.iter().zip(&slides).enumerate() {
+            let q = position[joint];
+            let (turn_rad, slide_m) = if *slides { (*offset, d + q) } else { (offset + q, *d) };
+            let turn = turn_z(turn_rad);
+            dh = times(&times(&times(&dh, &turn), &shift(*a, slide_m)), &turn_x(*alpha));
+            mdh = times(
+                &times(&times(&times(&mdh, &turn_x(*alpha)), &shift(*a, 0.0)), &turn),
+                &shift(0.0, slide_m),
+            );
             let gaps = [gap(&by_dh[joint + 1], &dh), gap(&by_mdh[joint + 1], &mdh)];
             assert!(gaps[0] < 1e-12 && gaps[1] < 1e-12, "seed {seed}, joint {joint}: {gaps:?}");
         }
@@ -157,7 +203,9 @@ fn jacobian_at_two_thousand_poses_is_the_derivative_of_the_tip() {
         let count = rng.whole(1, 8) as usize;
         let rows: Vec<Row> =
             (0..count).map(|_| [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span))).collect();
-        let chain = if seed % 2 == 0 { standard(&rows) } else { modified(&rows) };
+        let joints: Vec<ChainJoint> =
+            rows.iter().map(|row| any_joint(&mut rng, *row, seed % 2 == 0)).collect();
+        let chain = Chain::new(&joints).unwrap();
         let position_rad = rng.joints(count, PI);
         let (tip, columns) = chain.jacobian(count, &position_rad);
         assert_eq!(tip, chain.frames(&position_rad)[MAX_JOINTS]);
@@ -189,7 +237,7 @@ fn any_tree(rng: &mut SeededRng) -> (Chain, Vec<usize>) {
     let joints: Vec<ChainJoint> = (0..count)
         .map(|_| {
             let [a, alpha, d, offset] = [0.5, PI, 0.5, PI].map(|span| rng.within(-span, span));
-            ChainJoint::from_mdh(a, alpha, d, offset)
+            any_joint(rng, [a, alpha, d, offset], false)
         })
         .collect();
     let parents: Vec<usize> =

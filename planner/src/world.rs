@@ -13,7 +13,7 @@ use std::sync::Arc;
 use taustream_arm::body::to_parry;
 use taustream_arm::{Obstacle, Robot, Scene};
 use taustream_motion::chain::{self, ChainJoint};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 
 /// The other side of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,8 +65,13 @@ impl StillBody {
 /// The axis of a joint in the frame that it stands in: a point of it, and its direction.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
+    kind: JointKind,
     point: Vector,
     direction: Vector,
+}
+
+impl Axis {
+    const NONE: Self = Self { kind: JointKind::Revolute, point: Vector::ZERO, direction: Vector::ZERO };
 }
 
 /// The frames of the chain in one pose of the arm.
@@ -205,13 +210,14 @@ impl<'a> World<'a> {
         relaxed
     }
 
-    /// Furthest that a point of the arm can be from the base's origin, in any pose (m).
+    /// Furthest that a point of the arm can be from the base's origin, in any pose of the ranges (m).
     fn farthest_m(&self) -> f64 {
         let mut snapshot = Snapshot::default();
         self.place(&[0.0; MAX_JOINTS], &mut snapshot);
         let step_m = |index: usize| {
             let joint = self.robot.chain.joint(index);
-            joint.map_or(0.0, |j| j.pre.translation.vector.norm() + j.post.translation.vector.norm())
+            let fixed = |j: &ChainJoint| j.pre.translation.vector.norm() + j.post.translation.vector.norm();
+            joint.map_or(0.0, fixed) + self.robot.extension_m(index)
         };
         let body_m = |(body, at): (&LinkBody, &Posed)| {
             let frame = snapshot.frames.get(body.frame);
@@ -221,7 +227,8 @@ impl<'a> World<'a> {
         self.links.iter().zip(&snapshot.at).map(body_m).fold(0.0, f64::max)
     }
 
-    /// Furthest that a point of the arm can be from each joint's axis, in any pose (m).
+    /// How far a unit of each joint moves a point of the arm at most, in any pose of the ranges: the distance from the axis of a
+    /// revolute joint, 1 for a prismatic one. What stands behind a prismatic joint is as far off as its range allows.
     fn joint_reach_m(&self) -> JointArray {
         let mut snapshot = Snapshot::default();
         self.place(&[0.0; MAX_JOINTS], &mut snapshot);
@@ -236,8 +243,13 @@ impl<'a> World<'a> {
                 let own_m =
                     snapshot.frames.get(body.frame).map_or(0.0, |f| (at.centre - f.translation).length());
                 let next = chain.movers(body.frame).filter(|next| *next > joint);
-                let chain_m = behind_m(joint) + next.map(|next| before_m(next) + behind_m(next)).sum::<f64>();
-                *reach = f64::max(*reach, chain_m + own_m + body.body.bound_m());
+                let step_m = |next: usize| before_m(next) + self.robot.extension_m(next) + behind_m(next);
+                let chain_m = behind_m(joint) + next.map(step_m).sum::<f64>();
+                let lever = match chain.kind(joint) {
+                    JointKind::Revolute => chain_m + own_m + body.body.bound_m(),
+                    JointKind::Prismatic => 1.0,
+                };
+                *reach = f64::max(*reach, lever);
             }
         }
         reach_m
@@ -258,7 +270,8 @@ impl<'a> World<'a> {
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }
-    /// Furthest that a point of the arm can be from each joint's axis, in any pose (m); 0 for unused joints.
+    /// How far a unit of each joint moves a point of the arm at most: the furthest that one can be from the axis in any pose, m/rad,
+    /// and 1 m/m for prismatic joints; 0 for unused joints.
     #[must_use]
     pub fn reach_m(&self) -> &JointArray {
         &self.reach_m
@@ -269,7 +282,7 @@ impl<'a> World<'a> {
     pub fn margin_m(&self) -> f64 {
         self.margin_m
     }
-    /// Furthest that a point of the arm can be from the base's origin, in any pose (m).
+    /// Furthest that a point of the arm can be from the base's origin, in any pose of the ranges (m).
     #[must_use]
     pub fn extent_m(&self) -> f64 {
         self.extent_m
@@ -452,12 +465,13 @@ impl<'a> World<'a> {
         })
     }
 
-    /// How far points of each body can move against each frame that carries it when joint j turns by at most `turn_rad[j]` away
-    /// from the pose of the snapshot, written into `moves_m[link body][frame]`.
+    /// How far points of each body can move against each frame that carries it when joint j moves by at most `turn_rad[j]` (m for a
+    /// prismatic one) away from the pose of the snapshot, written into `moves_m[link body][frame]`.
     ///
-    /// Turn the joints that move a body one after the other, base first: joint j then turns everything beyond it rigidly, in the
-    /// snapshot's shape, about an axis that the joints before it have only carried along. So a point moves by at
-    /// most the sum over j of turn j times its distance to axis j *in the snapshot*: no larger lever can occur on the way. Seen from a
+    /// Move the joints that move a body one after the other, base first: joint j then moves everything beyond it rigidly, in the
+    /// snapshot's shape, about or along an axis that the joints before it have only carried along. So a point moves by at
+    /// most the sum over j of turn j times its distance to axis j *in the snapshot*, and of what prismatic joints slide: no larger
+    /// lever can occur on the way, as a prismatic joint slides after those before it have turned. Seen from a
     /// frame that carries the body, only the joints between the two count. There is no bound against other frames, nor for bodies that
     /// are not concerned.
     pub fn moves_m(
@@ -467,10 +481,11 @@ impl<'a> World<'a> {
         moves_m: &mut Vec<[f64; MAX_JOINTS + 1]>,
     ) {
         let axis = |(axis, frame): (&Axis, &Pose)| Axis {
+            kind: axis.kind,
             point: frame.transform_point(axis.point),
             direction: frame.rotation * axis.direction,
         };
-        let mut axes = [Axis { point: Vector::ZERO, direction: Vector::ZERO }; MAX_JOINTS];
+        let mut axes = [Axis::NONE; MAX_JOINTS];
         for (joint, (placed, own)) in axes.iter_mut().zip(&self.axes).enumerate() {
             *placed = axis((own, &snapshot.frames[self.robot.chain.parent_frame(joint)]));
         }
@@ -482,10 +497,13 @@ impl<'a> World<'a> {
             let (mut frame, mut sum_m) = (link.frame, 0.0);
             sums[frame] = sum_m;
             while let Some(joint) = frame.checked_sub(1) {
-                let Axis { point, direction } = axes[joint];
-                let lever_m =
-                    if turn_rad[joint] > 0.0 { link.body.lever_m(at, point, direction) } else { 0.0 };
-                sum_m += turn_rad[joint] * lever_m;
+                let Axis { kind, point, direction } = axes[joint];
+                let lever = match kind {
+                    JointKind::Revolute if turn_rad[joint] > 0.0 => link.body.lever_m(at, point, direction),
+                    JointKind::Revolute => 0.0,
+                    JointKind::Prismatic => 1.0,
+                };
+                sum_m += turn_rad[joint] * lever;
                 frame = self.robot.chain.parent_frame(joint);
                 sums[frame] = sum_m;
             }
@@ -508,7 +526,8 @@ fn axes(robot: &Robot) -> Vec<Axis> {
     let axis = |joint: &ChainJoint| {
         let pre = to_parry(&joint.pre);
         let axis = joint.axis.into_inner();
-        Axis { point: pre.translation, direction: pre.rotation * Vector::new(axis.x, axis.y, axis.z) }
+        let direction = pre.rotation * Vector::new(axis.x, axis.y, axis.z);
+        Axis { kind: joint.kind, point: pre.translation, direction }
     };
     (0..robot.joints.len()).filter_map(|joint| robot.chain.joint(joint).map(axis)).collect()
 }

@@ -12,7 +12,7 @@ use taustream_arm::body::{Body, to_parry};
 use taustream_arm::scene::Shape;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 use taustream_planner::budget::Budget;
 use taustream_planner::collide::{Clearance, StraightEdge, SweepRules, sweep};
 use taustream_planner::rng::SeededRng;
@@ -94,9 +94,10 @@ fn robot(template: &Robot, seed: u64) -> Robot {
     let count = 1 + rng.index(MAX_JOINTS);
     let joints: Vec<ChainJoint> = (0..count)
         .map(|i| ChainJoint {
+            kind: if rng.unit() < 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
             pre: pose(&mut rng, 0.2),
             axis: Unit::new_normalize(vector(&mut rng, 1.0)),
-            offset_rad: rng.within(-3.0, 3.0),
+            offset: rng.within(-3.0, 3.0),
             // A URDF has something behind the last joint only; the bound holds wherever it is.
             post: if i + 1 == count || rng.unit() < 0.3 { pose(&mut rng, 0.2) } else { Pose::identity() },
         })
@@ -179,7 +180,11 @@ fn no_point_of_any_shape_moves_further_than_its_bound() {
                 for joint in robot.chain.movers(shape.frame) {
                     let axis = robot.chain.joint(joint).expect("a joint");
                     let base = before[robot.chain.parent_frame(joint)] * axis.pre;
-                    let lever_m = (base.inverse() * at(&before)).coords.cross(&axis.axis).norm();
+                    let lever_m = match axis.kind {
+                        JointKind::Revolute => (base.inverse() * at(&before)).coords.cross(&axis.axis).norm(),
+                        // Metres a metre.
+                        JointKind::Prismatic => 1.0,
+                    };
                     assert!(lever_m <= world.reach_m()[joint] + 1e-12, "seed {seed}: reach of joint {joint}");
                 }
             }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use taustream_arm::scene::Shape;
 use taustream_arm::{LinkShape, Obstacle, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 use taustream_planner::budget::Budget;
 use taustream_planner::collide::{StraightEdge, SweepRules, sweep};
 use taustream_planner::lanes::Lanes;
@@ -24,9 +24,10 @@ fn rod(frame: usize) -> LinkShape {
 /// Rods that turn about vertical axes at these places of the base, all on one level: branches of one joint each.
 fn rods(places_m: &[[f64; 2]]) -> Robot {
     let joint = |[x, y]: &[f64; 2]| ChainJoint {
+        kind: JointKind::Revolute,
         pre: Pose::translation(*x, *y, 0.0),
         axis: Vector3::z_axis(),
-        offset_rad: 0.0,
+        offset: 0.0,
         post: Pose::identity(),
     };
     let joints: Vec<ChainJoint> = places_m.iter().map(joint).collect();

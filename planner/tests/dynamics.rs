@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use taustream_arm::{LinkMass, Robot, Scene};
 use taustream_motion::chain::{Chain, ChainJoint};
-use taustream_motion::{JointArray, MAX_JOINTS, Stroke, Trajectory, joint_array};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS, Stroke, Trajectory, joint_array};
 use taustream_optimizers::papers::two_link::{Moving, TwoLink};
 use taustream_planner::energy::Energy;
 use taustream_planner::margin_exit::is_clear;
@@ -51,9 +51,10 @@ fn rod(frame: usize, mass_kg: f64, length_m: f64, along: Vector3<f64>) -> LinkMa
 fn two_link(arm: &TwoLink) -> Robot {
     let [first_m, second_m] = arm.lengths;
     let joint = |axis, post: Vector3<f64>| ChainJoint {
+        kind: JointKind::Revolute,
         pre: Isometry3::identity(),
         axis,
-        offset_rad: 0.0,
+        offset: 0.0,
         post: Isometry3::translation(post.x, post.y, post.z),
     };
     let mut robot = robot(3);

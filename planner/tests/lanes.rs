@@ -6,7 +6,7 @@ use std::sync::Arc;
 use taustream_arm::cloud::Cloud;
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 use taustream_planner::lanes::Lanes;
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::{Snapshot, World};
@@ -91,6 +91,18 @@ fn two_arms(mut robot: Robot) -> Robot {
     robot
 }
 
+/// An arm whose first and fourth joints slide instead of turning.
+fn with_slides(mut robot: Robot) -> Robot {
+    let mut joints: Vec<ChainJoint> = (0..6).filter_map(|i| robot.chain.joint(i).copied()).collect();
+    for (index, stroke) in [(0, [-0.6, 0.6]), (3, [-0.1, 0.5])] {
+        joints[index].kind = JointKind::Prismatic;
+        let joint = &mut robot.joints[index];
+        (joint.kind, joint.limits.position_rad, joint.stroke) = (JointKind::Prismatic, stroke, stroke);
+    }
+    robot.chain = Chain::new(&joints).expect("six joints");
+    robot
+}
+
 fn pose(rng: &mut SeededRng, robot: &Robot) -> JointArray {
     let mut pose = [0.0; MAX_JOINTS];
     for (q, joint) in pose.iter_mut().zip(&robot.joints) {
@@ -109,6 +121,7 @@ fn lanes_answer_as_the_exact_model_for_random_poses() {
         ("ur5.toml", shipped("ur5.toml"), 1.1),
         ("piper.toml", shipped("piper.toml"), 0.5),
         ("two arms", two_arms(shipped("ur5.toml")), 0.7),
+        ("ur5 with slides", with_slides(shipped("ur5.toml")), 1.1),
     ];
     for (arm, (name, robot, far_m)) in robots.into_iter().enumerate() {
         let (mut free, mut all) = (0_u64, 0_u64);

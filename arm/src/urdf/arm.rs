@@ -18,8 +18,8 @@ use crate::scene::{self, Shape};
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use taustream_motion::MAX_JOINTS;
 use taustream_motion::chain::{ChainJoint, Pose};
+use taustream_motion::{JointKind, MAX_JOINTS};
 
 /// Keys of a robot file that say where a URDF is and which part of it is the arm.
 pub(crate) const KEYS: [&str; 6] = ["urdf", "srdf", "tip_link", "tip_links", "base_link", "package_dirs"];
@@ -220,7 +220,8 @@ impl UrdfArm {
             let pre = origins(tip.map_or(Pose::identity(), |tip| tip.inverse()), &path);
             let axis = Unit::new_normalize(Vector3::from(of.axis));
             let post = posts.get(index).copied().flatten().unwrap_or_default();
-            Some((ChainJoint { pre, axis, offset_rad: 0.0, post }, parent.map_or(0, |parent| parent + 1)))
+            let kind = JointKind::Revolute;
+            Some((ChainJoint { kind, pre, axis, offset: 0.0, post }, parent.map_or(0, |parent| parent + 1)))
         };
         self.moving.iter().enumerate().filter_map(chain_joint).collect()
     }

@@ -38,14 +38,14 @@ pub(super) struct Prefiltered {
 }
 
 impl Fast {
-    /// `None` for an arm or spheres that the kernel cannot see; it sees serial arms only.
+    /// `None` for an arm or spheres that the kernel cannot see; it sees serial arms of revolute joints only.
     pub(super) fn new(
         chain: &Chain,
         spheres: &[(Point, f64)],
         model: &CostModel,
         phases: &[f64],
     ) -> Option<Self> {
-        if !chain.is_serial() {
+        if !chain.is_serial() || chain.has_prismatic() {
             return None;
         }
         let sums = model.reading == Reading::Printed;

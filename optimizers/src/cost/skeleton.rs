@@ -41,7 +41,7 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// The skeleton of a chain.
+    /// The skeleton of a chain of revolute joints.
     pub(super) fn new(chain: &Chain) -> Self {
         let joints: Vec<&ChainJoint> = (0..chain.joints()).filter_map(|j| chain.joint(j)).collect();
         let upright = |j: &ChainJoint| {
@@ -65,7 +65,7 @@ impl Skeleton {
             let tilt = [tilt_rad.cos(), tilt_rad.sin()].map(|x| if x.abs() < NOTHING { 0.0 } else { x });
             let tilt = (tilt[1] != 0.0 || tilt[0] < 0.0).then_some(tilt);
             link_segments.push(LinkSegment {
-                offset_rad: joint.offset_rad + carried_rad + before_rad,
+                offset_rad: joint.offset + carried_rad + before_rad,
                 origin_m,
                 next_m,
                 tilt,

@@ -9,7 +9,7 @@ use std::path::Path;
 use taustream_arm::Robot;
 use taustream_arm::rng::SeededRng;
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
-use taustream_motion::{JointArray, MAX_JOINTS, joint_array};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS, joint_array};
 
 /// A chain of any axes and shifts, some of them of nothing, some parallel or opposite.
 pub(super) fn any_chain(rng: &mut SeededRng, count: usize) -> Chain {
@@ -29,7 +29,7 @@ pub(super) fn any_chain(rng: &mut SeededRng, count: usize) -> Chain {
             let (pre, post) = (pose(), pose());
             let axes = [Vector3::z(), -Vector3::z(), Vector3::y(), Vector3::new(0.3, -0.5, 0.2)];
             let axis = Unit::new_normalize(axes[rng.index(4)]);
-            ChainJoint { pre, axis, offset_rad: rng.within(-1.0, 1.0), post }
+            ChainJoint { kind: JointKind::Revolute, pre, axis, offset: rng.within(-1.0, 1.0), post }
         })
         .collect();
     Chain::new(&joints).expect("1 to 16 joints")

@@ -197,8 +197,10 @@ fn check_reach(robot: &Robot, target: &TipTarget) -> Result<f64, GoalError> {
     let frame = target.frame(robot);
     let first = chain.movers(frame).next().and_then(|first| chain.joint(first));
     let first = first.map_or_else(Vector3::zeros, |j| j.pre.translation.vector);
-    let joints = chain.movers(frame).filter_map(|i| chain.joint(i));
-    let lengths = joints.map(|j| j.pre.translation.vector.norm() + j.post.translation.vector.norm());
+    let joints = chain.movers(frame).filter_map(|i| Some((chain.joint(i)?, robot.extension_m(i))));
+    let lengths = joints.map(|(j, extension_m)| {
+        j.pre.translation.vector.norm() + extension_m + j.post.translation.vector.norm()
+    });
     let reach_m = lengths.sum::<f64>() - first.norm();
     let distance_m = (Vector3::from(target.position_m) - first).norm();
     if distance_m > reach_m + target.tolerance_m.max(ERROR_M_MAX) {

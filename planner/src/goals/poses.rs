@@ -157,12 +157,16 @@ impl Search<'_> {
         }))
     }
 
-    /// A random pose inside the ranges, no joint more than half a turn from the start.
+    /// A random pose inside the ranges, no revolute joint more than half a turn from the start.
     fn random(&self, number: u64) -> JointArray {
         let mut rng = SeededRng::new(self.seed.wrapping_add(number), STREAM);
         let mut pose = self.start_rad;
         for (q, joint) in pose.iter_mut().zip(&self.world.robot().joints) {
             let [low, high] = joint.limits.position_rad;
+            if joint.kind.is_prismatic() {
+                *q = rng.within(low, high);
+                continue;
+            }
             let from = (*q - PI).min(high).max(low);
             let to = (*q + PI).max(low).min(high);
             *q = rng.within(from, to);

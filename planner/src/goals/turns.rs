@@ -9,6 +9,9 @@ use taustream_motion::JointArray;
 pub fn nearest_turn(robot: &Robot, from_rad: &JointArray, pose_rad: &JointArray) -> JointArray {
     let mut nearest_rad = *pose_rad;
     for ((q, from), joint) in nearest_rad.iter_mut().zip(from_rad).zip(&robot.joints) {
+        if joint.kind.is_prismatic() {
+            continue;
+        }
         let [low, high] = joint.limits.position_rad;
         let turned = *q + TAU * ((from - *q) / TAU).round();
         // The nearest turn, or the next one inside the range.

@@ -2,12 +2,12 @@
 use super::Scratch;
 use super::arithmetic::{Ops, Vector, Vector3};
 use super::grid::Bounds;
-use super::model::{Form, Group, GroupPair, Model, Obstacle};
+use super::model::{Form, Group, GroupPair, Joint, Model, Obstacle};
 use super::rounding::down;
 use pulp::{Simd, WithSimd};
 use std::f64::consts::PI;
 use taustream_arm::cloud::Cloud;
-use taustream_motion::{JointArray, MAX_JOINTS, USUAL_JOINTS};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS, USUAL_JOINTS};
 
 /// Most lanes of any machine.
 const LANES_MAX: usize = 16;
@@ -72,6 +72,22 @@ impl Pass<'_> {
     }
 }
 
+/// What is left of a joint's position: half revolutions, -1 to 1, or metres.
+#[inline(always)]
+fn reduced(joint: &Joint, position: f64) -> f32 {
+    let by = match joint.kind {
+        JointKind::Revolute => {
+            let halves = position * (1.0 / PI) + joint.offset;
+            let whole = (halves * 0.5 + WHOLE) - WHOLE;
+            halves - 2.0 * whole
+        }
+        JointKind::Prismatic => position + joint.offset,
+    };
+    #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
+    let by = by as f32;
+    by
+}
+
 /// The arm in as many poses as there are lanes.
 struct Chunk<'a, S: Simd, const FRAMES: usize> {
     ops: Ops<S>,
@@ -97,17 +113,12 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
         let mut origin = [zero; 3];
         let mut frames = [(columns, origin); FRAMES];
         for (j, joint) in model.joints.iter().enumerate() {
-            let mut angles = [0.0_f32; LANES_MAX];
-            for (lane, angle) in angles.iter_mut().enumerate().take(S::F32_LANES) {
+            let mut positions = [0.0_f32; LANES_MAX];
+            for (lane, position) in positions.iter_mut().enumerate().take(S::F32_LANES) {
                 let pose = &poses_rad[(first + lane * strides).min(poses_rad.len() - 1)];
-                let halves = pose[j] * (1.0 / PI) + joint.offset;
-                let whole = (halves * 0.5 + WHOLE) - WHOLE;
-                #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
-                let rest = (halves - 2.0 * whole) as f32;
-                *angle = rest;
+                *position = reduced(joint, pose[j]);
             }
-            let (angle, _) = S::as_simd_f32s(&angles);
-            let [sin, cos] = ops.sin_cos_pi(angle[0]);
+            let (position, _) = S::as_simd_f32s(&positions);
             if joint.parent != j {
                 (columns, origin) = frames[joint.parent];
             }
@@ -118,12 +129,23 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
                 ops.moved(zero3, &columns, joint.columns[1]),
                 ops.moved(zero3, &columns, joint.columns[2]),
             ];
-            for k in 0..3 {
-                let (x, y) = (fixed[0][k], fixed[1][k]);
-                columns[0][k] = ops.mul_add(sin, y, ops.0.mul_f32s(cos, x));
-                columns[1][k] = ops.sub_mul(sin, x, ops.0.mul_f32s(cos, y));
+            match joint.kind {
+                JointKind::Revolute => {
+                    let [sin, cos] = ops.sin_cos_pi(position[0]);
+                    for k in 0..3 {
+                        let (x, y) = (fixed[0][k], fixed[1][k]);
+                        columns[0][k] = ops.mul_add(sin, y, ops.0.mul_f32s(cos, x));
+                        columns[1][k] = ops.sub_mul(sin, x, ops.0.mul_f32s(cos, y));
+                    }
+                    columns[2] = fixed[2];
+                }
+                JointKind::Prismatic => {
+                    columns = fixed;
+                    for k in 0..3 {
+                        origin[k] = ops.mul_add(position[0], columns[2][k], origin[k]);
+                    }
+                }
             }
-            columns[2] = fixed[2];
             frames[j + 1] = (columns, origin);
         }
         #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]

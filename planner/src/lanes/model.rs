@@ -11,18 +11,20 @@ use std::ops::Range;
 use std::sync::Arc;
 use taustream_arm::body::{Body, Core, Posed};
 use taustream_arm::cloud::Cloud;
+use taustream_motion::JointKind;
 
 /// Fewer obstacles than this are looked at one by one.
 const TREE_MIN: usize = 24;
 
-/// From one joint to the next: a fixed motion, then a rotation about z.
+/// From one joint to the next: a fixed motion, then a rotation about z or a translation along it.
 pub(super) struct Joint {
+    pub(super) kind: JointKind,
     /// The frame that it stands in.
     pub(super) parent: usize,
     /// Columns of the rotation.
     pub(super) columns: [[f32; 3]; 3],
     pub(super) shift: [f32; 3],
-    /// Added to the joint's angle, half revolutions.
+    /// Added to the joint's position, half revolutions or metres.
     pub(super) offset: f64,
 }
 
@@ -242,12 +244,14 @@ impl Model {
 
 /// A joint whose axis is z.
 struct Aligned {
+    kind: JointKind,
     /// The frame that it stands in.
     parent: usize,
     /// From the axes of that frame's joint, or from the base.
     before: Isometry3<f64>,
-    offset_rad: f64,
-    /// From the joint's axes, rotated, to the frame behind it.
+    /// rad, or m.
+    offset: f64,
+    /// From the joint's axes, moved, to the frame behind it.
     to_frame: Pose,
 }
 
@@ -267,9 +271,10 @@ fn aligned(world: &World) -> Vec<Aligned> {
             let to_frame = align.inverse() * joint.post;
             behind.push(to_frame);
             Some(Aligned {
+                kind: joint.kind,
                 parent,
                 before,
-                offset_rad: joint.offset_rad,
+                offset: joint.offset,
                 to_frame: taustream_arm::body::to_parry(&to_frame),
             })
         })
@@ -286,7 +291,11 @@ fn joints(world: &World, aligned: &[Aligned]) -> Vec<Joint> {
             parent: a.parent,
             columns: std::array::from_fn(|column| std::array::from_fn(|row| entry(row, column))),
             shift: [shift.x as f32, shift.y as f32, shift.z as f32],
-            offset: a.offset_rad / PI,
+            kind: a.kind,
+            offset: match a.kind {
+                JointKind::Revolute => a.offset / PI,
+                JointKind::Prismatic => a.offset,
+            },
         }
     };
     aligned.iter().map(one).collect()

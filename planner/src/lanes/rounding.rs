@@ -3,7 +3,8 @@
 //! With u = 2^-24, to first order and generous. An angle is reduced to one revolution in f64 and rounded once: pi u. Sine and cosine add 12 u
 //! each ([`super::arithmetic`]). A joint multiplies the directions by a fixed rotation (three products a column, 4 u each, constants
 //! 2 u) and by its own, in Frobenius' norm of at most 40 u more. So it turns what lies beyond it wrongly by less than 64 u, and the sums of
-//! positions round 4 times a joint. Every point is wrong by at most e = rho (64 n + 6 (n + 1)) u, with rho the arm's
+//! positions round 4 times a joint. A prismatic joint rounds its extension once and adds it in one rounding, both at most u rho, and turns
+//! nothing but by the fixed rotation. Every point is wrong by at most e = rho (64 n + 6 (n + 1)) u, with rho the arm's
 //! reach. Seen from an obstacle, coordinates grow by its distance, which rounds 8 times more; the distance of two points
 //! rounds 8 times, as does its square, which is compared with the square of what is to be kept. Both spheres of a pair of links may be wrong.
 const U: f64 = 1.0 / 16_777_216.0;
