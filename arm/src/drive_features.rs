@@ -3,6 +3,7 @@
 //! The profile demands little beside the state machine, and drives differ in the rest. What a drive lacks is never skipped
 //! in silence: bring-up refuses it by object, and its owner states here that the drive has it solved by other means.
 use crate::document::{Value, shown};
+use crate::profile_limits::{self, ProfileLimits};
 use crate::reader::{Bounds, Table};
 
 /// Object of a CiA 402 drive that is configured or read during bring-up, and that drives may lack or not let write.
@@ -19,6 +20,16 @@ pub enum OptionalObject {
     QuickStopOption = 0x605A,
     /// Home offset.
     HomeOffset = 0x607C,
+    /// Max profile velocity: beyond it the drive cuts speeds off.
+    MaxProfileVelocity = 0x607F,
+    /// Max motor speed, in revolutions of the motor a minute.
+    MaxMotorSpeed = 0x6080,
+    /// Profile acceleration.
+    ProfileAcceleration = 0x6083,
+    /// Profile deceleration.
+    ProfileDeceleration = 0x6084,
+    /// Quick stop deceleration.
+    QuickStopDeceleration = 0x6085,
     /// Homing method.
     HomingMethod = 0x6098,
     /// Homing speeds.
@@ -27,22 +38,33 @@ pub enum OptionalObject {
     HomingAcceleration = 0x609A,
     /// Interpolation time period.
     InterpolationPeriod = 0x60C2,
+    /// Max acceleration.
+    MaxAcceleration = 0x60C5,
+    /// Max deceleration.
+    MaxDeceleration = 0x60C6,
     /// Supported drive modes.
     SupportedModes = 0x6502,
 }
 
 impl OptionalObject {
     /// Every object.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 17] = [
         Self::SyncPeriod,
         Self::ProducerHeartbeat,
         Self::AbortConnection,
         Self::QuickStopOption,
         Self::HomeOffset,
+        Self::MaxProfileVelocity,
+        Self::MaxMotorSpeed,
+        Self::ProfileAcceleration,
+        Self::ProfileDeceleration,
+        Self::QuickStopDeceleration,
         Self::HomingMethod,
         Self::HomingSpeeds,
         Self::HomingAcceleration,
         Self::InterpolationPeriod,
+        Self::MaxAcceleration,
+        Self::MaxDeceleration,
         Self::SupportedModes,
     ];
 
@@ -65,12 +87,33 @@ impl OptionalObject {
             Self::AbortConnection => "abort connection option",
             Self::QuickStopOption => "quick stop option",
             Self::HomeOffset => "home offset",
+            Self::MaxProfileVelocity => "max profile velocity",
+            Self::MaxMotorSpeed => "max motor speed",
+            Self::ProfileAcceleration => "profile acceleration",
+            Self::ProfileDeceleration => "profile deceleration",
+            Self::QuickStopDeceleration => "quick stop deceleration",
+            Self::MaxAcceleration => "max acceleration",
+            Self::MaxDeceleration => "max deceleration",
             Self::HomingMethod => "homing method",
             Self::HomingSpeeds => "homing speeds",
             Self::HomingAcceleration => "homing acceleration",
             Self::InterpolationPeriod => "interpolation time period",
             Self::SupportedModes => "supported drive modes",
         }
+    }
+    /// It limits speeds or accelerations: looked at where `[servo.profile_limits]` says so, and not otherwise.
+    #[must_use]
+    pub const fn is_profile_limit(self) -> bool {
+        matches!(
+            self,
+            Self::MaxProfileVelocity
+                | Self::MaxMotorSpeed
+                | Self::ProfileAcceleration
+                | Self::ProfileDeceleration
+                | Self::QuickStopDeceleration
+                | Self::MaxAcceleration
+                | Self::MaxDeceleration
+        )
     }
     /// It is needed for homing alone, and not at bring-up.
     #[must_use]
@@ -86,6 +129,16 @@ impl OptionalObject {
             Self::AbortConnection => "what the drive does when its master is lost is the drive's own setting",
             Self::QuickStopOption => "whether the drive holds after a quick stop is the drive's own setting",
             Self::HomeOffset => "the position that homing gives the home position is the drive's own setting",
+            Self::MaxProfileVelocity | Self::MaxMotorSpeed => {
+                "whether the drive cuts speeds off is the drive's own setting"
+            }
+            Self::ProfileAcceleration
+            | Self::ProfileDeceleration
+            | Self::MaxAcceleration
+            | Self::MaxDeceleration => "whether the drive cuts accelerations off is the drive's own setting",
+            Self::QuickStopDeceleration => {
+                "how far the joint goes on in a quick stop is the drive's own setting"
+            }
             Self::HomingMethod => "how the drive homes is the drive's own setting",
             Self::HomingSpeeds => "how fast the drive homes is the drive's own setting",
             Self::HomingAcceleration => "how the drive accelerates in homing is the drive's own setting",
@@ -93,7 +146,7 @@ impl OptionalObject {
             Self::SupportedModes => "only its modes display (0x6061) confirms the mode",
         }
     }
-    const fn bit(self) -> u16 {
+    const fn bit(self) -> u32 {
         match self {
             Self::SyncPeriod => 1,
             Self::ProducerHeartbeat => 2,
@@ -105,13 +158,20 @@ impl OptionalObject {
             Self::HomingMethod => 128,
             Self::HomingSpeeds => 256,
             Self::HomingAcceleration => 512,
+            Self::MaxProfileVelocity => 1 << 10,
+            Self::MaxMotorSpeed => 1 << 11,
+            Self::ProfileAcceleration => 1 << 12,
+            Self::ProfileDeceleration => 1 << 13,
+            Self::QuickStopDeceleration => 1 << 14,
+            Self::MaxAcceleration => 1 << 15,
+            Self::MaxDeceleration => 1 << 16,
         }
     }
 }
 
 /// Objects that are neither read nor written, because the drive does not have them or they are fixed in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AbsentObjects(u16);
+pub struct AbsentObjects(u32);
 
 impl AbsentObjects {
     /// Every object is there.
@@ -218,6 +278,8 @@ pub struct DriveFeatures {
     pub position_mode: PositionMode,
     /// Limits that are written into it.
     pub limits: WrittenLimits,
+    /// Its own limits of speed and acceleration; `None`: they are not looked at.
+    pub profile_limits: Option<ProfileLimits>,
 }
 
 impl Default for DriveFeatures {
@@ -229,6 +291,7 @@ impl Default for DriveFeatures {
             late_mode_display: false,
             position_mode: PositionMode::Cyclic,
             limits: WrittenLimits::default(),
+            profile_limits: None,
         }
     }
 }
@@ -269,6 +332,7 @@ impl DriveFeatures {
         if self.limits.soft_limits {
             all.push("software position limit written".into());
         }
+        all.extend(self.profile_limits.map(ProfileLimits::sentence));
         if self.boot_timeout_s > BOOT_TIMEOUT_S {
             all.push(format!("boot-up within {} s", self.boot_timeout_s));
         }
@@ -288,6 +352,7 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
     let late_mode_display = table.flag_or("late_mode_display", false);
     let position_mode = read_position_mode(table);
     let limits = read_limits(table);
+    let profile_limits = profile_limits::read(table);
     Some(DriveFeatures {
         absent: absent?,
         master_supervision: master_supervision?,
@@ -295,6 +360,7 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
         late_mode_display: late_mode_display?,
         position_mode: position_mode?,
         limits: limits?,
+        profile_limits: profile_limits?,
     })
 }
 

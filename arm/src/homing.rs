@@ -4,46 +4,8 @@
 //! table has no default, and a method that moves needs its risk acknowledged.
 //!
 //! Source: CiA 402-2, "Homing mode".
-use crate::document::shown;
 use crate::reader::{Bounds, Table};
-use std::f64::consts::TAU;
-
-/// In which unit a drive takes speeds (0x6099) and, a second, accelerations (0x609A).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VelocityUnit {
-    /// Position units a second, as CiA 402 has it.
-    CountsPerSecond,
-    /// Motor revolutions a minute.
-    Rpm,
-    /// Tenths of motor revolutions a minute.
-    TenthRpm,
-}
-
-impl VelocityUnit {
-    /// Every unit.
-    pub const ALL: [Self; 3] = [Self::CountsPerSecond, Self::Rpm, Self::TenthRpm];
-
-    /// Its word in settings files.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::CountsPerSecond => "counts/s",
-            Self::Rpm => "rpm",
-            Self::TenthRpm => "0.1rpm",
-        }
-    }
-    /// A speed of the joint in this unit, for a drive with so many motor revolutions a joint revolution and counts a motor
-    /// revolution. Of an acceleration in rad/s^2 it makes this unit a second.
-    #[must_use]
-    pub fn of_rad_s(self, velocity_rad_s: f64, gear_ratio: f64, counts_per_rev: f64) -> f64 {
-        let motor_rev_s = velocity_rad_s * gear_ratio / TAU;
-        match self {
-            Self::CountsPerSecond => motor_rev_s * counts_per_rev,
-            Self::Rpm => motor_rev_s * 60.0,
-            Self::TenthRpm => motor_rev_s * 600.0,
-        }
-    }
-}
+use crate::velocity_unit::{self, VelocityUnit};
 
 /// The homing of one drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +69,7 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<Option<HomingSettings>> {
     const KEY: &str = "homing";
     let Some(mut homing) = table.table_if_there(KEY) else { return (!table.had(KEY)).then_some(None) };
     let method = homing.integer("method", -128, 127);
-    let velocity_unit = read_unit(&mut homing);
+    let velocity_unit = velocity_unit::read(&mut homing);
     let switch_speed_rad_s = homing.number("switch_speed_rad_s", &SPEED_RAD_S);
     let zero_speed_rad_s = homing.number("zero_speed_rad_s", &SPEED_RAD_S);
     let acceleration_rad_s2 = homing.number("acceleration_rad_s2", &ACCELERATION_RAD_S2);
@@ -135,33 +97,4 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<Option<HomingSettings>> {
     }
     homing.done();
     acknowledged.and(read).map(Some)
-}
-
-fn read_unit(table: &mut Table<'_>) -> Option<VelocityUnit> {
-    const KEY: &str = "velocity_unit";
-    const EXPECTED: &str = "\"counts/s\", \"rpm\" or \"0.1rpm\" (of the motor): the unit in which the drive takes speeds, and a second, accelerations";
-    let word = table.text(KEY, EXPECTED)?;
-    let known = VelocityUnit::ALL.into_iter().find(|unit| unit.word() == word);
-    if known.is_none() {
-        table.fault(KEY, &shown(&word), EXPECTED);
-    }
-    known
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Goal: one speed is the same in every unit. A joint revolution a second behind a gear of 100.
-    #[test]
-    fn speeds_are_stated_in_the_unit_of_the_drive() {
-        for (unit, expected) in [
-            (VelocityUnit::CountsPerSecond, 100.0 * 4096.0),
-            (VelocityUnit::Rpm, 6_000.0),
-            (VelocityUnit::TenthRpm, 60_000.0),
-        ] {
-            let got = unit.of_rad_s(TAU, 100.0, 4096.0);
-            assert!((got - expected).abs() < 1e-6, "{}: {got}", unit.word());
-        }
-    }
 }

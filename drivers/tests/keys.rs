@@ -11,8 +11,9 @@
 )]
 #[path = "keys/meanings.rs"]
 mod meanings;
+#[path = "keys/meanings_cia402.rs"]
+mod meanings_cia402;
 
-use meanings::MEANINGS;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
@@ -106,9 +107,14 @@ fn kinds() -> Vec<Kind> {
 const FEED_FORWARD: &str = "[feed_forward]\ngravity = true\ninertia = true\nshare = 1.0\n[[feed_forward.joint]]\njoint = \"elbow\"\n\
     torque_nm_max = 20.0\nrate_nm_s_max = 50.0\n[cycle]";
 
-/// The homing of the first servo, behind its other keys.
+/// Every key, and what it means.
+fn meanings() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    meanings::MEANINGS.iter().chain(meanings_cia402::MEANINGS)
+}
+
+/// The homing of the first servo, and its own limits, behind its other keys.
 const HOMING: &str = "limp_is_safe = true\n[servo.homing]\nmethod = 18\nvelocity_unit = \"rpm\"\nswitch_speed_rad_s = 0.1\n\
-    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n\n[[servo]]";
+    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n[servo.profile_limits]\napply = \"compare\"\nvelocity_unit = \"rpm\"\n\n[[servo]]";
 
 /// The shipped axis in rad.
 const AXIS_IN_RAD: &[(&str, &str)] = &[
@@ -280,14 +286,14 @@ fn page() -> String {
                 current = Some(path.clone());
             }
             let id = format!("{}: {}", kind.title, joined(&path, &name).replace("[0]", "[]"));
-            let meaning = MEANINGS.iter().find(|(key, _)| *key == id).map_or("?", |(_, text)| *text);
+            let meaning = meanings().find(|(key, _)| *key == id).map_or("?", |(_, text)| *text);
             used.insert(id.clone());
             let needed = if known.required { "yes" } else { "" };
             let expected = known.expected.replace('|', "\\|");
             writeln!(page, "| `{name}` | {needed} | {expected} | {meaning} |").unwrap();
         }
     }
-    let gone: Vec<&str> = MEANINGS.iter().map(|(key, _)| *key).filter(|key| !used.contains(*key)).collect();
+    let gone: Vec<&str> = meanings().map(|(key, _)| *key).filter(|key| !used.contains(*key)).collect();
     assert!(gone.is_empty(), "no reader knows these keys any more: {gone:#?}\n{page}");
     page
 }

@@ -6,6 +6,7 @@ use crate::bus_load::frame::Format;
 use crate::drive_features::{self, DriveFeatures, OptionalObject};
 use crate::drive_scale::{self, Overruled, ScaleObject};
 use crate::homing::{self, HomingSettings};
+use crate::profile_limits::ProfileLimits;
 use crate::reader::{Bounds, FaultList, Table};
 use crate::robot::RobotJoint;
 use crate::settings::{Bus, Servo, Settings};
@@ -47,6 +48,7 @@ pub(super) const REGISTRATION: Registration = Registration {
         "following_window_rad",
         "following_timeout_ms",
         "write_soft_limits",
+        "profile_limits",
         "homing",
     ],
     // 127 is refused later, because it is this master.
@@ -98,6 +100,20 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
     })
 }
 
+impl Cia402 {
+    /// A drive has one unit of velocities.
+    fn check_units(&self, table: &Table<'_>) {
+        let (limits, homing) = (self.features.profile_limits, self.homing);
+        if let (Some(limits), Some(homing)) = (limits, homing)
+            && limits.velocity_unit != homing.velocity_unit
+        {
+            let value = format!("{:?}", limits.velocity_unit.word());
+            let expected = format!("{:?}, the unit of [servo.homing]", homing.velocity_unit.word());
+            table.fault("profile_limits.velocity_unit", &value, &expected);
+        }
+    }
+}
+
 impl ServoProtocol for Cia402 {
     fn name(&self) -> &'static str {
         REGISTRATION.name
@@ -137,6 +153,7 @@ impl ServoProtocol for Cia402 {
                 return;
             }
         }
+        self.check_units(table);
         let most_rad_s = joint.limits.motion.velocity_rad_s;
         let speeds = self
             .homing
@@ -192,6 +209,7 @@ impl ServoProtocol for Cia402 {
             ("following_window_rad", self.features.limits.following_window_rad.into()),
             ("following_timeout_ms", self.features.limits.following_timeout_ms.into()),
             ("write_soft_limits", self.features.limits.soft_limits.into()),
+            ("profile_limits", self.features.profile_limits.map_or(Value::Null, ProfileLimits::entries)),
             ("homing", self.homing.map_or(Value::Null, |homing| homing.entries())),
         ]
     }

@@ -364,6 +364,35 @@ pub(crate) const CASES: &[Case] = &[
     (
         Settings,
         "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nprofile_limits = \"write\"",
+        "servo[0].profile_limits",
+        "a table",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nprofile_limits = { apply = \"set\", velocity_unit = \"rpm\" }",
+        "servo[0].profile_limits.apply",
+        "\"compare\"",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nprofile_limits = { apply = \"write\" }",
+        "servo[0].profile_limits.velocity_unit",
+        "\"counts/s\"",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nprofile_limits = { apply = \"write\", velocity_unit = \"rpm\" }\nhoming = { method = 35, \
+         velocity_unit = \"0.1rpm\", switch_speed_rad_s = 0.1, zero_speed_rad_s = 0.1, acceleration_rad_s2 = 1.0, timeout_s = 5.0 }",
+        "servo[0].profile_limits.velocity_unit",
+        "the unit of [servo.homing]",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
         "gear_ratio = 101.0\nlate_mode_display = 1",
         "servo[0].late_mode_display",
         "true or false",

@@ -107,12 +107,12 @@ impl Adoption {
             };
         };
         if step.check == Check::Scale {
-            return match value.as_unsigned_of_any_width() {
+            return match step.number(value) {
                 Some(number) => self.scale(job.address(), Some(number)),
                 None => Finding::Foreign(BringUpFault::WrongWidth, object),
             };
         }
-        let number = value.as_unsigned(step.width);
+        let number = step.number(value);
         let fits = number.is_some_and(|number| steps::passes(step.check, number).is_ok());
         if !fits {
             return Finding::Foreign(BringUpFault::Foreign, object);

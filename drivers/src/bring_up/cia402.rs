@@ -35,6 +35,7 @@ const HEARTBEAT_LOST: Nanos = Nanos(HEARTBEAT_LOST_MS as u64 * 1_000_000);
 const START_TRIES: u8 = 3;
 
 pub(super) const SCALE_DIFFERS: u32 = BringUpFault::ScaleDiffers.code();
+const LIMIT_TOO_LOW: u32 = BringUpFault::LimitTooLow.code();
 const NOT_TAKEN: u32 = BringUpFault::NotTaken.code();
 
 /// What the modes display (0x6061) has said.
@@ -278,7 +279,7 @@ impl Node {
     pub fn refused_numbers(&self) -> [f64; 2] {
         let homing = if let HomingState::Failed { code, .. } = self.homing() { code } else { 0 };
         match self.error().0.max(homing) {
-            SCALE_DIFFERS | NOT_TAKEN => self.numbers,
+            SCALE_DIFFERS | LIMIT_TOO_LOW | NOT_TAKEN => self.numbers,
             _ => [0.0; 2],
         }
     }

@@ -20,12 +20,10 @@ impl Node {
             }
             SdoOutcome::Aborted(code) => self.step_refused(now, step, index, code),
             SdoOutcome::TimedOut => self.refuse(ABORT_TIMEOUT, step.job),
-            SdoOutcome::Value(value) if step.check == Check::Scale => {
-                match value.as_unsigned_of_any_width() {
-                    Some(number) => self.compare(now, step, index, Some(number)),
-                    None => self.refuse(BringUpFault::WrongWidth.code(), step.job),
-                }
-            }
+            SdoOutcome::Value(value) if step.check == Check::Scale => match step.number(value) {
+                Some(number) => self.compare(now, step, index, Some(number)),
+                None => self.refuse(BringUpFault::WrongWidth.code(), step.job),
+            },
             SdoOutcome::Value(value) => match self.check_value(now, step, since, value) {
                 Ok(true) => self.next_step(now, index),
                 Ok(false) => {}
@@ -90,9 +88,14 @@ impl Node {
         since: Nanos,
         value: SdoValue,
     ) -> Result<bool, BringUpFault> {
-        let Some(number) = value.as_unsigned(step.width) else { return Err(BringUpFault::WrongWidth) };
+        let Some(number) = step.number(value) else { return Err(BringUpFault::WrongWidth) };
         if let Check::Equals { value: expected, .. } = step.check {
             self.numbers = [f64::from(number), f64::from(expected)];
+        }
+        if matches!(step.check, Check::AtLeast(_))
+            && let Some(profile) = &self.plan.profile
+        {
+            self.numbers = profile.numbers(step.job.address(), number);
         }
         steps::passes(step.check, number)?;
         match step.check {
@@ -127,6 +130,7 @@ impl Node {
             | Check::Offers(_)
             | Check::Scale
             | Check::OffOrOwn(_)
+            | Check::AtLeast(_)
             | Check::Equals { .. } => Ok(true),
         }
     }

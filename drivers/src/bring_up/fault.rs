@@ -2,7 +2,7 @@
 //!
 //! [`crate::ServoStatus::error_code`] of a CiA 402 drive holds kinds of codes that do not overlap: emergency codes (up to
 //! 0xFFFF), these (0x1 0000 to 0x1 FFFF), and SDO abort codes (from 0x503 0000).
-use crate::bring_up::scale;
+use crate::bring_up::{profile_limits, scale};
 use crate::codec::cia402_words::{DriveStep, STATUS_WARNING};
 use crate::codec::{emcy, error_text, object};
 use taustream_arm::OptionalObject;
@@ -65,11 +65,13 @@ pub enum BringUpFault {
     HomingNotAtRest = 0x0001_001A,
     /// Neither halt nor quick stop ended its homing.
     HomingNotStopped = 0x0001_001B,
+    /// A limit of speed or acceleration is below what the streamer may command.
+    LimitTooLow = 0x0001_001C,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -97,6 +99,7 @@ impl BringUpFault {
         Self::HomingNoFeedback,
         Self::HomingNotAtRest,
         Self::HomingNotStopped,
+        Self::LimitTooLow,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -148,6 +151,9 @@ impl BringUpFault {
             Self::ScaleDiffers => {
                 "what the drive states about its scale, direction or range contradicts the settings; correct the one that \
                  is wrong"
+            }
+            Self::LimitTooLow => {
+                "a limit of speed or acceleration of the drive is below what the streamer may command"
             }
             Self::NotTaken => "the drive confirmed a write and holds another value",
             Self::HomingError => {
@@ -205,7 +211,8 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::HomingModeNotTaken
         | BringUpFault::HomingNoFeedback
         | BringUpFault::HomingNotAtRest
-        | BringUpFault::HomingNotStopped => None,
+        | BringUpFault::HomingNotStopped
+        | BringUpFault::LimitTooLow => None,
     }
 }
 
@@ -226,6 +233,11 @@ pub fn explain_refusal(refusal: &Refusal, has_cable: bool) -> String {
     let Refusal { code, object, numbers: [stated, expected] } = *refusal;
     if code == BringUpFault::ScaleDiffers.code()
         && let Some(sentence) = scale::sentence(object, stated, expected)
+    {
+        return sentence;
+    }
+    if code == BringUpFault::LimitTooLow.code()
+        && let Some(sentence) = profile_limits::sentence(object, stated, expected)
     {
         return sentence;
     }

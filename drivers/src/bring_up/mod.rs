@@ -10,6 +10,7 @@ pub mod homing_plan;
 mod observe;
 pub mod plan;
 pub mod power;
+pub mod profile_limits;
 mod receive;
 pub mod scale;
 mod steps;

@@ -1,5 +1,6 @@
 //! The configuration of a CSP drive as a list of SDO steps.
 use crate::bring_up::power::Power;
+use crate::bring_up::profile_limits::ProfilePlan;
 use crate::bring_up::scale::ExpectedScale;
 use crate::bring_up::steps::{self, Check, Need, Pdo, Step, Steps, cob_id};
 use crate::codec::canopen::{COB_RPDO1, COB_TPDO1, MASTER_NODE, PdoEntry};
@@ -66,6 +67,8 @@ pub struct NodePlan {
     pub scale: ExpectedScale,
     /// What it lacks or does in its own time.
     pub features: DriveFeatures,
+    /// Its own limits of speed and acceleration.
+    pub profile: Option<ProfilePlan>,
     /// How it finds its zero by itself.
     pub homing: Option<HomingSettings>,
     /// Distance between a command and the measured position up to which they belong together, in counts.
@@ -224,6 +227,9 @@ impl NodePlan {
             steps.set(object::SOFT_LIMIT_MIN, low, Need::Demanded);
             let high = SdoBytes::from_i32(high.saturating_add(beyond));
             steps.set(object::SOFT_LIMIT_MAX, high, Need::Demanded);
+        }
+        if let Some(profile) = &self.profile {
+            profile.steps(self.features.absent, steps);
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::bring_up::fault::BringUpFault;
 use crate::codec::canopen::{COB_PDO_STEP, PDO_DISABLED, PDO_NO_RTR, PdoEntry};
 use crate::codec::object::{self, Address};
 use crate::codec::sdo::SdoBytes;
-use crate::codec::sdo_client::SdoJob;
+use crate::codec::sdo_client::{SdoJob, SdoValue};
 
 /// What a value that was read must satisfy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +28,8 @@ pub enum Check {
     Position,
     /// It agrees with the settings' scale, direction or range.
     Scale,
+    /// The value, of any width, is not below this one.
+    AtLeast(u32),
     /// The PDO is off, or has this identifier, which is its drive's own.
     OffOrOwn(u32),
     /// The bits of the mask are those of the value.
@@ -111,6 +113,13 @@ pub struct Step {
 }
 
 impl Step {
+    /// The number in an answer to this read; `None` when it is of another width than the object may have.
+    #[must_use]
+    pub fn number(&self, value: SdoValue) -> Option<u32> {
+        let any_width = matches!(self.check, Check::Scale | Check::AtLeast(_));
+        if any_width { value.as_unsigned_of_any_width() } else { value.as_unsigned(self.width) }
+    }
+
     /// A read, always due, of an object that every drive has.
     #[must_use]
     pub const fn read(address: Address, width: usize, check: Check) -> Self {
@@ -248,7 +257,7 @@ pub(super) fn verification(steps: &[Step]) -> Vec<Step> {
                 let value = u32::from(mode);
                 Step { check: Check::Equals { value, mask: u32::MAX }, ..*step }
             }
-            (SdoJob::Read(_), Check::Profile402 | Check::Scale) => *step,
+            (SdoJob::Read(_), Check::Profile402 | Check::Scale | Check::AtLeast(_)) => *step,
             (SdoJob::Read(_), _) => continue,
         };
         match reads.iter_mut().find(|other| other.job == read.job) {
@@ -267,6 +276,7 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
             if mode == object::MODE_CSP.cast_unsigned() { BringUpFault::NoCsp } else { BringUpFault::NoMode }
         }
         Check::Equals { value, mask } if number & mask != value & mask => BringUpFault::NotTaken,
+        Check::AtLeast(least) if number < least => BringUpFault::LimitTooLow,
         Check::OffOrOwn(off) if number & PDO_DISABLED == 0 && !is_same_identifier(number, off) => {
             BringUpFault::NotTaken
         }
@@ -274,6 +284,7 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
         | Check::Offers(_)
         | Check::Equals { .. }
         | Check::OffOrOwn(_)
+        | Check::AtLeast(_)
         | Check::Present
         | Check::NotEnergised
         | Check::Becomes(_)

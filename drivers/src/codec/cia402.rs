@@ -6,6 +6,7 @@
 use crate::bring_up::cia402::{DriveSetpoint, Node, Target};
 use crate::bring_up::fault;
 use crate::bring_up::plan::{HEARTBEAT_MS, NodePlan, TargetPdo};
+use crate::bring_up::profile_limits::ProfilePlan;
 use crate::bring_up::scale::ExpectedScale;
 use crate::bring_up::timing::{self, BringUpCycle, StepTimer, Timeouts};
 use crate::codec::canopen::{
@@ -163,6 +164,7 @@ impl Cia402Driver {
                 feedback_every,
                 setpoints_lost_ms: u16::try_from(settings.cycle.drive_watchdog_ms).unwrap_or(u16::MAX),
                 scale: expected,
+                profile: joint(servo).and_then(|joint| ProfilePlan::of(servo, joint, setpoint_us)),
                 homing: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.homing),
                 near_counts: expected.counts_of(near_rad),
                 features: servo.protocol.get::<Cia402>().map(|cia402| cia402.features).unwrap_or_default(),

@@ -122,6 +122,16 @@ objects! {
     POSITION_RANGE_MAX = 0x607B:2;
     /// Polarity, u8: bit 7 turns the direction of positions round, bit 6 that of velocities.
     POLARITY = 0x607E:0;
+    /// Max profile velocity, u32.
+    MAX_PROFILE_VELOCITY = 0x607F:0;
+    /// Max motor speed, u32, revolutions of the motor a minute.
+    MAX_MOTOR_SPEED = 0x6080:0;
+    /// Profile acceleration, u32.
+    PROFILE_ACCELERATION = 0x6083:0;
+    /// Profile deceleration, u32.
+    PROFILE_DECELERATION = 0x6084:0;
+    /// Quick stop deceleration, u32.
+    QUICK_STOP_DECELERATION = 0x6085:0;
     /// Position encoder resolution, increments, u32.
     ENCODER_INCREMENTS = 0x608F:1;
     /// Position encoder resolution, in so many motor revolutions, u32.
@@ -138,8 +148,6 @@ objects! {
     FACTOR_INCREMENTS = 0x6093:1;
     /// Position factor, in so many position units, u32.
     FACTOR_UNITS = 0x6093:2;
-    /// Quick stop deceleration, u32.
-    QUICK_STOP_DECELERATION = 0x6085:0;
     /// Position offset, i32, counts.
     POSITION_OFFSET = 0x60B0:0;
     /// Velocity offset, i32.
@@ -160,6 +168,10 @@ objects! {
     INTERPOLATION_VALUE = 0x60C2:1;
     /// Interpolation period, power of ten of a second, i8.
     INTERPOLATION_EXPONENT = 0x60C2:2;
+    /// Max acceleration, u32.
+    MAX_ACCELERATION = 0x60C5:0;
+    /// Max deceleration, u32.
+    MAX_DECELERATION = 0x60C6:0;
     /// Following error, i32, counts.
     FOLLOWING_ERROR = 0x60F4:0;
     /// Supported modes, u32; bit `mode - 1`.

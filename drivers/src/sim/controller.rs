@@ -127,6 +127,11 @@ impl Controller {
         }
     }
 
+    /// The newest setpoint, or where it stood when it began to follow.
+    pub(crate) const fn target_rad(&self) -> f64 {
+        self.line.to_rad
+    }
+
     /// No torque any more.
     pub(crate) fn release(&mut self) {
         self.mode = Mode::Released;

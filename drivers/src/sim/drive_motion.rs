@@ -73,19 +73,22 @@ impl Drive {
     /// Gives the newest setpoint to the controller, when the drive follows setpoints now.
     fn target_source(&mut self, now: Nanos, wanted: i64) {
         let (low, high) = (self.dictionary.get(0x607D, 1), self.dictionary.get(0x607D, 2));
-        let target = wanted.max(low).min(high);
+        let mut target = wanted.max(low).min(high);
         self.limited = target != wanted;
         if !self.follows_target() {
             return;
         }
         let exponent = i32::try_from(self.dictionary.get(0x60C2, 2)).unwrap_or(-3);
         let periods = f64::from(u8::try_from(self.dictionary.get(0x60C2, 1)).unwrap_or(1));
+        let period_s = periods * 10_f64.powi(exponent);
+        target = self.within_speed(target, period_s);
+        self.limited |= target != wanted;
         let offsets = &mut self.controller.offsets;
         offsets.velocity_rad_s = whole(self.dictionary.get(0x60B1, 0)) / self.parameters.counts_per_rad();
         offsets.torque_nm =
             whole(self.dictionary.get(0x60B2, 0)) * 1e-3 * self.parameters.plant.torque_nm_max;
         let target_rad = self.rad(whole(target));
-        self.controller.set_target(now, target_rad, periods * 10_f64.powi(exponent));
+        self.controller.set_target(now, target_rad, period_s);
     }
 
     /// Statusword bit 12: the motor follows the setpoints. Not before the brake has opened.

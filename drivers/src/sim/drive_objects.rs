@@ -75,12 +75,15 @@ impl Drive {
             (0x607D, 1, limits[0].min(limits[1])),
             (0x607D, 2, limits[0].max(limits[1])),
             (0x607F, 0, register(speed, 1, i32::MAX)),
+            (0x6080, 0, register(60.0 * speed / parameters.counts_per_rev, 1, i32::MAX)),
             (0x6081, 0, register(0.5 * speed, 1, i32::MAX)),
             (0x6083, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6084, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6099, 1, register(0.1 * speed, 1, i32::MAX)),
             (0x6099, 2, register(0.01 * speed, 1, i32::MAX)),
             (0x609A, 0, register(parameters.slow_rad_s2 * per_rad.abs(), 1, i32::MAX)),
+            (0x60C5, 0, register(2.0 * parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
+            (0x60C6, 0, register(2.0 * parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
             (0x6085, 0, register(parameters.quick_rad_s2 * per_rad.abs(), 1, i32::MAX)),
         ] {
             dictionary.ship(Address::new(index, sub), value);

@@ -12,7 +12,7 @@ use crate::servo::Nanos;
 use taustream_arm::Cia402;
 
 /// Its own keys.
-pub(crate) const KEYS: [&str; 14] = [
+pub(crate) const KEYS: [&str; 15] = [
     "objects",
     "dummy_mapping",
     "following_window_rad",
@@ -23,6 +23,7 @@ pub(crate) const KEYS: [&str; 14] = [
     "watchdog_ms",
     "fixed_pdos",
     "late_mode_display",
+    "limits_setpoints",
     "sdo_answer_ms",
     "switch_on_ms",
     "reset_edges",
@@ -65,6 +66,7 @@ fn quirks(joint: &SimulatedJoint<'_>) -> DriveQuirks {
     DriveQuirks {
         fixed_pdos: joint.flag("fixed_pdos", false),
         late_mode_display: joint.flag("late_mode_display", false),
+        limits_setpoints: joint.flag("limits_setpoints", false),
         sdo_answer_s: joint.number("sdo_answer_ms", 0.0, 0.0..=10_000.0) * 1e-3,
         switch_on_s: joint.number("switch_on_ms", 0.0, 0.0..=60_000.0) * 1e-3,
         reset_edges: joint.whole::<u8>("reset_edges", 1, 1..=10).saturating_sub(1),

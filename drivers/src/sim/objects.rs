@@ -240,6 +240,8 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::rw(0x607D, 1, Kind::I32, i64::from(i32::MIN)),
         Spec::rw(0x607D, 2, Kind::I32, i64::from(i32::MAX)),
         Spec::rw(0x607F, 0, Kind::U32, 1).rpdo(),
+        // Revolutions of the motor a minute.
+        Spec::rw(0x6080, 0, Kind::U32, 1).rpdo(),
         Spec::rw(0x6081, 0, Kind::U32, 1).rpdo(),
         Spec::rw(0x6082, 0, Kind::U32, 0).one_of(&[0]),
         Spec::rw(0x6083, 0, Kind::U32, 1).within(1, 0xFFFF_FFFF).rpdo(),
@@ -270,6 +272,8 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x60C2, 0, Kind::U8, 2),
         Spec::rw(0x60C2, 1, Kind::U8, 1).within(1, 255),
         Spec::rw(0x60C2, 2, Kind::I8, -3).within(-6, 0),
+        Spec::rw(0x60C5, 0, Kind::U32, 1).rpdo(),
+        Spec::rw(0x60C6, 0, Kind::U32, 1).rpdo(),
         Spec::ro(0x60F4, 0, Kind::I32, 0).tpdo(),
         // Bit 0 negative, bit 1 positive limit switch.
         Spec::ro(0x60FD, 0, Kind::U32, 0).tpdo(),

@@ -2,6 +2,7 @@
 //!
 //! Objects that are absent, fixed, wider or refused with another abort code are [`super::PlantedObject`]s.
 use super::drive::Drive;
+use super::drive_motion::{counts, whole};
 use super::objects::INVALID;
 use super::power::PowerState;
 use crate::codec::canopen::{COB_PDO_STEP, COB_RPDO1, COB_TPDO1, PDO_NO_RTR};
@@ -17,6 +18,8 @@ pub struct DriveQuirks {
     pub fixed_pdos: bool,
     /// The modes display (0x6061) follows only in operation enabled.
     pub late_mode_display: bool,
+    /// Setpoints are cut off at the speed of its limits (0x607F, 0x6080).
+    pub limits_setpoints: bool,
     /// Time that an SDO answer takes.
     pub sdo_answer_s: f64,
     /// Time from the command to switch on to the state switched on.
@@ -70,6 +73,19 @@ impl Drive {
         }
         let since = *self.quirks.switching.get_or_insert(now);
         if now.since_s(since) < quirks.switch_on_s { SHUTDOWN } else { word }
+    }
+
+    /// A setpoint as the drive takes it, where it cuts off at its limits of speed; counts.
+    pub(super) fn within_speed(&self, target: i64, period_s: f64) -> i64 {
+        if !self.parameters.quirks.limits_setpoints {
+            return target;
+        }
+        let profile = whole(self.dictionary.get(0x607F, 0));
+        let motor = whole(self.dictionary.get(0x6080, 0)) / 60.0 * self.parameters.counts_per_rev;
+        #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+        let step = (profile.min(motor) * period_s).round() as i64;
+        let before = i64::from(counts(self, self.controller.target_rad()));
+        target.clamp(before.saturating_sub(step), before.saturating_add(step))
     }
 
     /// It is switching on, and the time for it has passed.

@@ -329,11 +329,6 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: servo[].sign", "Direction of the drive's position against the joint's."),
     ("Settings files: servo[].zero_offset_rad", "Joint angle where the drive's position is 0."),
     ("Settings files: servo[].gear_ratio", "CiA 402, ODrive: motor revolutions for one of the joint."),
-    ("Settings files: servo[].counts_per_rev", "CiA 402: position counts for one motor revolution."),
-    (
-        "Settings files: servo[].home_offset_counts",
-        "CiA 402: what the drive stated as its home offset (0x607C) when `zero_offset_rad` was determined; 0.",
-    ),
     ("Settings files: servo[].feedback", "What the encoder knows after power-up."),
     ("Settings files: servo[].feedback_range_rad", "Joint angles that the feedback tells apart."),
     ("Settings files: servo[].reaction", "What the drive does when setpoints stop coming."),
@@ -346,85 +341,8 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "true: the joint falls when commands stop, its servo cannot hold, and its owner knows it; false.",
     ),
     (
-        "Settings files: servo[].overruled_objects",
-        "CiA 402: objects of the drive that are not compared with these settings, for example `[0x6091]`; none.",
-    ),
-    (
-        "Settings files: servo[].absent_objects",
-        "CiA 402: objects that the drive lacks or has fixed, neither read nor written, for example `[0x6007]`; none.",
-    ),
-    (
-        "Settings files: servo[].master_supervision",
-        "CiA 402: how the drive finds out that its master is gone; without it `heartbeat`.",
-    ),
-    (
-        "Settings files: servo[].boot_timeout_s",
-        "CiA 402: longest time from the reset of communication to the boot-up message, s; 5.",
-    ),
-    (
-        "Settings files: servo[].late_mode_display",
-        "CiA 402: true: the modes display (0x6061) follows only in operation enabled, and is looked at there; false.",
-    ),
-    (
         "Settings files: simulator.objects",
         "Objects of the drives changed, for example `[\"joint=3,object=0x6091:01,value=50\"]`; also `value=absent`, `access=read-only`, `abort=0x08000020`, `bytes=4`; none.",
-    ),
-    ("Settings files: servo[].position_mode", "CiA 402: the mode in which it follows setpoints; `cyclic`."),
-    (
-        "Settings files: servo[].following_window_rad",
-        "CiA 402: following error window (0x6065) that is written into the drive; without it the drive's own.",
-    ),
-    (
-        "Settings files: servo[].following_timeout_ms",
-        "CiA 402: following error time-out (0x6066) that is written into the drive; without it the drive's own.",
-    ),
-    (
-        "Settings files: servo[].write_soft_limits",
-        "CiA 402: true: the joint's `position_rad` is written as software position limit (0x607D); false: compared.",
-    ),
-    (
-        "Settings files: servo[].homing",
-        "CiA 402: how the drive finds its zero by itself: see [homing.md](homing.md); without it `taustream home` is refused.",
-    ),
-    (
-        "Settings files: servo[].homing.method",
-        "Homing method (0x6098), by the drive's manual; negative ones are the maker's own.",
-    ),
-    (
-        "Settings files: servo[].homing.velocity_unit",
-        "Unit in which the drive takes speeds and, a second, accelerations, of its motor.",
-    ),
-    (
-        "Settings files: servo[].homing.switch_speed_rad_s",
-        "Speed of the joint towards the switch (0x6099:01); at most its motion limit.",
-    ),
-    (
-        "Settings files: servo[].homing.zero_speed_rad_s",
-        "Speed of the joint towards the zero (0x6099:02); at most its motion limit.",
-    ),
-    ("Settings files: servo[].homing.acceleration_rad_s2", "Acceleration of the joint (0x609A)."),
-    ("Settings files: servo[].homing.timeout_s", "Longest time from start to end; then the drive is halted."),
-    (
-        "Settings files: servo[].homing.collision_risk_acknowledged",
-        "true: its owner knows that nothing checks this motion for collisions; needed for methods that move (all but 35 and 37).",
-    ),
-    (
-        "Settings files: simulator.fixed_pdos",
-        "CiA 402: true: PDO 1 is mapped and on as this master needs it, and no PDO can be changed; false.",
-    ),
-    (
-        "Settings files: simulator.late_mode_display",
-        "CiA 402: true: the modes display (0x6061) follows only in operation enabled; false.",
-    ),
-    ("Settings files: simulator.sdo_answer_ms", "CiA 402: time that an SDO answer takes; 0."),
-    (
-        "Settings files: simulator.switch_on_ms",
-        "CiA 402: time from the command to switch on to the state switched on; 0.",
-    ),
-    ("Settings files: simulator.reset_edges", "CiA 402: rising edges that a fault reset takes; 1."),
-    (
-        "Settings files: simulator.falls_back",
-        "CiA 402: how often the drive falls from ready-to-switch-on to switch-on-disabled on its way up; 0.",
     ),
     ("Robot files: link_margin_m", "Least distance of links that may not touch; 0.003."),
     (
@@ -497,10 +415,6 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Frames that the master's side of a bus with a bit rate holds; 64.",
     ),
     (
-        "Settings files: simulator.dummy_mapping",
-        "CiA 402: objects 0x0005 and 0x0007 may be mapped as placeholders; true.",
-    ),
-    (
         "Settings files: simulator.start_rad",
         "Where the joints stand at power-up; 0, or the limit that is nearest to it.",
     ),
@@ -528,14 +442,6 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "For how long a CiA 402 drive goes on at its speed when no setpoint follows; 0: it stops.",
     ),
     ("Settings files: simulator.torque_lag_ms", "Lag of the torque loop; 0.3."),
-    ("Settings files: simulator.following_window_rad", "CiA 402: following error window; 0.3."),
-    ("Settings files: simulator.following_timeout_ms", "CiA 402: following error time out; 50."),
-    (
-        "Settings files: simulator.soft_limit_margin_rad",
-        "CiA 402: software position limits this far beyond the joint's; 0.02.",
-    ),
-    ("Settings files: simulator.slow_rad_s2", "CiA 402: slow-down ramp; the motion limit."),
-    ("Settings files: simulator.quick_stop_rad_s2", "CiA 402: quick stop ramp; the stop limit."),
     (
         "Settings files: simulator.watchdog_ms",
         "Watchdog on setpoints, 0 for none; `cycle.drive_watchdog_ms`.",

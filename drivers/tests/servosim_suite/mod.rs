@@ -8,5 +8,6 @@ mod motion;
 mod network;
 mod power;
 mod process;
+mod profile_limits;
 mod quirks;
 mod scale;
