@@ -278,6 +278,8 @@ pub struct DriveFeatures {
     pub position_mode: PositionMode,
     /// Limits that are written into it.
     pub limits: WrittenLimits,
+    /// Its digital inputs (0x60FD) are read: limit switches, home switch, interlock.
+    pub digital_inputs: bool,
     /// Its own limits of speed and acceleration; `None`: they are not looked at.
     pub profile_limits: Option<ProfileLimits>,
 }
@@ -291,6 +293,7 @@ impl Default for DriveFeatures {
             late_mode_display: false,
             position_mode: PositionMode::Cyclic,
             limits: WrittenLimits::default(),
+            digital_inputs: false,
             profile_limits: None,
         }
     }
@@ -332,6 +335,9 @@ impl DriveFeatures {
         if self.limits.soft_limits {
             all.push("software position limit written".into());
         }
+        if self.digital_inputs {
+            all.push("digital inputs (0x60FD) read: a limit switch stops the arm".into());
+        }
         all.extend(self.profile_limits.map(ProfileLimits::sentence));
         if self.boot_timeout_s > BOOT_TIMEOUT_S {
             all.push(format!("boot-up within {} s", self.boot_timeout_s));
@@ -352,6 +358,7 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
     let late_mode_display = table.flag_or("late_mode_display", false);
     let position_mode = read_position_mode(table);
     let limits = read_limits(table);
+    let digital_inputs = table.flag_or("digital_inputs", false);
     let profile_limits = profile_limits::read(table);
     Some(DriveFeatures {
         absent: absent?,
@@ -360,6 +367,7 @@ pub(crate) fn read(table: &mut Table<'_>) -> Option<DriveFeatures> {
         late_mode_display: late_mode_display?,
         position_mode: position_mode?,
         limits: limits?,
+        digital_inputs: digital_inputs?,
         profile_limits: profile_limits?,
     })
 }

@@ -2,7 +2,7 @@
 use super::identifiers::Use;
 use super::{FdUse, Protocol, Registration, ServoProtocol};
 use crate::bus_load::flow::{Cia402Bus, Flow};
-use crate::bus_load::frame::Format;
+use crate::bus_load::frame::{Format, Frame};
 use crate::drive_features::{self, DriveFeatures, OptionalObject};
 use crate::drive_scale::{self, Overruled, ScaleObject};
 use crate::homing::{self, HomingSettings};
@@ -48,6 +48,7 @@ pub(super) const REGISTRATION: Registration = Registration {
         "following_window_rad",
         "following_timeout_ms",
         "write_soft_limits",
+        "digital_inputs",
         "profile_limits",
         "homing",
     ],
@@ -59,6 +60,10 @@ pub(super) const REGISTRATION: Registration = Registration {
 const GEAR_RATIO: Bounds = Bounds::above(0.0, 1e5, "motor revolutions a link revolution");
 const COUNTS_PER_REV: Bounds = Bounds::within(1.0, 4_294_967_296.0, "counts a motor revolution");
 const HOME_OFFSET_COUNTS: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
+/// Time between two looks at the digital inputs of a drive whose statusword does not change, ms.
+pub const DIGITAL_INPUTS_MS: u16 = 200;
+/// Data bytes of an SDO request and of its answer.
+const SDO_BYTES: u32 = 8;
 /// Control or status word and a 32-bit position.
 const PDO_BYTES: u32 = 6;
 
@@ -81,6 +86,16 @@ const NODE: [(u16, &str); 12] = [
 ];
 /// What all CANopen nodes of a bus share.
 const SHARED: [(u16, &str); 3] = [(0x000, "NMT"), (0x080, "SYNC"), (0x77F, "the master's heartbeat")];
+
+/// Requests for the digital inputs of so many drives, and their answers.
+fn digital_inputs(drives: u32, format: Format) -> Flow {
+    Flow {
+        what: "digital inputs, by SDO",
+        frame: Frame::standard(format, SDO_BYTES),
+        rate_hz: f64::from(2 * drives) * 1000.0 / f64::from(DIGITAL_INPUTS_MS),
+        burst: 2 * drives,
+    }
+}
 
 fn read(table: &mut Table<'_>) -> Option<Cia402> {
     let gear_ratio = table.number("gear_ratio", &GEAR_RATIO);
@@ -186,7 +201,11 @@ impl ServoProtocol for Cia402 {
             answer_bytes: PDO_BYTES,
             format,
         };
-        [cia402.process_data(), cia402.service()].concat()
+        let reads_inputs =
+            |servo: &&Protocol| servo.get::<Self>().is_some_and(|it| it.features.digital_inputs);
+        let readers = u32::try_from(servos.iter().filter(reads_inputs).count()).unwrap_or(u32::MAX);
+        let inputs = (readers > 0).then(|| digital_inputs(readers, format));
+        [cia402.process_data(), cia402.service(), inputs.into_iter().collect()].concat()
     }
 
     fn fd(&self) -> FdUse {
@@ -209,6 +228,7 @@ impl ServoProtocol for Cia402 {
             ("following_window_rad", self.features.limits.following_window_rad.into()),
             ("following_timeout_ms", self.features.limits.following_timeout_ms.into()),
             ("write_soft_limits", self.features.limits.soft_limits.into()),
+            ("digital_inputs", self.features.digital_inputs.into()),
             ("profile_limits", self.features.profile_limits.map_or(Value::Null, ProfileLimits::entries)),
             ("homing", self.homing.map_or(Value::Null, |homing| homing.entries())),
         ]

@@ -364,6 +364,13 @@ pub(crate) const CASES: &[Case] = &[
     (
         Settings,
         "gear_ratio = 101.0",
+        "gear_ratio = 101.0\ndigital_inputs = 1",
+        "servo[0].digital_inputs",
+        "true or false",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
         "gear_ratio = 101.0\nprofile_limits = \"write\"",
         "servo[0].profile_limits",
         "a table",

@@ -7,6 +7,7 @@ use crate::bring_up::adopt::Adoption;
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::homing::{Homing, HomingTarget};
 use crate::bring_up::homing_plan::HomingPlan;
+use crate::bring_up::inputs::Inputs;
 use crate::bring_up::plan::{HEARTBEAT_LOST_MS, NodePlan};
 use crate::bring_up::power::{Power, Received, TargetSource};
 use crate::bring_up::scale::StatedScale;
@@ -135,6 +136,7 @@ pub struct Node {
     /// PDOs that are not needed and stay on.
     pub(super) fixed_pdos: FixedPdos,
     pub(super) mode: ModeDisplay,
+    pub(super) inputs: Inputs,
     pub(super) stated: StatedScale,
     pub(super) homing: Homing,
     pub(super) homing_plan: Option<HomingPlan>,
@@ -173,6 +175,7 @@ impl Node {
             there: None,
             fixed_pdos: FixedPdos::NONE,
             mode: ModeDisplay::default(),
+            inputs: Inputs::default(),
             stated: StatedScale::default(),
             homing: Homing::default(),
             homing_plan: plan.homing.map(|homing| HomingPlan::of(&homing, &plan)),
@@ -411,6 +414,7 @@ impl Node {
         self.power = self.plan.power(self.timeouts.step);
         self.commanded = None;
         self.homing.forget();
+        self.inputs.forget();
         self.power.watch(self.last_target);
         (self.emcy, self.requested_error) = (0, false);
         self.stage = NodeStage::Observe { since: now, next: now, fault };
@@ -507,8 +511,12 @@ impl Node {
                     self.observe(now, Some(BringUpFault::HeartbeatLost));
                 }
             }
-        } else if !self.request_error() && self.homing.is_idle() {
+        } else if !self.homing.is_idle() {
+            self.inputs.forget();
+            self.request_error();
+        } else if !self.request_error() {
             self.request_mode(now);
+            self.request_inputs(now);
         }
     }
 
@@ -549,6 +557,9 @@ impl Node {
                 self.emcy = code;
             }
             return;
+        }
+        if job.address() == object::DIGITAL_INPUTS && matches!(self.stage, NodeStage::Operational { .. }) {
+            return self.take_inputs(outcome);
         }
         match self.stage {
             NodeStage::Observe { .. } | NodeStage::Unowned { .. } | NodeStage::Held { .. } => {

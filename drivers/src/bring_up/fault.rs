@@ -3,8 +3,8 @@
 //! [`crate::ServoStatus::error_code`] of a CiA 402 drive holds kinds of codes that do not overlap: emergency codes (up to
 //! 0xFFFF), these (0x1 0000 to 0x1 FFFF), and SDO abort codes (from 0x503 0000).
 use crate::bring_up::{profile_limits, scale};
-use crate::codec::cia402_words::{DriveStep, STATUS_WARNING};
-use crate::codec::{emcy, error_text, object};
+use crate::codec::cia402_words::{DriveStep, STATUS_LIMIT, STATUS_WARNING};
+use crate::codec::{digital_inputs, emcy, error_text, object};
 use taustream_arm::OptionalObject;
 
 /// A finding of the master.
@@ -67,11 +67,15 @@ pub enum BringUpFault {
     HomingNotStopped = 0x0001_001B,
     /// A limit of speed or acceleration is below what the streamer may command.
     LimitTooLow = 0x0001_001C,
+    /// Its negative limit switch has become active while it followed.
+    NegativeLimitSwitch = 0x0001_001D,
+    /// Its positive limit switch has become active while it followed.
+    PositiveLimitSwitch = 0x0001_001E,
 }
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 30] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -100,6 +104,8 @@ impl BringUpFault {
         Self::HomingNotAtRest,
         Self::HomingNotStopped,
         Self::LimitTooLow,
+        Self::NegativeLimitSwitch,
+        Self::PositiveLimitSwitch,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -154,6 +160,12 @@ impl BringUpFault {
             }
             Self::LimitTooLow => {
                 "a limit of speed or acceleration of the drive is below what the streamer may command"
+            }
+            Self::NegativeLimitSwitch => {
+                "the drive's negative limit switch has become active (object 0x60FD, bit 0); lead the joint off it, then see its position_rad"
+            }
+            Self::PositiveLimitSwitch => {
+                "the drive's positive limit switch has become active (object 0x60FD, bit 1); lead the joint off it, then see its position_rad"
             }
             Self::NotTaken => "the drive confirmed a write and holds another value",
             Self::HomingError => {
@@ -212,7 +224,9 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::HomingNoFeedback
         | BringUpFault::HomingNotAtRest
         | BringUpFault::HomingNotStopped
-        | BringUpFault::LimitTooLow => None,
+        | BringUpFault::LimitTooLow
+        | BringUpFault::NegativeLimitSwitch
+        | BringUpFault::PositiveLimitSwitch => None,
     }
 }
 
@@ -271,6 +285,9 @@ fn advice(code: u32, index: u16) -> String {
         _ if index == object::RPDO_MAPPING + 1 => {
             "; the drive does not skip the other drive's part of a shared setpoint frame: take `packed` off its bus".into()
         }
+        _ if index == object::DIGITAL_INPUTS.index => {
+            " (digital inputs): if the drive lacks it, take digital_inputs out of its [[servo]]; its switches are then its own affair".into()
+        }
         _ if index == object::CONSUMER_HEARTBEAT.index => {
             " (consumer heartbeat): without it the drive does not notice that its master is gone; if it notices otherwise, state \
              master_supervision = \"setpoint-timer\" (0x1400:05) or \"drive\" (set in the drive) for this servo"
@@ -293,11 +310,13 @@ pub fn explain(code: u32, has_cable: bool) -> String {
     }
 }
 
-/// A drive's statusword as text: "0x0218 fault".
+/// A drive's statusword as text: "0x0218 fault"; with the digital inputs that stand above it.
 #[must_use]
 pub fn status_text(word: u32) -> String {
     let status = (word & 0xFFFF) as u16;
     let step = DriveStep::from_status(status).map_or("no state of CiA 402", DriveStep::word);
     let warning = if status & STATUS_WARNING == 0 { "" } else { ", warning" };
-    format!("0x{status:04X} {step}{warning}")
+    let limit = if status & STATUS_LIMIT == 0 { "" } else { ", internal limit active" };
+    let inputs = digital_inputs::words(digital_inputs::active(word >> 16));
+    format!("0x{status:04X} {step}{warning}{limit}{inputs}")
 }

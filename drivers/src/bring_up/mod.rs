@@ -7,6 +7,7 @@ mod configure;
 pub mod fault;
 mod homing;
 pub mod homing_plan;
+mod inputs;
 mod observe;
 pub mod plan;
 pub mod power;

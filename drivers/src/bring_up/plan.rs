@@ -167,6 +167,9 @@ impl NodePlan {
             let offers = Check::Offers(self.features.position_mode.number());
             steps.read(object::SUPPORTED_MODES, 4, offers);
         }
+        if self.features.digital_inputs {
+            steps.read(object::DIGITAL_INPUTS, 4, Check::Present);
+        }
         steps.read(object::STATUSWORD, 2, Check::NotEnergised);
         for address in self.scale.addresses() {
             steps.read_if_there(address, 4, Check::Scale);

@@ -370,7 +370,7 @@ impl ServoDriver for Cia402Driver {
             fixed_pdos: node.fixed_pdos(),
             hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
             received: drive.received,
-            status_word: u32::from(node.status()),
+            status_word: node.status_word(),
             error_code,
             refused_object,
             refused_numbers: node.refused_numbers(),

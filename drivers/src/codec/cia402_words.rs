@@ -31,6 +31,8 @@ pub enum DriveStep {
 pub const STATUS_WARNING: u16 = 1 << 7;
 /// Statusword bit that all energised states have: operation enabled, quick stop active, fault reaction active.
 pub const STATUS_ENERGISED: u16 = 1 << 2;
+/// Statusword bit: a limit of the drive acts, as its maker defines it.
+pub const STATUS_LIMIT: u16 = 1 << 11;
 /// Statusword bit in CSP: the drive follows the target.
 pub const STATUS_FOLLOWS: u16 = 1 << 12;
 

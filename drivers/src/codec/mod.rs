@@ -4,6 +4,7 @@
 pub mod canopen;
 pub mod cia402;
 pub mod cia402_words;
+pub mod digital_inputs;
 pub mod emcy;
 pub mod error_text;
 pub mod mit;

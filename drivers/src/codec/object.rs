@@ -174,6 +174,8 @@ objects! {
     MAX_DECELERATION = 0x60C6:0;
     /// Following error, i32, counts.
     FOLLOWING_ERROR = 0x60F4:0;
+    /// Digital inputs, u32: see [`super::digital_inputs`].
+    DIGITAL_INPUTS = 0x60FD:0;
     /// Supported modes, u32; bit `mode - 1`.
     SUPPORTED_MODES = 0x6502:0;
 }

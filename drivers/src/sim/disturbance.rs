@@ -16,6 +16,8 @@ pub enum Disturbance {
     Warning(bool),
     /// Every write is refused; 0 ends it. CiA 402: with this SDO abort code. Damiao: the echo holds the old value.
     RefuseWrites(u32),
+    /// CiA 402: these digital inputs (0x60FD) are active, whatever the joint's place; 0 ends it.
+    Inputs(u8),
     /// The servo restarts, as after a dip of its supply: torque is gone meanwhile.
     Restart,
 }

@@ -103,6 +103,8 @@ pub struct Drive {
     pub(super) moving: Nanos,
     pub(super) warning: bool,
     pub(super) refuse_writes: u32,
+    /// Digital inputs that are active on request.
+    pub(super) forced_inputs: u8,
     pub(super) quirks: QuirkState,
     pub(super) modes: ModeState,
     pub(super) block: Option<BlockUpload>,
@@ -141,6 +143,7 @@ impl Drive {
             moving: Nanos(0),
             warning: false,
             refuse_writes: 0,
+            forced_inputs: 0,
             quirks: QuirkState::default(),
             modes: ModeState::default(),
             block: None,
@@ -217,6 +220,7 @@ impl Drive {
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warning) => self.warning = warning,
             Disturbance::RefuseWrites(code) => self.refuse_writes = code,
+            Disturbance::Inputs(inputs) => self.forced_inputs = inputs,
             Disturbance::Restart => self.restart(false),
         }
     }

@@ -8,6 +8,7 @@ use super::planted::{ObjectChange, PlantedObject, as_ratio};
 use super::power::PowerState;
 use super::quirks::fixed_pdos;
 use super::sdo_server::Objects;
+use crate::codec::digital_inputs::{NEGATIVE_LIMIT, POSITIVE_LIMIT};
 use crate::codec::object::{RPDO_COMMUNICATION, TPDO_MAPPING};
 use crate::codec::{Address, error_text};
 use crate::frame::CanFrame;
@@ -154,7 +155,7 @@ impl Drive {
             | bit(powered, 4)
             | bit(self.warning || self.held, 7)
             | bit(true, 9)
-            | bit(self.limited, 11)
+            | bit(self.limited || self.forced_inputs & (NEGATIVE_LIMIT | POSITIVE_LIMIT) != 0, 11)
             | self.mode_bits()
     }
 

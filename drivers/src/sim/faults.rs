@@ -1,6 +1,7 @@
 //! Faults on request, as text: `joint=elbow,kind=silence,at_s=2.0,after=enable,for_s=1.0,value=..`.
 //!
 //! The same text serves `--fault` and, after the word `fault`, lines on the standard input.
+use crate::codec::digital_inputs::{KNOWN, NEGATIVE_LIMIT};
 use std::fmt;
 
 /// What goes wrong.
@@ -41,6 +42,11 @@ pub enum FaultKind {
     Refuse {
         /// SDO abort code.
         code: u32,
+    },
+    /// These digital inputs are active (CiA 402).
+    Inputs {
+        /// Bits 0 to 3 of 0x60FD.
+        bits: u8,
     },
     /// Its supply dips: it restarts.
     Restart,
@@ -108,7 +114,7 @@ pub enum FaultRequestError {
     },
     /// The kind is unknown.
     #[error(
-        "kind={0} is unknown: expected silence, delay, drop, fault, stuck, object, jump, warning, refuse or restart"
+        "kind={0} is unknown: expected silence, delay, drop, fault, stuck, object, jump, warning, refuse, inputs or restart"
     )]
     Kind(String),
     /// The event is unknown.
@@ -240,6 +246,8 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, FaultRequestError> {
     const CHANCE: Fits = Fits { low: 0.0, high: 1.0, words: "a probability from 0 to 1" };
     const ANGLE: Fits = Fits { low: -100.0, high: 100.0, words: "radians from -100 to 100" };
     const PLACE: Fits = Fits { low: -1e4, high: 1e4, words: "radians of the link, from -10000 to 10000" };
+    const INPUTS: &str =
+        "bits of 0x60FD from 1 to 15: 1 negative, 2 positive limit switch, 4 home switch, 8 interlock";
     const EMCY: &str = "an EMCY code from 1 to 0xFFFF";
     const ABORT: &str = "an SDO abort code, for example 0x08000022";
     let kind = match pieces.need("kind")? {
@@ -258,6 +266,10 @@ fn kind(pieces: &Pieces<'_>) -> Result<FaultKind, FaultRequestError> {
         "jump" => FaultKind::Jump { by_rad: pieces.number("value", 0.2, &ANGLE)? },
         "warning" => FaultKind::Warning,
         "refuse" => FaultKind::Refuse { code: pieces.code(0x0800_0000, u32::MAX, ABORT)? },
+        "inputs" => {
+            let bits = pieces.code(u32::from(NEGATIVE_LIMIT), u32::from(KNOWN), INPUTS)?;
+            FaultKind::Inputs { bits: u8::try_from(bits).unwrap_or(KNOWN) }
+        }
         "restart" => FaultKind::Restart,
         other => return Err(FaultRequestError::Kind(other.to_owned())),
     };
@@ -295,6 +307,7 @@ impl fmt::Display for FaultKind {
             Self::Jump { by_rad } => write!(f, "jump by {by_rad} rad"),
             Self::Warning => write!(f, "warning"),
             Self::Refuse { code } => write!(f, "refusal 0x{code:08X}"),
+            Self::Inputs { bits } => write!(f, "digital inputs 0x{bits:X}"),
             Self::Restart => write!(f, "restart"),
         }
     }

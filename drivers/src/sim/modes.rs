@@ -260,7 +260,9 @@ impl Drive {
 
     /// Digital inputs (0x60FD): bit 0 negative and bit 1 positive limit switch.
     pub(super) fn digital_inputs(&self) -> i64 {
-        i64::from(self.on_switch(false)) | i64::from(self.on_switch(true)) << 1
+        i64::from(self.on_switch(false))
+            | i64::from(self.on_switch(true)) << 1
+            | i64::from(self.forced_inputs)
     }
 
     /// The bits of the statusword that belong to the mode: 10, 12 and 13.

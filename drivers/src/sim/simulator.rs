@@ -297,6 +297,7 @@ impl ServoSimulator {
             | FaultKind::Jump { .. }
             | FaultKind::Warning
             | FaultKind::Refuse { .. }
+            | FaultKind::Inputs { .. }
             | FaultKind::Restart => {}
         }
         if let Some(disturbance) = disturbance(request.kind, true) {
@@ -317,6 +318,7 @@ impl ServoSimulator {
             | FaultKind::Jump { .. }
             | FaultKind::Warning
             | FaultKind::Refuse { .. }
+            | FaultKind::Inputs { .. }
             | FaultKind::Restart => {}
         }
         if let Some(disturbance) = disturbance(request.kind, false) {
@@ -343,6 +345,7 @@ fn disturbance(kind: FaultKind, begins: bool) -> Option<Disturbance> {
         FaultKind::Jump { by_rad } => Some(Disturbance::EncoderShift(if begins { by_rad } else { 0.0 })),
         FaultKind::Warning => Some(Disturbance::Warning(begins)),
         FaultKind::Refuse { code } => Some(Disturbance::RefuseWrites(if begins { code } else { 0 })),
+        FaultKind::Inputs { bits } => Some(Disturbance::Inputs(if begins { bits } else { 0 })),
         FaultKind::Restart => begins.then_some(Disturbance::Restart),
     }
 }

@@ -97,6 +97,10 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: simulator.slow_rad_s2", "CiA 402: slow-down ramp; the motion limit."),
     ("Settings files: simulator.quick_stop_rad_s2", "CiA 402: quick stop ramp; the stop limit."),
     (
+        "Settings files: servo[].digital_inputs",
+        "CiA 402: true: limit switches, home switch and interlock (0x60FD) are read, shown with the status, and a limit switch in motion stops the arm: see [faults.md](faults.md#digital-inputs-of-a-cia-402-drive); false.",
+    ),
+    (
         "Settings files: servo[].profile_limits",
         "CiA 402: the drive's own limits of speed and acceleration (0x607F, 0x6080, 0x6083 to 0x6085, 0x60C5, 0x60C6); without it they are not looked at: see [faults.md](faults.md#limits-of-speed-and-acceleration).",
     ),

@@ -3,6 +3,7 @@ mod adopt;
 mod arm;
 mod bench;
 mod hostile;
+mod inputs;
 mod modes;
 mod motion;
 mod network;

@@ -187,7 +187,7 @@ impl ServoModel for CubeMarsMotor {
             Disturbance::Object(at_rad) => self.joint.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.joint.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
-            Disturbance::RefuseWrites(_) => {}
+            Disturbance::RefuseWrites(_) | Disturbance::Inputs(_) => {}
             Disturbance::Restart => {
                 self.joint.energise(false);
                 self.error = 0;

@@ -370,6 +370,8 @@ impl ServoModel for Motor {
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.registers.locked = code != 0,
+            // It has no such inputs.
+            Disturbance::Inputs(_) => {}
             Disturbance::Restart => {
                 self.disable(STATUS_DISABLED);
                 self.registers.restart();

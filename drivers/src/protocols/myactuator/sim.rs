@@ -387,6 +387,8 @@ impl ServoModel for Motor {
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.locked = code != 0,
+            // It has no such inputs.
+            Disturbance::Inputs(_) => {}
             Disturbance::Restart => self.restart(self.parameters.boot_s),
         }
     }

@@ -197,7 +197,7 @@ impl Odrive {
             Disturbance::Object(at_rad) => self.mechanics.plant.place_object(at_rad),
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             // It has no warnings.
-            Disturbance::Warning(_) => {}
+            Disturbance::Warning(_) | Disturbance::Inputs(_) => {}
             Disturbance::RefuseWrites(code) => self.locked = code != 0,
             Disturbance::Restart => self.restart(),
         }

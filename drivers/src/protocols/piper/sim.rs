@@ -211,6 +211,8 @@ impl PiperJoint {
             Disturbance::EncoderShift(shift_rad) => self.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.locked = code != 0,
+            // It has no such inputs.
+            Disturbance::Inputs(_) => {}
             Disturbance::Restart => {
                 self.release();
                 (self.faults, self.stopped, self.target_mdeg, self.mode) = (0, false, None, [0; 4]);

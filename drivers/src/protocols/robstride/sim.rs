@@ -334,6 +334,8 @@ impl ServoModel for RobStrideMotor {
             Disturbance::EncoderShift(shift_rad) => self.joint.mechanics.encoder_shift_rad = shift_rad,
             Disturbance::Warning(warm) => self.warm = warm,
             Disturbance::RefuseWrites(code) => self.held.locked = code != 0,
+            // It has no such inputs.
+            Disturbance::Inputs(_) => {}
             Disturbance::Restart => {
                 self.disable();
                 (self.faults, self.reported) = (0, 0);
