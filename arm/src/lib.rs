@@ -7,6 +7,7 @@
 pub mod axis;
 mod binding;
 pub mod body;
+pub mod brake;
 pub mod bus_load;
 mod capsule;
 pub mod closed_form;
@@ -63,6 +64,7 @@ mod urdf;
 pub mod velocity_unit;
 
 pub use axis::{AXES_MAX, Axis, AxisContact, AxisUnit, OnFault};
+pub use brake::BrakeSettings;
 pub use bus_load::BusLoad;
 pub use drive_features::{
     AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject, PositionMode, WrittenLimits,

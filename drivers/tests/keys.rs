@@ -80,7 +80,13 @@ fn kinds() -> Vec<Kind> {
             about: "`config/settings`: one arm's robot, scene, buses and servos. Keys that affect motion have no default.",
             samples: vec![
                 shipped("config/settings/vcan6.toml", &[]),
-                shipped("config/settings/vcan6.toml", &[("limp_is_safe = true\n\n[[servo]]", HOMING)]),
+                shipped(
+                    "config/settings/vcan6.toml",
+                    &[
+                        ("limp_is_safe = true\n\n[[servo]]", HOMING),
+                        ("reaction = \"ramp\"", "reaction = \"hold\""),
+                    ],
+                ),
                 shipped("config/settings/damiao6.toml", &[]),
                 shipped("config/settings/robstride6.toml", &[]),
                 shipped("config/settings/ak6.toml", &[]),
@@ -112,9 +118,9 @@ fn meanings() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
     meanings::MEANINGS.iter().chain(meanings_cia402::MEANINGS)
 }
 
-/// The homing of the first servo, and its own limits, behind its other keys.
+/// The homing of the first servo, its brake and its own limits, behind its other keys.
 const HOMING: &str = "limp_is_safe = true\n[servo.homing]\nmethod = 18\nvelocity_unit = \"rpm\"\nswitch_speed_rad_s = 0.1\n\
-    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n[servo.profile_limits]\napply = \"compare\"\nvelocity_unit = \"rpm\"\n\n[[servo]]";
+    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n[servo.brake]\nreleased_by = 1\nrelease_ms = 50\nclose_ms = 50\n[servo.profile_limits]\napply = \"compare\"\nvelocity_unit = \"rpm\"\n\n[[servo]]";
 
 /// The shipped axis in rad.
 const AXIS_IN_RAD: &[(&str, &str)] = &[

@@ -1,6 +1,7 @@
 //! CANopen CiA 402, cyclic synchronous position.
 use super::identifiers::Use;
 use super::{FdUse, Protocol, Registration, ServoProtocol};
+use crate::brake::{self, BrakeSettings};
 use crate::bus_load::flow::{Cia402Bus, Flow};
 use crate::bus_load::frame::{Format, Frame};
 use crate::drive_features::{self, DriveFeatures, OptionalObject};
@@ -30,6 +31,8 @@ pub struct Cia402 {
     pub features: DriveFeatures,
     /// How it finds its zero by itself; `None`: it is not asked to.
     pub homing: Option<HomingSettings>,
+    /// The brake that its master releases; `None`: it works its brake by itself, or has none.
+    pub brake: Option<BrakeSettings>,
 }
 
 pub(super) const REGISTRATION: Registration = Registration {
@@ -51,6 +54,7 @@ pub(super) const REGISTRATION: Registration = Registration {
         "digital_inputs",
         "profile_limits",
         "homing",
+        "brake",
     ],
     // 127 is refused later, because it is this master.
     node_id: [1, 127],
@@ -105,6 +109,7 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
     let overruled = drive_scale::read_overruled(table);
     let features = drive_features::read(table);
     let homing = homing::read(table);
+    let brake = brake::read(table);
     Some(Cia402 {
         gear_ratio: gear_ratio?,
         counts_per_rev: counts_per_rev?,
@@ -112,6 +117,7 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
         overruled: overruled?,
         features: features?,
         homing: homing?,
+        brake: brake?,
     })
 }
 
@@ -190,6 +196,11 @@ impl ServoProtocol for Cia402 {
                             `taustream reference` does";
             fault_list.add(None, &format!("servo[{at}].homing"), "feedback = \"wraps\"", expected);
         }
+        if self.brake.is_some() && servo.reaction != Reaction::Hold {
+            let given = format!("reaction = {:?}", servo.reaction.word());
+            let expected = "reaction = \"hold\": a brake that the streamer releases stays released when it is lost, so the drive must hold";
+            fault_list.add(None, &format!("servo[{at}].brake"), &given, expected);
+        }
     }
 
     fn flows(&self, servos: &[Protocol], bus: &Bus, cycle_hz: f64, format: Format) -> Vec<Flow> {
@@ -231,6 +242,7 @@ impl ServoProtocol for Cia402 {
             ("digital_inputs", self.features.digital_inputs.into()),
             ("profile_limits", self.features.profile_limits.map_or(Value::Null, ProfileLimits::entries)),
             ("homing", self.homing.map_or(Value::Null, |homing| homing.entries())),
+            ("brake", self.brake.map_or(Value::Null, |brake| brake.entries())),
         ]
     }
 
@@ -247,6 +259,9 @@ impl ServoProtocol for Cia402 {
         }
         if let Some(homing) = &self.homing {
             let _ = write!(text, ", {}", homing.sentence());
+        }
+        if let Some(brake) = &self.brake {
+            let _ = write!(text, ", {}", brake.sentence());
         }
         text
     }

@@ -4,6 +4,7 @@
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's stall-free
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
+use crate::bring_up::brake::{self, Brake};
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::homing::{Homing, HomingTarget};
 use crate::bring_up::homing_plan::HomingPlan;
@@ -137,6 +138,7 @@ pub struct Node {
     pub(super) fixed_pdos: FixedPdos,
     pub(super) mode: ModeDisplay,
     pub(super) inputs: Inputs,
+    pub(super) brake: Brake,
     pub(super) stated: StatedScale,
     pub(super) homing: Homing,
     pub(super) homing_plan: Option<HomingPlan>,
@@ -176,6 +178,7 @@ impl Node {
             fixed_pdos: FixedPdos::NONE,
             mode: ModeDisplay::default(),
             inputs: Inputs::default(),
+            brake: Brake::default(),
             stated: StatedScale::default(),
             homing: Homing::default(),
             homing_plan: plan.homing.map(|homing| HomingPlan::of(&homing, &plan)),
@@ -308,6 +311,7 @@ impl Node {
             command_near: target.near,
             in_mode: self.mode.is_right,
             homes: self.homing.suspends_following(),
+            brake: self.brake.view(cycle.now, self.plan.brake.as_ref()),
         };
         self.homing.release_at(target.counts);
         let control = match self.stage {
@@ -382,6 +386,7 @@ impl Node {
     /// Real time: no allocation.
     pub fn clear_faults(&mut self, now: Nanos) {
         self.power.clear(self.status);
+        self.brake.clear();
         if !self.in_fault() {
             self.emcy = 0;
         }
@@ -415,6 +420,7 @@ impl Node {
         self.commanded = None;
         self.homing.forget();
         self.inputs.forget();
+        self.brake.forget();
         self.power.watch(self.last_target);
         (self.emcy, self.requested_error) = (0, false);
         self.stage = NodeStage::Observe { since: now, next: now, fault };
@@ -422,6 +428,13 @@ impl Node {
 
     pub(super) fn torque_off_by_sdo(&mut self) {
         self.sdo.begin(SdoJob::Write(object::CONTROLWORD, SdoBytes::from_u16(0)));
+    }
+
+    /// Closes the brake of a drive that has left process data, as far as it still takes requests.
+    pub(super) fn close_brake(&mut self) {
+        if let Some(settings) = &self.plan.brake {
+            self.sdo.begin(brake::command(settings, false));
+        }
     }
 
     pub(super) fn refuse(&mut self, code: u32, job: SdoJob) {
@@ -498,6 +511,7 @@ impl Node {
     fn supervise(&mut self, cycle: BringUpCycle, shutdown_since: Option<Nanos>) {
         let now = cycle.now;
         self.advance_homing(now);
+        self.work_brake(now);
         if self.age(now, self.heartbeat_at) >= HEARTBEAT_LOST.0 {
             // A drive without feedback may still receive: it keeps its setpoints until the target is `Disabled`.
             self.power.note(BringUpFault::HeartbeatLost);
@@ -557,6 +571,9 @@ impl Node {
                 self.emcy = code;
             }
             return;
+        }
+        if job.address() == object::OUTPUTS && matches!(self.stage, NodeStage::Operational { .. }) {
+            return self.take_brake(cycle.now, job, outcome);
         }
         if job.address() == object::DIGITAL_INPUTS && matches!(self.stage, NodeStage::Operational { .. }) {
             return self.take_inputs(outcome);

@@ -71,11 +71,21 @@ pub enum BringUpFault {
     NegativeLimitSwitch = 0x0001_001D,
     /// Its positive limit switch has become active while it followed.
     PositiveLimitSwitch = 0x0001_001E,
+    /// It has not taken the command to release its brake.
+    BrakeNotReleased = 0x0001_001F,
+    /// It has not taken the command to close its brake.
+    BrakeNotClosed = 0x0001_0020,
 }
+
+const NEGATIVE_SWITCH: &str = "the drive's negative limit switch has become active (object 0x60FD, bit 0); lead the joint off it, then see its position_rad";
+const POSITIVE_SWITCH: &str = "the drive's positive limit switch has become active (object 0x60FD, bit 1); lead the joint off it, then see its position_rad";
+const NOT_RELEASED: &str = "the drive has not taken the command to release its brake (object 0x60FE:01); it is de-energised with the brake closed";
+const NOT_CLOSED: &str = "the drive has not taken the command to close its brake (object 0x60FE:01), and keeps its torque; support the joint, then \
+    `torque-off`";
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 32] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -106,6 +116,8 @@ impl BringUpFault {
         Self::LimitTooLow,
         Self::NegativeLimitSwitch,
         Self::PositiveLimitSwitch,
+        Self::BrakeNotReleased,
+        Self::BrakeNotClosed,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -161,12 +173,10 @@ impl BringUpFault {
             Self::LimitTooLow => {
                 "a limit of speed or acceleration of the drive is below what the streamer may command"
             }
-            Self::NegativeLimitSwitch => {
-                "the drive's negative limit switch has become active (object 0x60FD, bit 0); lead the joint off it, then see its position_rad"
-            }
-            Self::PositiveLimitSwitch => {
-                "the drive's positive limit switch has become active (object 0x60FD, bit 1); lead the joint off it, then see its position_rad"
-            }
+            Self::NegativeLimitSwitch => NEGATIVE_SWITCH,
+            Self::PositiveLimitSwitch => POSITIVE_SWITCH,
+            Self::BrakeNotReleased => NOT_RELEASED,
+            Self::BrakeNotClosed => NOT_CLOSED,
             Self::NotTaken => "the drive confirmed a write and holds another value",
             Self::HomingError => {
                 "the drive reports a homing error (statusword bit 13); see its switches and its homing method (0x6098)"
@@ -226,7 +236,9 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::HomingNotStopped
         | BringUpFault::LimitTooLow
         | BringUpFault::NegativeLimitSwitch
-        | BringUpFault::PositiveLimitSwitch => None,
+        | BringUpFault::PositiveLimitSwitch
+        | BringUpFault::BrakeNotReleased
+        | BringUpFault::BrakeNotClosed => None,
     }
 }
 
@@ -287,6 +299,9 @@ fn advice(code: u32, index: u16) -> String {
         }
         _ if index == object::DIGITAL_INPUTS.index => {
             " (digital inputs): if the drive lacks it, take digital_inputs out of its [[servo]]; its switches are then its own affair".into()
+        }
+        _ if index == object::OUTPUTS.index => {
+            " (digital outputs): this drive has no brake that its master releases; take [servo.brake] out if it works its brake by itself".into()
         }
         _ if index == object::CONSUMER_HEARTBEAT.index => {
             " (consumer heartbeat): without it the drive does not notice that its master is gone; if it notices otherwise, state \

@@ -2,6 +2,7 @@
 //!
 //! State machines without I/O, advanced once a cycle by their protocol's driver.
 pub(crate) mod adopt;
+pub mod brake;
 pub mod cia402;
 mod configure;
 pub mod fault;

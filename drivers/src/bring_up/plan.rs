@@ -10,7 +10,7 @@ use crate::codec::sdo::SdoBytes;
 use crate::codec::setpoint_frames::shared_cob_id;
 use crate::servo::Nanos;
 use taustream_arm::{
-    DriveFeatures, HomingSettings, MasterSupervision, OptionalObject, PositionMode, Reaction,
+    BrakeSettings, DriveFeatures, HomingSettings, MasterSupervision, OptionalObject, PositionMode, Reaction,
 };
 use taustream_motion::range::POSITION_TOLERANCE_RAD;
 
@@ -71,6 +71,8 @@ pub struct NodePlan {
     pub profile: Option<ProfilePlan>,
     /// How it finds its zero by itself.
     pub homing: Option<HomingSettings>,
+    /// The brake that it does not work by itself.
+    pub brake: Option<BrakeSettings>,
     /// Distance between a command and the measured position up to which they belong together, in counts.
     pub near_counts: u32,
 }
@@ -135,7 +137,10 @@ impl NodePlan {
     /// [`Self::steps`] writes must hold what is written last, and the drive must be in its mode.
     #[must_use]
     pub fn verification(&self) -> Vec<Step> {
-        steps::verification(&self.steps())
+        let mut reads = steps::verification(&self.steps());
+        // The brake of a drive that holds is released.
+        reads.retain(|read| read.job.address() != object::OUTPUTS);
+        reads
     }
 
     /// The object that takes the target.
@@ -207,6 +212,10 @@ impl NodePlan {
         }
         if self.has(OptionalObject::QuickStopOption) {
             steps.set(object::QUICK_STOP_OPTION, SdoBytes::from_i16(quick_stop), quick_stop_need);
+        }
+        if let Some(brake) = &self.brake {
+            steps.set_bits(object::OUTPUTS, brake.output(false), brake.mask(), Need::Demanded);
+            steps.set(object::OUTPUT_MASK, SdoBytes::from_u32(brake.mask()), Need::IfThere);
         }
         self.limit(steps);
     }

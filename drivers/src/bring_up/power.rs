@@ -3,6 +3,7 @@
 //! Everything follows from the newest statusword and the drive target; the enable command is sent only to a drive whose own
 //! last word was "switched on" or "operation enabled". Enabling begins only on the change of the target from disabled
 //! to enabled: a drive that drops out by itself is never energised again by an unchanged target.
+use crate::bring_up::brake::BrakeView;
 use crate::bring_up::fault::BringUpFault;
 use crate::codec::cia402_words::{
     CONTROL_ENABLE, CONTROL_FAULT_RESET, CONTROL_OFF, CONTROL_QUICK_STOP, CONTROL_SHUTDOWN,
@@ -33,6 +34,8 @@ pub struct Received {
     pub in_mode: bool,
     /// It homes itself, and follows nothing.
     pub homes: bool,
+    /// The brake that its master works.
+    pub brake: BrakeView,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +59,7 @@ enum Phase {
 pub enum TargetSource {
     /// State of the drive.
     Measured,
-    /// What it has held since before this master.
+    /// What it has held since before this master, or was commanded last.
     Held,
     /// The command.
     Command,
@@ -107,6 +110,11 @@ fn holds(step: Option<DriveStep>) -> bool {
     matches!(step, Some(DriveStep::OperationEnabled | DriveStep::QuickStopActive))
 }
 
+/// A drive that follows must keep its torque until its brake is closed.
+fn holds_for_brake(step: Option<DriveStep>, brake: BrakeView) -> bool {
+    step == Some(DriveStep::OperationEnabled) && !brake.closed
+}
+
 impl Power {
     /// De-energised; `step_timeout` bounds each confirmation, an answer comes every `answer_every` cycles, and `mode_bits` are set
     /// in the controlword of an enabled drive.
@@ -135,6 +143,17 @@ impl Power {
         self.phase == Phase::On
     }
 
+    /// Whether the brake is to be released, for a drive with this statusword; `None`: it is left as it is.
+    pub(super) fn wants_brake_released(&self, status: u16, in_mode: bool) -> Option<bool> {
+        let enabled = DriveStep::from_status(status) == Some(DriveStep::OperationEnabled);
+        match self.phase {
+            Phase::Enabling { .. } => Some(enabled && in_mode && status & STATUS_FOLLOWS != 0),
+            Phase::On => Some(enabled),
+            Phase::Off | Phase::Disabling { .. } => Some(false),
+            Phase::Kept | Phase::TakingOver { .. } => None,
+        }
+    }
+
     /// A controlword is the one of a drive that follows.
     pub(super) const fn follows(&self, control: u16) -> bool {
         control == self.follow
@@ -145,10 +164,9 @@ impl Power {
     pub fn target_source(&self) -> TargetSource {
         match self.phase {
             Phase::Off => TargetSource::Measured,
-            Phase::Kept => TargetSource::Held,
-            Phase::Enabling { .. } | Phase::On | Phase::Disabling { .. } | Phase::TakingOver { .. } => {
-                TargetSource::Command
-            }
+            // One that steps down holds what it held, for as long as its brake takes to close: a drive that was kept has no command.
+            Phase::Kept | Phase::Disabling { .. } => TargetSource::Held,
+            Phase::Enabling { .. } | Phase::On | Phase::TakingOver { .. } => TargetSource::Command,
         }
     }
 
@@ -215,8 +233,9 @@ impl Power {
         }
         self.advance(now, drive_target, step, received);
         match self.phase {
-            Phase::Off => self.control_off(now, drive_target, step),
+            Phase::Off => self.control_off(now, drive_target, step, received.brake),
             Phase::Enabling { .. } | Phase::On => self.control_up(step, received),
+            Phase::Disabling { .. } if holds_for_brake(step, received.brake) => self.follow,
             Phase::Disabling { .. } => Self::control_down(step),
             Phase::Kept => self.keeping(received.status),
             Phase::TakingOver { .. } => self.follow,
@@ -279,7 +298,13 @@ impl Power {
             Phase::TakingOver { since } => self.advance_taking_over(now, step, received, since),
             Phase::Disabling { since, rung: reached } => {
                 let at = rung(step);
-                if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
+                if holds_for_brake(step, received.brake) {
+                    if received.brake.failed {
+                        // It keeps its torque: a joint that nothing holds would fall.
+                        self.note(BringUpFault::BrakeNotClosed);
+                    }
+                    self.phase = Phase::Disabling { since: now, rung: at };
+                } else if at == 0 || now.0.saturating_sub(since.0) >= self.step_timeout.0 {
                     // Reached, in fault, or it ignores the shutdown command: voltage off.
                     self.phase = Phase::Off;
                 } else if at < reached {
@@ -300,14 +325,22 @@ impl Power {
         } else if step == Some(DriveStep::SwitchedOn) && received.fresh && !received.command_near {
             self.note(BringUpFault::CommandFar);
             self.phase = Phase::Off;
-        } else if rung == 3 && received.in_mode && received.status & STATUS_FOLLOWS != 0 {
+        } else if rung == 3 && received.brake.failed {
+            self.note(BringUpFault::BrakeNotReleased);
+            self.phase = Phase::Disabling { since: now, rung };
+        } else if rung == 3
+            && received.in_mode
+            && received.status & STATUS_FOLLOWS != 0
+            && received.brake.released
+        {
             self.phase = Phase::On;
         } else if rung > reached {
             self.phase = Phase::Enabling { since: now, rung, falls };
         } else if now.0.saturating_sub(since.0) >= self.step_timeout.0 {
             let wrong_mode = rung == 3 && !received.in_mode;
             self.note(if wrong_mode { BringUpFault::ModeNotTaken } else { BringUpFault::EnableTimeout });
-            self.phase = Phase::Off;
+            let braked = holds_for_brake(step, received.brake);
+            self.phase = if braked { Phase::Disabling { since: now, rung } } else { Phase::Off };
         }
     }
 
@@ -359,7 +392,13 @@ impl Power {
         }
     }
 
-    fn control_off(&mut self, now: Nanos, drive_target: DriveTarget, step: Option<DriveStep>) -> u16 {
+    fn control_off(
+        &mut self,
+        now: Nanos,
+        drive_target: DriveTarget,
+        step: Option<DriveStep>,
+        brake: BrakeView,
+    ) -> u16 {
         match self.reset {
             Reset::Low { left: 0, began } => {
                 self.reset = Reset::High { since: now, began: began.unwrap_or(now) };
@@ -377,8 +416,11 @@ impl Power {
         }
         if matches!(self.reset, Reset::High { .. }) {
             CONTROL_FAULT_RESET
-        } else if step == Some(DriveStep::QuickStopActive) && drive_target == DriveTarget::Enabled {
-            // It may be holding a load: keep it in quick stop until the target changes.
+        } else if step == Some(DriveStep::QuickStopActive)
+            && (drive_target == DriveTarget::Enabled
+                || drive_target != DriveTarget::TorqueOff && !brake.closed && !brake.failed)
+        {
+            // It may be holding a load: keep it in quick stop until the target changes, and its brake is closed.
             CONTROL_QUICK_STOP
         } else {
             CONTROL_OFF

@@ -20,6 +20,7 @@ impl Node {
         self.received = true;
         match self.stage {
             NodeStage::Start { .. } => {
+                self.brake.closed_by_bring_up();
                 self.stage = NodeStage::Operational { shutdown_since: None };
                 self.heartbeat_at = now;
                 self.denials = 0;
@@ -112,6 +113,7 @@ impl Node {
             self.observe(now, Some(fault));
         } else {
             self.sdo.cancel();
+            self.close_brake();
             self.stage = NodeStage::Gone(fault);
         }
     }

@@ -183,6 +183,14 @@ impl Steps {
         self.0.push(back.when(Parts::VALUE).needed(Need::Free));
     }
 
+    /// Makes these bits of an object those of a value, like [`Self::set`].
+    pub(super) fn set_bits(&mut self, address: Address, value: u32, mask: u32, need: Need) {
+        let part = Parts::VALUE;
+        self.0.push(Step::read(address, 4, Check::Compare { value, mask, part, first: true }));
+        self.0.push(Step::write(address, SdoBytes::from_u32(value), part).needed(need));
+        self.0.push(Step::read(address, 4, Check::Equals { value, mask }).when(part).needed(Need::Free));
+    }
+
     /// The same without reading it back.
     pub(super) fn set_unproven(&mut self, address: Address, bytes: SdoBytes) {
         self.compare(address, bytes, Parts::VALUE, true);

@@ -166,6 +166,7 @@ impl Cia402Driver {
                 scale: expected,
                 profile: joint(servo).and_then(|joint| ProfilePlan::of(servo, joint, setpoint_us)),
                 homing: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.homing),
+                brake: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.brake),
                 near_counts: expected.counts_of(near_rad),
                 features: servo.protocol.get::<Cia402>().map(|cia402| cia402.features).unwrap_or_default(),
             };

@@ -176,6 +176,10 @@ objects! {
     FOLLOWING_ERROR = 0x60F4:0;
     /// Digital inputs, u32: see [`super::digital_inputs`].
     DIGITAL_INPUTS = 0x60FD:0;
+    /// Digital outputs, u32.
+    OUTPUTS = 0x60FE:1;
+    /// Which of them a master works, u32.
+    OUTPUT_MASK = 0x60FE:2;
     /// Supported modes, u32; bit `mode - 1`.
     SUPPORTED_MODES = 0x6502:0;
 }

@@ -151,6 +151,12 @@ impl SdoClient {
         self.transfer = Some(Transfer { job, state, tries: 0, toggle: None, value: SdoValue::EMPTY });
     }
 
+    /// The open transfer's job.
+    #[must_use]
+    pub fn job(&self) -> Option<SdoJob> {
+        self.transfer.as_ref().map(|transfer| transfer.job)
+    }
+
     /// Clears the open transfer.
     pub fn cancel(&mut self) {
         self.transfer = None;

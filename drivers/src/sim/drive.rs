@@ -22,7 +22,7 @@ use crate::codec::canopen::{NmtCommand, decode_sync};
 use crate::codec::{Emcy, Nmt as NmtFrame, NmtState, SdoResponse, emcy, error_text};
 use crate::frame::CanFrame;
 use crate::servo::Nanos;
-use taustream_arm::Reaction;
+use taustream_arm::{BrakeSettings, Reaction};
 
 /// What a simulated drive is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +66,8 @@ pub struct DriveParameters {
     pub boot_s: f64,
     /// Step of the simulated mechanics, 10,000 to 1,000,000 ns.
     pub step_ns: u64,
+    /// The brake that its master works; `None`: it follows the torque.
+    pub brake: Option<BrakeSettings>,
     /// What it does otherwise than masters expect.
     pub quirks: DriveQuirks,
 }
@@ -316,6 +318,7 @@ impl Drive {
         }
         self.forget_quirks(communication_only);
         self.dictionary.reset(communication_only);
+        self.work_brake();
         self.readdress();
         self.pdos = Pdos::compile(&self.dictionary);
         self.watch_heartbeats();

@@ -95,7 +95,7 @@ impl Drive {
     pub(super) fn follows_target(&self) -> bool {
         self.power.state() == PowerState::OperationEnabled
             && self.controller.is_following()
-            && self.mechanics.plant.is_free()
+            && (self.parameters.brake.is_some() || self.mechanics.plant.is_free())
             && !self.held
             && self.cyclic_target().is_some()
     }
@@ -144,6 +144,17 @@ impl Drive {
                 self.resting = None;
             }
         }
+        self.work_brake();
+    }
+
+    /// Moves the brake that the master works to where the outputs have it: released only by an output that is its own.
+    pub(super) fn work_brake(&mut self) {
+        if let Some(brake) = &self.parameters.brake {
+            let bit = i64::from(brake.mask());
+            let released = self.dictionary.get(0x60FE, 2) & bit != 0
+                && self.dictionary.get(0x60FE, 1) & bit == i64::from(brake.output(true));
+            self.mechanics.plant.shut_brake(!released);
+        }
     }
 
     /// Looks for faults, and for the end of a ramp.
@@ -177,7 +188,8 @@ impl Drive {
         if !rests {
             return;
         }
-        if self.power.ends_released() && self.parameters.plant.brake && self.mechanics.plant.is_free() {
+        let own_brake = self.parameters.plant.brake && self.parameters.brake.is_none();
+        if self.power.ends_released() && own_brake && self.mechanics.plant.is_free() {
             self.mechanics.plant.shut_brake(true);
             return;
         }

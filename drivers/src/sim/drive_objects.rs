@@ -211,6 +211,7 @@ impl Drive {
             RPDO_COMMUNICATION..=0x17FF | 0x1800..TPDO_MAPPING | TPDO_MAPPING..=0x1AFF => {
                 self.pdos = Pdos::compile(&self.dictionary);
             }
+            0x60FE => self.work_brake(),
             0x2002 => self.fail(u16::try_from(value).unwrap_or(0x1000), out),
             0x6040 | 0x6060 | 0x607A | 0x60B0..=0x60B2 | 0x60C1 | 0x60FF => self.commanded(self.now, out),
             _ => {}

@@ -38,6 +38,8 @@ pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
     let margin_rad = joint.number("soft_limit_margin_rad", 0.02, 0.0..=3.0);
     let (slow_rad_s2, quick_rad_s2) =
         (limits.motion.acceleration_rad_s2.max(1e-3), limits.stop.acceleration_rad_s2.max(1e-3));
+    let brake = cia402.and_then(|cia402| cia402.brake);
+    let plant = joint.plant(Load::LARGE);
     Box::new(DriveParameters {
         node_id: servo.node_id,
         sign: servo.sign,
@@ -47,7 +49,7 @@ pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
         home_offset_counts: cia402.map_or(0, |cia402| cia402.home_offset_counts),
         dummy_mapping: joint.flag("dummy_mapping", true),
         start_rad: joint.start_rad(),
-        plant: joint.plant(Load::LARGE),
+        plant: PlantParameters { brake: plant.brake || brake.is_some(), ..plant },
         loops: joint.loops(),
         following_window_rad: joint.number("following_window_rad", 0.3, 1e-6..=100.0),
         following_timeout_ms: joint.whole("following_timeout_ms", 50, 0..=65_535),
@@ -58,6 +60,7 @@ pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
         reaction: servo.reaction,
         boot_s: joint.boot_s(),
         step_ns: joint.step_ns(),
+        brake,
         quirks: quirks(joint),
     })
 }

@@ -277,6 +277,9 @@ fn motion(all: &mut Vec<Spec>) {
         Spec::ro(0x60F4, 0, Kind::I32, 0).tpdo(),
         // Bit 0 negative, bit 1 positive limit switch.
         Spec::ro(0x60FD, 0, Kind::U32, 0).tpdo(),
+        Spec::ro(0x60FE, 0, Kind::U8, 2),
+        Spec::rw(0x60FE, 1, Kind::U32, 0).rpdo(),
+        Spec::rw(0x60FE, 2, Kind::U32, 0),
         Spec::rw(0x60FF, 0, Kind::I32, 0).rpdo().tpdo(),
     ]);
 }

@@ -101,6 +101,23 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "CiA 402: true: limit switches, home switch and interlock (0x60FD) are read, shown with the status, and a limit switch in motion stops the arm: see [faults.md](faults.md#digital-inputs-of-a-cia-402-drive); false.",
     ),
     (
+        "Settings files: servo[].brake",
+        "CiA 402: a brake that the streamer releases, for drives that do not work theirs by themselves: see [faults.md](faults.md#a-brake-that-the-streamer-releases).",
+    ),
+    ("Settings files: servo[].brake.output_bit", "Bit of 0x60FE:01 that works it; 0."),
+    (
+        "Settings files: servo[].brake.released_by",
+        "Value of the bit that releases it, by the drive's manual.",
+    ),
+    (
+        "Settings files: servo[].brake.release_ms",
+        "Time from the drive's confirmation until it is released; the joint is not moved before.",
+    ),
+    (
+        "Settings files: servo[].brake.close_ms",
+        "Time from the drive's confirmation until it holds; the drive keeps its torque as long.",
+    ),
+    (
         "Settings files: servo[].profile_limits",
         "CiA 402: the drive's own limits of speed and acceleration (0x607F, 0x6080, 0x6083 to 0x6085, 0x60C5, 0x60C6); without it they are not looked at: see [faults.md](faults.md#limits-of-speed-and-acceleration).",
     ),

@@ -2,6 +2,7 @@
 mod adopt;
 mod arm;
 mod bench;
+mod brake;
 mod hostile;
 mod inputs;
 mod modes;
