@@ -208,15 +208,16 @@ impl Body {
         }
     }
 
-    /// Upper bound of the distance of the shape's points to the axis through `point` along the unit `direction`.
+    /// Upper bound of the distance of the core's points to the axis through `point` along the unit `direction`. The radius around
+    /// the core does not count: how near two bodies come is a matter of their cores.
     #[must_use]
     pub fn lever_m(&self, at: &Posed, point: Vector, direction: Vector) -> f64 {
         let distance_m = |p: Vector| (p - point).cross(direction).length();
         match self.core {
             // The distance to a line is convex: the ends of a segment are the furthest.
-            Core::Segment(..) => distance_m(at.ends[0]).max(distance_m(at.ends[1])) + self.radius_m,
+            Core::Segment(..) => distance_m(at.ends[0]).max(distance_m(at.ends[1])),
             Core::Box(_) | Core::Cylinder { .. } | Core::Convex | Core::Mesh(_) | Core::Cloud(_) => {
-                distance_m(at.centre) + self.bound_m
+                distance_m(at.centre) + (self.bound_m - self.radius_m)
             }
         }
     }

@@ -3,7 +3,7 @@
 //! Limits are proven by the motion crate from closed-form peaks; distances by bisection with a proven step
 //! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
 use crate::budget::Budget;
-use crate::collide::{Blocked, Clearance, Course, Motion, SweepRules, sweep, sweep_knowing};
+use crate::collide::{Blocked, Course, SweepRules, sweep, sweep_in_parts};
 use crate::torque::{Overload, TorqueLimits};
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
@@ -237,15 +237,6 @@ pub(crate) fn measured(
     }
 }
 
-/// The least distance at one instant of a stretch, whatever that is worth.
-fn met_at(stretch: &Stretch, course: &Course, near_s: f64) -> Clearance {
-    let at = near_s.clamp(stretch.span_s[0], stretch.span_s[1]);
-    let closest = stretch.world.closest(&course.at(at));
-    let (pair, sampled_m) =
-        closest.map_or((None, f64::INFINITY), |(pair, distance_m)| (Some(pair), distance_m));
-    Clearance { proven_m: f64::INFINITY, sampled_m, at, pair, checks: 0 }
-}
-
 /// Proves the distances of all stretches and takes down the least of them.
 fn measure<'s>(
     proof: &mut Proof,
@@ -253,11 +244,10 @@ fn measure<'s>(
     trajectory: &Trajectory,
     (rules, budget): (&SweepRules, &Budget),
 ) -> Result<(), (&'s Stretch<'s>, Blocked)> {
-    let (course, near_s) = (Course::new(trajectory), proof.clearance_at_s);
+    let course = Course::new(trajectory);
     proof.clearance_m = f64::INFINITY;
     for stretch in stretches {
-        let met = met_at(stretch, &course, near_s);
-        let clearance = sweep_knowing(met, (stretch.world, &course), stretch.span_s, rules, budget)
+        let clearance = sweep_in_parts(stretch.world, &course, stretch.span_s, rules, budget)
             .map_err(|blocked| (stretch, blocked))?;
         if clearance.proven_m < proof.clearance_m {
             let between = clearance.pair.map(|pair| stretch.world.names(&pair)).unwrap_or_default();

@@ -6,10 +6,11 @@
 mod changes;
 
 use crate::collide::{Body, Posed};
+use crate::lanes::Model;
 use crate::verify::Contact;
 use parry3d_f64::math::{Pose, Vector};
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use taustream_arm::body::to_parry;
 use taustream_arm::{Obstacle, Robot, Scene};
 use taustream_motion::chain::{self, ChainJoint};
@@ -96,6 +97,16 @@ impl Deref for RobotOf<'_> {
     }
 }
 
+/// What lanes see of a world, from when it is first asked for. A copy begins without, as it may be changed.
+#[derive(Default)]
+struct InLanes(OnceLock<Box<Model>>);
+
+impl Clone for InLanes {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
 /// Everything that can collide.
 #[derive(Clone)]
 pub struct World<'a> {
@@ -107,6 +118,7 @@ pub struct World<'a> {
     reach_m: JointArray,
     margin_m: f64,
     extent_m: f64,
+    in_lanes: InLanes,
 }
 
 /// Which link bodies some pairs are about.
@@ -165,6 +177,7 @@ impl<'a> World<'a> {
             reach_m: [0.0; MAX_JOINTS],
             margin_m: scene.margin_m,
             extent_m: 0.0,
+            in_lanes: InLanes::default(),
         };
         world.extent_m = world.farthest_m();
         world.pairs = world.pairs_to_keep(scene.margin_m);
@@ -296,6 +309,12 @@ impl<'a> World<'a> {
         self.obstacles.iter().map(|obstacle| (&obstacle.body, &obstacle.at))
     }
 
+    /// The world in f32.
+    #[must_use]
+    pub(crate) fn model(&self) -> &Model {
+        self.in_lanes.0.get_or_init(|| Box::new(Model::new(self)))
+    }
+
     /// The frames in a pose, for pairs that are asked for one by one.
     #[must_use]
     pub fn frames(&self, position_rad: &JointArray) -> Frames {
@@ -423,6 +442,24 @@ impl<'a> World<'a> {
         self.place(position_rad, &mut snapshot);
         let measured = self.pairs.iter().map(|pair| (*pair, self.solid_distance_m(pair, &snapshot)));
         measured.min_by(|(p, d), (q, e)| (d - p.required_m).total_cmp(&(e - q.required_m)))
+    }
+
+    /// The pair that is nearest in a pose, with its distance; `None` when nothing can collide. Does not see bodies wholly inside a mesh.
+    #[must_use]
+    pub fn nearest(&self, position_rad: &JointArray) -> Option<(Pair, f64)> {
+        let mut snapshot = Snapshot::default();
+        self.place(position_rad, &mut snapshot);
+        let mut nearest: Option<(Pair, f64)> = None;
+        for pair in &self.pairs {
+            let least_m = nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m);
+            if self.distance_bound_m(pair, &snapshot) < least_m {
+                let distance_m = self.distance_m(pair, &snapshot);
+                if distance_m < least_m {
+                    nearest = Some((*pair, distance_m));
+                }
+            }
+        }
+        nearest
     }
 
     /// What is too close in a pose, the worst first; `None` when the pose is free.

@@ -7,7 +7,9 @@ use taustream_arm::cloud::Cloud;
 use taustream_arm::{Obstacle, Robot, Scene, Shape};
 use taustream_motion::chain::{Chain, ChainJoint, Pose};
 use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
-use taustream_planner::lanes::Lanes;
+use taustream_planner::budget::Budget;
+use taustream_planner::collide::{Motion, StraightEdge, SweepRules, sweep, sweep_in_parts};
+use taustream_planner::lanes::{Kept, Lanes};
 use taustream_planner::rng::SeededRng;
 use taustream_planner::world::{Snapshot, World};
 
@@ -186,4 +188,115 @@ fn lanes_answer_as_the_exact_model_next_to_contact() {
         found += 1;
     }
     assert!(found > 15, "{found} edges with one end in contact");
+}
+
+/// Goal: no pose of an interval keeps less than the lanes say of it, or nothing where they say so, whatever the machine's instructions; what moves within it is needed for that.
+/// Method: random scenes of every kind of shape, turns of every size; the exact model at random poses within each interval.
+#[test]
+fn no_pose_of_an_interval_keeps_less_than_its_bound() {
+    let shipped = |name: &str| Robot::load(&file(name)).expect("shipped");
+    let robots = [
+        ("ur5.toml", shipped("ur5.toml"), 1.1),
+        ("piper.toml", shipped("piper.toml"), 0.5),
+        ("two arms", two_arms(shipped("ur5.toml")), 0.7),
+        ("ur5 with slides", with_slides(shipped("ur5.toml")), 1.1),
+    ];
+    for (arm, (name, robot, far_m)) in robots.into_iter().enumerate() {
+        let (mut all, mut moved, mut tight) = (0, 0, 0);
+        for number in 0..poses().div_ceil(POSES_PER_SCENE) {
+            let mut rng = SeededRng::new(number, 80 + arm as u64);
+            let few = 1 + rng.index(5);
+            let scene = scene(&mut rng, if number % 8 == 0 { 40 } else { few }, far_m);
+            let world = World::new(&robot, &scene).expect("builds");
+            let drawn: Vec<JointArray> = (0..60).map(|_| pose(&mut rng, &robot)).collect();
+            let turns: Vec<JointArray> = drawn
+                .iter()
+                .map(|_| {
+                    let most = 10.0_f64.powf(rng.within(-4.0, -0.5));
+                    let joints = robot.joints.len();
+                    std::array::from_fn(|j| {
+                        if j < joints && rng.unit() < 0.6 { rng.within(0.0, most) } else { 0.0 }
+                    })
+                })
+                .collect();
+            let enough_m = if number % 2 == 0 { f64::INFINITY } else { 0.02 };
+            let of = |lanes: &Lanes, turns: &[JointArray]| {
+                let mut kept = Vec::<Kept>::new();
+                lanes.keep((&drawn, turns), enough_m, &mut kept);
+                assert_eq!(kept.len(), drawn.len());
+                kept
+            };
+            let still = of(&Lanes::new(&world), &vec![[0.0; MAX_JOINTS]; drawn.len()]);
+            for lanes in [Lanes::new(&world), Lanes::new(&world).scalar()] {
+                let kept = of(&lanes, &turns);
+                for (((pose, turn), kept), still) in drawn.iter().zip(&turns).zip(&kept).zip(&still) {
+                    for _ in 0..3 {
+                        let side = if rng.unit() < 0.5 { 1.0 } else { -1.0 };
+                        let share = if rng.unit() < 0.5 { side } else { rng.within(-1.0, 1.0) };
+                        let there: JointArray = std::array::from_fn(|j| pose[j] + share * turn[j]);
+                        let nearest_m =
+                            world.nearest(&there).map_or(f64::INFINITY, |(_, distance_m)| distance_m);
+                        let spare =
+                            world.closest(&there).map(|(pair, distance_m)| distance_m - pair.required_m);
+                        let spare_m = spare.unwrap_or(f64::INFINITY);
+                        let (least, spare) = (f64::from(kept.least_m), f64::from(kept.spare_m));
+                        assert!(
+                            least <= nearest_m.max(0.0),
+                            "{name}, scene {number}, {there:?}: {least} above {nearest_m}"
+                        );
+                        assert!(
+                            spare <= spare_m.max(0.0),
+                            "{name}, scene {number}, {there:?}: {spare} above {spare_m}"
+                        );
+                        all += 1;
+                        moved += i32::from(f64::from(still.least_m) > nearest_m);
+                        tight += i32::from(least > nearest_m - 0.02 || least >= enough_m);
+                    }
+                }
+            }
+        }
+        assert!(moved > all / 50, "{name}: nothing moves in {} of {all} poses", all - moved);
+        assert!(tight > all / 20, "{name}: the bound is near in {tight} of {all} poses only");
+    }
+}
+
+/// Goal: a sweep in parts proves what the exact sweep proves, finds the same contact, and its least distance is as sharp.
+/// Method: random edges in random scenes, short and long; dense poses for the least distance.
+#[test]
+fn a_sweep_in_parts_answers_as_the_exact_sweep() {
+    let robot = Robot::load(&file("ur5.toml")).expect("shipped");
+    let (mut proven, mut refused) = (0, 0);
+    for number in 0..240 {
+        let mut rng = SeededRng::new(number, 90);
+        let obstacles = if number % 8 == 0 { 40 } else { 3 };
+        let scene = scene(&mut rng, obstacles, 1.1);
+        let world = World::new(&robot, &scene).expect("builds");
+        let (from_rad, far_rad) = (pose(&mut rng, &robot), pose(&mut rng, &robot));
+        let share = 10.0_f64.powf(rng.within(-3.0, 0.0));
+        let to_rad = std::array::from_fn(|j| from_rad[j] + share * (far_rad[j] - from_rad[j]));
+        let edge = StraightEdge { from_rad: &from_rad, to_rad: &to_rad };
+        let budget = Budget::unbounded();
+        let exact = sweep(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &budget);
+        let found = sweep_in_parts(&world, &edge, [0.0, 1.0], &SweepRules::PROOF, &budget);
+        match (exact, found) {
+            (Ok(_), Ok(_)) => {
+                proven += 1;
+                let least = sweep_in_parts(&world, &edge, [0.0, 1.0], &SweepRules::LEAST_DISTANCE, &budget);
+                let least = least.expect("proven");
+                let at =
+                    |i: u32| world.nearest(&edge.at(f64::from(i) / 500.0)).map_or(f64::INFINITY, |(_, d)| d);
+                let dense_m = (0..=500).map(at).fold(f64::INFINITY, f64::min);
+                assert!(least.proven_m <= dense_m, "scene {number}: {least:?} above {dense_m}");
+                assert!(least.proven_m >= least.sampled_m - 1.001e-3, "scene {number}: {least:?}");
+                assert!(least.sampled_m >= least.proven_m, "scene {number}: {least:?}");
+            }
+            (Err(exact), Err(found)) => {
+                refused += 1;
+                assert!(exact.pair.is_some() && found.pair.is_some(), "scene {number}: {exact:?}, {found:?}");
+                assert!((exact.at - found.at).abs() < 1e-4, "scene {number}: {exact:?}, {found:?}");
+            }
+            (exact, found) => panic!("scene {number}: {exact:?}, in parts {found:?}"),
+        }
+    }
+    assert!(proven > 40 && refused > 40, "{proven} proven, {refused} refused");
 }

@@ -5,9 +5,11 @@
 //! links are almost always segments: their distances to segments and boxes have closed forms (`closed_form`),
 //! everything else is asked of parry3d. The shapes themselves are [`taustream_arm::body`]'s.
 mod course;
+mod parts;
 pub mod sweep;
 
 pub use taustream_arm::body::{Body, Posed};
 
 pub use course::Course;
+pub use parts::sweep_in_parts;
 pub use sweep::{Blocked, Clearance, Motion, StraightEdge, SweepRules, sweep, sweep_knowing};

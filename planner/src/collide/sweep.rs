@@ -104,6 +104,19 @@ pub struct Clearance {
     pub checks: usize,
 }
 
+impl Clearance {
+    /// Where the bracket of the least distance begins: not below what its pair must keep, or a proven motion would seem to keep too little.
+    pub(super) fn bracket_from_m(&self, rules: &SweepRules) -> f64 {
+        /// A bracket has some width.
+        const LEAST_M: f64 = 1e-5;
+        if rules.bracket_m.is_infinite() {
+            return f64::NEG_INFINITY;
+        }
+        let required_m = self.pair.map_or(0.0, |pair| pair.required_m);
+        (self.sampled_m - rules.bracket_m).max(required_m.min(self.sampled_m - LEAST_M))
+    }
+}
+
 /// Why a motion is not proven.
 #[derive(Clone, Copy, Debug)]
 pub struct Blocked {
@@ -232,19 +245,7 @@ impl State<'_> {
 
     /// True when a lower bound over the interval is enough: for the pair, and for the bracket of the least distance.
     fn is_settled(&self, bound_m: f64, keep_m: f64) -> bool {
-        bound_m > keep_m && bound_m >= self.bracket_from_m()
-    }
-
-    /// Where the bracket of the least distance begins: not below what its pair must keep, or a proven motion would seem to keep too little.
-    fn bracket_from_m(&self) -> f64 {
-        /// A bracket has some width.
-        const LEAST_M: f64 = 1e-5;
-        let Clearance { sampled_m, pair, .. } = self.found;
-        if self.rules.bracket_m.is_infinite() {
-            return f64::NEG_INFINITY;
-        }
-        let required_m = pair.map_or(0.0, |pair| pair.required_m);
-        (sampled_m - self.rules.bracket_m).max(required_m.min(sampled_m - LEAST_M))
+        bound_m > keep_m && bound_m >= self.found.bracket_from_m(self.rules)
     }
 
     /// Goes on in the halves, the earlier one first: the first contact in time is reported.

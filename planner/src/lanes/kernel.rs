@@ -10,7 +10,7 @@ use taustream_arm::cloud::Cloud;
 use taustream_motion::{JointArray, JointKind, MAX_JOINTS, USUAL_JOINTS};
 
 /// Most lanes of any machine.
-const LANES_MAX: usize = 16;
+pub(super) const LANES_MAX: usize = 16;
 /// Adding and subtracting it leaves a number's whole part: 1.5 * 2^52.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
@@ -63,7 +63,7 @@ impl Pass<'_> {
         scratch.centres.resize(model.spheres.len() * 3 * S::F32_LANES, 0.0);
         // Lanes are spread over the poses: what blocks an edge is met in its first chunk.
         for first in 0..strides {
-            let mut chunk = Chunk::<S, FRAMES>::new(Ops(simd), (model, extra_m), (poses_rad, first, strides));
+            let mut chunk = Chunk::<S, FRAMES>::new(simd, (model, extra_m), (poses_rad, first, strides));
             if chunk.is_blocked(scratch) {
                 return false;
             }
@@ -89,25 +89,26 @@ fn reduced(joint: &Joint, position: f64) -> f32 {
 }
 
 /// The arm in as many poses as there are lanes.
-struct Chunk<'a, S: Simd, const FRAMES: usize> {
-    ops: Ops<S>,
-    model: &'a Model,
+pub(super) struct Chunk<'a, S: Simd, const FRAMES: usize> {
+    pub(super) ops: Ops<S>,
+    pub(super) model: &'a Model,
     extra: f32,
     /// Index of the first lane's pose, from one lane's to the next, and how many poses there are.
     poses: [usize; 3],
     /// Columns and origin of each frame.
-    frames: [([Vector3<S>; 3], Vector3<S>); FRAMES],
+    pub(super) frames: [([Vector3<S>; 3], Vector3<S>); FRAMES],
     /// Groups whose spheres are placed, a bit each.
     placed: u64,
 }
 
 impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
     #[inline(always)]
-    fn new(
-        ops: Ops<S>,
+    pub(super) fn new(
+        simd: S,
         (model, extra_m): (&'a Model, f64),
         (poses_rad, first, strides): (&[JointArray], usize, usize),
     ) -> Self {
+        let ops = Ops(simd);
         let (one, zero) = (ops.all(1.0), ops.all(0.0));
         let mut columns = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
         let mut origin = [zero; 3];
@@ -213,7 +214,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
 
     /// A box around spheres at some points.
     #[inline(always)]
-    fn region(&self, middle: Vector3<S>, radius: f32) -> Bounds {
+    pub(super) fn region(&self, middle: Vector3<S>, radius: f32) -> Bounds {
         let simd = self.ops.0;
         let [x, y, z] = middle;
         let low = [simd.reduce_min_f32s(x), simd.reduce_min_f32s(y), simd.reduce_min_f32s(z)];
@@ -242,7 +243,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
 
     /// Places the spheres of a group, once.
     #[inline(always)]
-    fn place(&mut self, (index, group): (usize, &Group), centres: &mut [f32]) {
+    pub(super) fn place(&mut self, (index, group): (usize, &Group), centres: &mut [f32]) {
         if self.placed & (1 << index) != 0 {
             return;
         }
@@ -257,7 +258,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
     }
 
     #[inline(always)]
-    fn centre(centres: &[f32], sphere: usize) -> Vector3<S> {
+    pub(super) fn centre(centres: &[f32], sphere: usize) -> Vector3<S> {
         let (slots, _) = S::as_simd_f32s(centres);
         [slots[3 * sphere], slots[3 * sphere + 1], slots[3 * sphere + 2]]
     }
@@ -367,7 +368,7 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
 
     /// Squared distance of two points.
     #[inline(always)]
-    fn apart2(&self, a: Vector3<S>, b: Vector3<S>) -> Vector<S> {
+    pub(super) fn apart2(&self, a: Vector3<S>, b: Vector3<S>) -> Vector<S> {
         let between = self.ops.sub3(a, b);
         self.ops.dot(between, between)
     }
@@ -430,7 +431,7 @@ fn is_below(square: f32, limit: f32) -> bool {
 
 /// What shall be known of a distance.
 #[derive(Clone, Copy)]
-enum Wanted {
+pub(super) enum Wanted {
     /// A lower bound, if that is quicker.
     Bound,
     /// The distance itself, if it is not more than this; any larger number otherwise.
@@ -439,7 +440,12 @@ enum Wanted {
 
 /// Squared distance of points from an obstacle's core: a root costs as much as all the rest.
 #[inline(always)]
-fn distance2<S: Simd>(ops: Ops<S>, obstacle: &Obstacle, point: Vector3<S>, wanted: Wanted) -> Vector<S> {
+pub(super) fn distance2<S: Simd>(
+    ops: Ops<S>,
+    obstacle: &Obstacle,
+    point: Vector3<S>,
+    wanted: Wanted,
+) -> Vector<S> {
     let from = ops.sub3(point, ops.all3(obstacle.centre));
     match &obstacle.form {
         Form::AlignedBox(half) => outside(ops, from, *half),

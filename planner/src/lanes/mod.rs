@@ -4,16 +4,19 @@
 //! smaller ones that lie within it. A pose whose larger spheres keep every distance, and more by what f32 can be wrong, is
 //! free. A pose in which a smaller sphere does not keep it, by as much, is not. For the few poses between the two, the pairs of bodies
 //! in question are measured by the exact model.
+//!
+//! Of an interval of a motion they tell what every pair surely keeps ([`Lanes::keep`]).
 mod arithmetic;
 mod cover;
 mod grid;
+mod intervals;
 mod kernel;
 mod model;
 mod rounding;
 
 use crate::world::{Frames, Other, Pair, World};
 use kernel::{Pass, Question, Suspect};
-use model::Model;
+pub(crate) use model::Model;
 use pulp::Arch;
 use std::cell::RefCell;
 use taustream_motion::JointArray;
@@ -21,9 +24,18 @@ use taustream_motion::JointArray;
 /// The world in f32, beside the exact one.
 pub struct Lanes<'a> {
     world: &'a World<'a>,
-    model: Model,
+    model: &'a Model,
     arch: Arch,
     scratch: RefCell<Scratch>,
+}
+
+/// What is kept throughout an interval: lower bounds. Those that are not positive say nothing of how deep bodies overlap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kept {
+    /// The least distance of all pairs (m).
+    pub least_m: f32,
+    /// The least of what a pair keeps beyond what it must (m).
+    pub spare_m: f32,
 }
 
 /// Memory that is used again.
@@ -40,7 +52,7 @@ impl<'a> Lanes<'a> {
     /// Prepares a world.
     #[must_use]
     pub fn new(world: &'a World<'a>) -> Self {
-        Self { world, model: Model::new(world), arch: Arch::new(), scratch: RefCell::default() }
+        Self { world, model: world.model(), arch: Arch::new(), scratch: RefCell::default() }
     }
 
     /// The same on plain arithmetic, one pose at a time: to compare.
@@ -54,7 +66,7 @@ impl<'a> Lanes<'a> {
     pub fn are_free(&self, poses_rad: &[JointArray], extra_m: f64) -> bool {
         let scratch = &mut *self.scratch.borrow_mut();
         scratch.suspects.clear();
-        let pass = Pass { model: &self.model, poses_rad, extra_m, scratch };
+        let pass = Pass { model: self.model, poses_rad, extra_m, scratch };
         if !self.arch.dispatch(pass) {
             return false;
         }
@@ -74,6 +86,18 @@ impl<'a> Lanes<'a> {
             if self.are_free(&poses_rad[free..middle], extra_m) { free = middle } else { blocked = middle }
         }
         Some(free)
+    }
+
+    /// What all pairs surely keep while each joint is within `turns_rad` of a pose, one for each of `poses_rad`; up to `enough_m`.
+    pub fn keep(
+        &self,
+        (poses_rad, turns_rad): (&[JointArray], &[JointArray]),
+        enough_m: f64,
+        kept: &mut Vec<Kept>,
+    ) {
+        let scratch = &mut *self.scratch.borrow_mut();
+        let model = self.model;
+        self.arch.dispatch(intervals::Pass { model, poses_rad, turns_rad, enough_m, scratch, kept });
     }
 
     fn pair(&self, question: Question) -> Option<Pair> {

@@ -92,6 +92,8 @@ pub(super) struct BodyPair {
 /// Two groups of which some bodies must keep apart.
 pub(super) struct GroupPair {
     pub(super) groups: [usize; 2],
+    /// The last frame that carries both.
+    pub(super) common: usize,
     pub(super) required: f32,
     pub(super) bodies: Vec<BodyPair>,
     /// Each sphere of the first group, with those of the second that it must keep apart from, and how far their centres.
@@ -99,7 +101,7 @@ pub(super) struct GroupPair {
 }
 
 /// The world.
-pub(super) struct Model {
+pub(crate) struct Model {
     pub(super) joints: Vec<Joint>,
     pub(super) groups: Vec<Group>,
     pub(super) covers: Vec<Cover>,
@@ -120,7 +122,7 @@ pub(super) struct Model {
 
 impl Model {
     /// Takes the constants from a world.
-    pub(super) fn new(world: &World) -> Self {
+    pub(crate) fn new(world: &World) -> Self {
         let aligned = aligned(world);
         let reach_m = world.extent_m();
         let mut model = Self {
@@ -219,7 +221,9 @@ impl Model {
             .map(|(groups, bodies)| {
                 let required = bodies.iter().map(|b| b.required).fold(0.0, f32::max);
                 let spheres = self.sphere_pairs(&bodies);
-                GroupPair { groups, required, bodies, spheres }
+                let [a, b] = groups.map(|group| self.groups[group].frame);
+                let common = world.robot().chain.common_frame(a, b);
+                GroupPair { groups, common, required, bodies, spheres }
             })
             .collect();
         pairs.sort_unstable_by_key(|pair| pair.groups);

@@ -12,7 +12,7 @@ mod through;
 pub(crate) use corners::blends_rad;
 
 use crate::budget::Budget;
-use crate::collide::{Course, StraightEdge, SweepRules, sweep};
+use crate::collide::{Course, StraightEdge, SweepRules, sweep_in_parts};
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
@@ -366,7 +366,9 @@ impl<'a> Pipeline<'a> {
         let course = Course::new(motion);
         self.stretches(motion).is_some_and(|stretches| {
             let mut parts = stretches.iter().zip(&rules);
-            parts.all(|(s, rules)| sweep(s.world, &course, s.span_s, rules, self.space.budget).is_ok())
+            parts.all(|(s, rules)| {
+                sweep_in_parts(s.world, &course, s.span_s, rules, self.space.budget).is_ok()
+            })
         })
     }
 
@@ -374,7 +376,8 @@ impl<'a> Pipeline<'a> {
     fn straight(&mut self, line: &[JointArray]) -> bool {
         let [from_rad, to_rad] = line else { return false };
         let edge = StraightEdge { from_rad, to_rad };
-        let result = sweep(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.budget);
+        let result =
+            sweep_in_parts(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.budget);
         match result.map_err(|b| b.pair) {
             Ok(_) => {
                 self.note("straight line".to_owned());
