@@ -22,14 +22,20 @@ impl Robot {
     /// # Errors
     /// When nothing that moves has a mass.
     pub fn dynamics(&self) -> Result<Dynamics, NoMasses> {
-        let mut bodies = [Body::NONE; MAX_JOINTS];
-        for (joint, body) in bodies.iter_mut().enumerate().take(self.joints.len()) {
-            *body = gather(self.masses.iter().filter(|m| m.frame == joint + 1));
-        }
+        let bodies = self.bodies();
         if bodies.iter().all(|body| body.mass_kg <= 0.0) {
             return Err(NoMasses { robot: self.name.clone() });
         }
         Ok(Dynamics::new(self.chain, bodies, self.gravity_m_s2))
+    }
+
+    /// What moves with each joint, as one body.
+    pub(crate) fn bodies(&self) -> [Body; MAX_JOINTS] {
+        let mut bodies = [Body::NONE; MAX_JOINTS];
+        for (joint, body) in bodies.iter_mut().enumerate().take(self.joints.len()) {
+            *body = gather(self.masses.iter().filter(|m| m.frame == joint + 1));
+        }
+        bodies
     }
 }
 

@@ -67,6 +67,8 @@ pub struct Robot {
     pub shapes: Vec<LinkShape>,
     /// Masses of the links that state one, and of the payload.
     pub masses: Vec<LinkMass>,
+    /// The payload, which is among [`Self::masses`], too.
+    pub payload: Option<LinkMass>,
     /// Where gravity points, in the base's frame.
     pub gravity_m_s2: Vector3<f64>,
     /// Names of the links without a shape: nothing keeps them from being hit.
@@ -195,6 +197,7 @@ impl Robot {
             links: parts.links,
             shapes: parts.shapes,
             masses: parts.masses.into_iter().chain(payload).collect(),
+            payload,
             gravity_m_s2: Vector3::from(description.gravity_m_s2),
             bare_links: parts.bare_links,
             unmodelled_links: description.unmodelled_links.clone(),

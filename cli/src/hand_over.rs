@@ -211,6 +211,7 @@ fn is_for_services(action: &Action) -> bool {
         | Action::Status
         | Action::Watch(_) => true,
         Action::Scene(args) => !args.reads_a_file(),
+        Action::Calibrate(args) => !args.touches_a_file(),
         Action::Plan(_)
         | Action::Import(_)
         | Action::Sample(_)
@@ -272,6 +273,8 @@ mod tests {
             &["status", "--settings", "../settings"],
             &["status", "--settings", "x.toml"],
             &["scene", "add", "--file", "/etc/shadow"],
+            &["calibrate", "gravity", "--from", "/etc/shadow"],
+            &["calibrate", "gravity", "-o", "/var/lib/taustream/x"],
         ] {
             let refused = understood(&text(words, None));
             assert!(matches!(refused, Err(Failure::Usage(_))), "{words:?}: {refused:?}");

@@ -81,7 +81,9 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
         Action::Cancel(args) => interrupt::watch().and_then(|()| live::cancel::run(form, settings, args)),
         Action::Recover(args) => interrupt::watch().and_then(|()| live::recover::run(form, settings, args)),
         Action::Run(args) => interrupt::watch().and_then(|()| live::run::run(form, settings, args)),
-        Action::Enable(args) => command(form, settings, Command::Enable, args.wait_s),
+        Action::Enable(args) => {
+            interrupt::watch().and_then(|()| live::command::enable(form, settings, args.wait_s))
+        }
         Action::Disable(args) => command(form, settings, Command::Disable, args.wait_s),
         Action::Pause(args) => command(form, settings, Command::Pause, args.wait_s),
         Action::Resume(args) => command(form, settings, Command::Resume, args.wait_s),
@@ -94,6 +96,9 @@ fn perform(cli: &Cli) -> Result<(), Failure> {
             interrupt::watch().and_then(|()| live::axis::run(form, &ArmName::read(settings)?, args))
         }
         Action::Home(args) => interrupt::watch().and_then(|()| live::home::run(form, settings, args)),
+        Action::Calibrate(args) => {
+            interrupt::watch().and_then(|()| live::calibrate::run(form, settings, args))
+        }
         Action::Reference(args) => live::reference::run(form, settings, args),
         Action::Status => live::status::run(form, &ArmName::read(settings)?),
         Action::Watch(args) => live::watch::run(form, settings, args),

@@ -3,6 +3,8 @@
 mod bad_input;
 #[path = "cli/buses.rs"]
 mod buses;
+#[path = "cli/calibrate.rs"]
+mod calibrate;
 #[path = "cli/common.rs"]
 mod common;
 #[path = "cli/doctor.rs"]

@@ -47,4 +47,4 @@ pub use text::Text;
 pub use trajectory::{CheckedTrajectory, Replaces, RobotDigest, TrajectoryMessage};
 
 /// Version of every layout in this crate; a change of any message raises it.
-pub const LAYOUT_VERSION: u32 = 8;
+pub const LAYOUT_VERSION: u32 = 9;

@@ -79,6 +79,8 @@ pub struct Report {
     pub measured_rad: [f64; MAX_JOINTS],
     /// Measured velocity, rad/s; NaN where the drive does not send it.
     pub measured_velocity_rad_s: [f64; MAX_JOINTS],
+    /// Measured torque at the joint, Nm; NaN where the drive does not send it.
+    pub measured_torque_nm: [f64; MAX_JOINTS],
     /// Age of the newest feedback a joint, s; infinite before the first.
     pub feedback_age_s: [f64; MAX_JOINTS],
     /// Tracking error a joint, rad.

@@ -518,6 +518,7 @@ impl Reporter {
         for (joint, servo) in cycle_state.servos.iter().enumerate().take(slots) {
             r.measured_rad[joint] = servo.position_rad;
             r.measured_velocity_rad_s[joint] = servo.velocity_rad_s;
+            r.measured_torque_nm[joint] = servo.torque_nm;
             r.feedback_age_s[joint] = supervisor.watch().age_s(cycle_state, joint);
             r.drive_status[joint] = servo.status_word;
             r.drive_error[joint] = servo.error_code;

@@ -74,6 +74,12 @@ pub const ALL: &[Scenario] = &[
         kills: false,
         fits: has_gripper,
     },
+    Scenario {
+        name: "gravity_calibrated_in_four_poses_masses_are_those_of_the_file",
+        run: gravity_calibrated,
+        kills: false,
+        fits: weighs,
+    },
 ];
 
 fn any_arm(_: &Settings) -> bool {
@@ -83,6 +89,11 @@ fn any_arm(_: &Settings) -> bool {
 /// It has an axis beside the path called `gripper`.
 fn has_gripper(settings: &Settings) -> bool {
     settings.axes.iter().any(|axis| axis.output.name == "gripper")
+}
+
+/// Its motors carry what the masses of the robot file weigh.
+fn weighs(settings: &Settings) -> bool {
+    settings.feed_forward.is_some_and(|wanted| wanted.gravity)
 }
 
 /// Nothing is in the way: round obstacles the planner's answer in motion takes longer than the machine's motion.
@@ -275,6 +286,35 @@ fn gripper_at_work(bench: &mut TestBench, goals: &Goals) -> Result<()> {
     );
     let report = arrive_within(bench, motion, goals.rad(0)?, AT_GOAL_RAD)?;
     ensure!(report.guard_trips == 0 && report.frames_lost == 0, "{report:?}");
+    bench.cli_done(&["disable"])?;
+    bench.await_phase(Phase::Disabled)?;
+    Ok(())
+}
+
+/// The simulated motors bear the masses of the file and dry friction: torques are those of the model, and the fit leaves the masses.
+fn gravity_calibrated(bench: &mut TestBench, _: &Goals) -> Result<()> {
+    bench.cli_refused(&["calibrate", "gravity"], "enable")?;
+    let enabled = bench.cli_done(&["enable"])?;
+    ensure!(!enabled.stdout.contains("NOTICE"), "the arm is as heavy as its file: {}", enabled.stdout);
+    bench.cli_done(&["speed", "100"])?;
+    let answer = bench.cli_done(&["calibrate", "gravity", "--poses", "4", "--json"])?;
+    let said: serde_json::Value = serde_json::from_str(&answer.stdout)?;
+    let list =
+        |key: &str| said.get(key).and_then(serde_json::Value::as_array).context("a list of the answer");
+    let number = |of: &serde_json::Value, key: &str| of.get(key).and_then(serde_json::Value::as_f64);
+    for joint in list("joints")? {
+        let (most_nm, apart_nm) = (number(joint, "torque_nm_max"), number(joint, "before_rms_nm"));
+        let (most_nm, apart_nm) = most_nm.zip(apart_nm).context("torques of a joint")?;
+        ensure!(apart_nm < 0.05 * most_nm + 0.1, "the drive's torque is not the model's: {joint}");
+    }
+    for body in list("bodies")? {
+        let mass_kg = |key: &str| number(body.get(key)?, "mass_kg");
+        let (before_kg, after_kg) = mass_kg("before").zip(mass_kg("after")).context("masses of a body")?;
+        ensure!(
+            (before_kg - after_kg).abs() < 0.05 * before_kg + 0.02,
+            "the fit goes away from the truth: {body}"
+        );
+    }
     bench.cli_done(&["disable"])?;
     bench.await_phase(Phase::Disabled)?;
     Ok(())

@@ -1,5 +1,6 @@
 //! The command line. Every name has its unit; the help states every default.
 mod axis;
+mod calibrate;
 mod cuts;
 mod goal;
 mod import;
@@ -15,6 +16,7 @@ mod timing;
 mod via;
 
 pub(crate) use axis::{AxisAction, AxisArgs};
+pub(crate) use calibrate::{CalibrateArgs, CalibrateWhat, GravityArgs};
 pub(crate) use goal::{Goal, group_of, tip_of};
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
@@ -228,6 +230,8 @@ pub(crate) enum Action {
     Reference(ReferenceArgs),
     /// Let the drive of a joint find its zero by itself. THE JOINT MOVES, unchecked for collisions.
     Home(HomeArgs),
+    /// Find out by measured torques what the arm weighs. THE ARM MOVES.
+    Calibrate(CalibrateArgs),
     /// Show the state of the arm: phase, joints, timing, buses.
     Status,
     /// Show the state of the arm, live; this does not affect the arm.

@@ -1,13 +1,14 @@
 //! enable, disable, pause, resume, speed, stop, torque-off, clear-fault: one command, then the wait for its effect.
 use super::client::{Client, Limit, STREAMER};
-use super::stop_way;
-use crate::arm::ArmName;
+use super::{standstill, stop_way};
+use crate::arm::{ArmName, settings_to_talk};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Form;
 use crate::words::fault_sentence;
 use serde::Serialize;
 use std::fmt;
+use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -25,12 +26,17 @@ struct Answer {
     accepted: bool,
     phase: Option<&'static str>,
     message: String,
+    /// What deserves a look before the first motion.
+    notices: Vec<String>,
 }
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.command, self.phase.unwrap_or("phase unknown"))?;
-        if self.message.is_empty() { Ok(()) } else { write!(f, " ({})", self.message) }
+        if !self.message.is_empty() {
+            write!(f, " ({})", self.message)?;
+        }
+        self.notices.iter().try_for_each(|notice| write!(f, "\nNOTICE: {notice}"))
     }
 }
 
@@ -126,6 +132,18 @@ pub(crate) fn run(form: Form, arm: &ArmName, command: Command, wait_s: f64) -> R
         Some(request) => stop(arm, command, request, wait_s)?,
         None => send(&Client::join(&arm.name)?, arm, command, wait_s, &mut || {})?,
     };
+    form.print(&answer)
+}
+
+/// Enables the arm, and then looks whether it bears what its masses weigh.
+pub(crate) fn enable(form: Form, given: Option<&Path>, wait_s: f64) -> Result<(), Failure> {
+    let arm = ArmName::read(given)?;
+    let client = Client::join(&arm.name)?;
+    let mut answer = send(&client, &arm, Command::Enable, wait_s, &mut || {})?;
+    // Settings with a fault have been mentioned, and keep nobody from enabling.
+    if let (true, Ok(settings)) = (wait_s > 0.0, settings_to_talk(given)) {
+        answer.notices = standstill::notices(&client, &settings)?;
+    }
     form.print(&answer)
 }
 
@@ -247,6 +265,7 @@ fn answer(arm: &ArmName, command: Command, phase: Option<Phase>, reply: &Command
         accepted: true,
         phase: phase.map(Phase::word),
         message: reply.text(),
+        notices: Vec::new(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Commands that talk to the running streamer and planner.
 pub(crate) mod axis;
+pub(crate) mod calibrate;
 pub(crate) mod cancel;
 pub(crate) mod client;
 pub(crate) mod command;
@@ -13,6 +14,7 @@ pub(crate) mod reference;
 pub(crate) mod replan;
 pub(crate) mod run;
 pub(crate) mod scene;
+pub(crate) mod standstill;
 pub(crate) mod status;
 mod stop_way;
 mod target_lines;

@@ -23,6 +23,8 @@ struct JointStatus {
     measured_rad: f64,
     /// Null where the drive does not send it.
     measured_velocity_rad_s: f64,
+    /// Null where the drive does not send it.
+    measured_torque_nm: f64,
     tracking_error_rad: f64,
     tracking_error_rad_max: f64,
     feedback_age_s: f64,
@@ -230,6 +232,7 @@ fn joints(r: &Report, arm: &ArmName) -> Vec<JointStatus> {
             command_jerk_rad_s3: at(&r.command_jerk_rad_s3, j),
             measured_rad: at(&r.measured_rad, j),
             measured_velocity_rad_s: at(&r.measured_velocity_rad_s, j),
+            measured_torque_nm: at(&r.measured_torque_nm, j),
             tracking_error_rad: at(&r.tracking_error_rad, j),
             tracking_error_rad_max: at(&r.tracking_error_rad_max, j),
             feedback_age_s: at(&r.feedback_age_s, j),
