@@ -211,7 +211,7 @@ fn check(robot: &Robot, poses: &[HeldPose]) -> Result<(), MassFitError> {
     for (pose, held) in poses.iter().enumerate() {
         for (what, values) in [("position", &held.q_rad), ("torque", &held.torque_nm)] {
             let mut used = values.iter().enumerate().take(robot.joints.len());
-            if let Some((joint, value)) = used.find(|(_, value)| !(value.abs() <= PLAUSIBLE)) {
+            if let Some((joint, value)) = used.find(|(_, value)| !(-PLAUSIBLE..=PLAUSIBLE).contains(*value)) {
                 return Err(MassFitError::Implausible { pose, joint, what, value: *value });
             }
         }

@@ -1,4 +1,5 @@
 //! Torques at rest against the masses of the robot file.
+#![expect(clippy::unwrap_used, reason = "helpers of tests; a failure in them fails the test")]
 use std::path::PathBuf;
 use taustream_arm::{LinkMass, Settings};
 use taustream_motion::{JointArray, MAX_JOINTS, joint_array};

@@ -1,4 +1,5 @@
 //! Masses by measured torques, on arms whose true masses are known.
+#![expect(clippy::unwrap_used, reason = "helpers of tests; a failure in them fails the test")]
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use taustream_arm::mass_fit::{HeldPose, MassFitError, POSES_MIN, Unknown, fit};

@@ -23,7 +23,7 @@ pub(crate) struct Rest {
 /// How a rest went.
 pub(crate) enum Resting {
     /// As it should.
-    Held(Rest),
+    Held(Box<Rest>),
     /// The arm did not hold all the time.
     Left(Box<Report>, Phase),
     /// Too few reports, or none with numbers.
@@ -54,7 +54,7 @@ pub(crate) fn rest(client: &Client, settle_s: f64, read_s: f64) -> Result<Restin
         return Ok(Resting::Unknown);
     }
     let mean = |sum: JointArray| sum.map(|sum| sum / f64::from(count));
-    Ok(Resting::Held(Rest { q_rad: mean(q_rad), torque_nm: mean(torque_nm) }))
+    Ok(Resting::Held(Box::new(Rest { q_rad: mean(q_rad), torque_nm: mean(torque_nm) })))
 }
 
 fn add(sum: &mut JointArray, values: &JointArray) {

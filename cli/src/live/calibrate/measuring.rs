@@ -142,7 +142,7 @@ impl Measuring<'_> {
     /// Reads torques while the arm holds.
     fn rest(&self) -> Result<Rest, Failure> {
         match rest(self.client, SETTLE_S, READ_S)? {
-            Resting::Held(rest) => Ok(rest),
+            Resting::Held(rest) => Ok(*rest),
             Resting::Left(report, phase) => {
                 let why = fault_sentence(&report, &self.arm);
                 Err(Failure::Failed(format!("the arm no longer holds, it is {}: {why}", phase.word())))
