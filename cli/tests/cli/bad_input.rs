@@ -323,7 +323,7 @@ fn goal_behind_a_closed_wall_is_refused_within_the_deadline() {
     let words = format!(
         "plan --robot ur5 --scene wall.toml --start {start} --goal {goal} --deadline-ms 700 -o x.json"
     );
-    refuse_all(&scratch, &[(&words, 1, &["no path found", "link3 and back", "700 ms", "longer"])]);
+    refuse_all(&scratch, &[(&words, 1, &["no path found", "blocked: link", "and back", "700 ms", "longer"])]);
 }
 
 #[test]
