@@ -4,16 +4,16 @@
 use crate::capsule::Capsule;
 use crate::document::{Node, Value, shown};
 use crate::group::{self, Group};
-use crate::limit_notices;
+use crate::joint_limits::{Known, guess_kind, read_kind, read_limits, read_torque};
 use crate::link_margin::LinkMargins;
 use crate::mass::{self, Weight};
 use crate::modelled::{self, Listed};
 use crate::named_pose::{self, NamedPose};
-use crate::reader::{Bounds, FaultList, Table};
+use crate::reader::{FaultList, Table};
 use crate::robot::link_name;
 use crate::rows::{self, Row, RowKind};
-use crate::urdf::{self, JointInfo, StatedLimits, UrdfArm};
-use taustream_motion::{JointKind, JointLimits, LimitSet, MAX_JOINTS};
+use crate::urdf::{self, UrdfArm};
+use taustream_motion::{JointKind, JointLimits, MAX_JOINTS};
 
 /// One joint of the arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,17 +70,6 @@ pub(crate) struct Description {
     /// What the owner should know about the joints' limits, as text.
     pub(crate) notices: Vec<String>,
 }
-
-/// Sixteen turns; a larger number is a slip of the unit (degrees).
-const POSITION_RAD: Bounds = Bounds::within(-100.0, 100.0, "rad");
-const VELOCITY_RAD_S: Bounds = Bounds::above(0.0, 100.0, "rad/s");
-const ACCELERATION_RAD_S2: Bounds = Bounds::above(0.0, 1e4, "rad/s^2");
-const JERK_RAD_S3: Bounds = Bounds::above(0.0, 1e7, "rad/s^3");
-const TORQUE_NM: Bounds = Bounds::above(0.0, 1e6, "Nm");
-
-/// Stop limits where the file gives none, as multiples of the motion limits.
-const STOP_ACCELERATION_RATIO: f64 = 2.0;
-const STOP_JERK_RATIO: f64 = 4.0;
 
 impl Description {
     /// Reads every key; `None` after a fault that leaves nothing to describe.
@@ -187,16 +176,13 @@ fn read_rows(top: &mut Table<'_>, notices: &mut Vec<String>) -> Read {
     for mut table in tables {
         // Every key is read before the first `?`, so that one fault does not hide the next.
         let name = table.name("name");
-        let row = rows::read(&mut table);
-        let limits = read_limits(&mut table, &Known::Nothing, notices);
-        let torque = read_torque(&mut table, &Known::Nothing, notices);
+        let stated = read_kind(&mut table);
+        let kind = stated.unwrap_or_else(|| guess_kind(&table));
+        let row = rows::read(&mut table, kind);
+        let limits = read_limits(&mut table, (kind, &Known::Nothing), notices);
+        let torque = read_torque(&mut table, (kind, &Known::Nothing), notices);
         table.done();
-        let joint = |((name, limits), torque_nm_max)| Joint {
-            name,
-            kind: JointKind::Revolute,
-            limits,
-            torque_nm_max,
-        };
+        let joint = |((name, limits), torque_nm_max)| Joint { name, kind, limits, torque_nm_max };
         read.push(name.zip(limits).zip(torque).map(joint).zip(row));
     }
     check_names(
@@ -234,12 +220,19 @@ fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) 
             }
             at
         });
-        let known = match at.and_then(|at| joint_info.as_ref()?.get(at)) {
-            Some(joint) => Known::Urdf(joint),
-            None => Known::Something,
+        let (kind, known) = match at.and_then(|at| joint_info.as_ref()?.get(at)) {
+            Some(joint) => (joint.kind, Known::Urdf(joint)),
+            None => (guess_kind(&table), Known::Something),
         };
-        let read = read_limits(&mut table, &known, notices);
-        let read = read.zip(read_torque(&mut table, &known, notices));
+        if let Some(node) = table.has("kind").then(|| table.take("kind")).flatten() {
+            table.fault(
+                "kind",
+                &node.to_string(),
+                "no such key beside `urdf`, which states the type of the joint",
+            );
+        }
+        let read = read_limits(&mut table, (kind, &known), notices);
+        let read = read.zip(read_torque(&mut table, (kind, &known), notices));
         table.done();
         if let Some(slot) = at.and_then(|at| limits.get_mut(at)) {
             *slot = read;
@@ -261,223 +254,10 @@ fn read_urdf(top: &mut Table<'_>, listed: &[Listed], notices: &mut Vec<String>) 
         .zip(limits)
         .map(|(joint_info, limits)| {
             let (limits, torque_nm_max) = limits?;
-            Some(Joint { name: joint_info.name, kind: JointKind::Revolute, limits, torque_nm_max })
+            Some(Joint { name: joint_info.name, kind: joint_info.kind, limits, torque_nm_max })
         })
         .collect();
     Read { links, whole: joints.map(|joints| (joints, Geometry::Urdf(Box::new(arm)))) }
-}
-
-/// What is known of a joint's limits besides its table.
-enum Known<'a> {
-    /// Nothing: the table must say everything.
-    Nothing,
-    /// A URDF has it.
-    Urdf(&'a JointInfo),
-    /// A URDF was to have it, but could not be read, or has no such joint: one fault says so, not one a limit.
-    Something,
-}
-
-fn read_limits(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<JointLimits> {
-    let position_rad = read_position(table, known);
-    let motion = read_motion(table, known, notices);
-    let stop = match table.table_if_there("stop") {
-        Some(stop) => read_stop(stop, motion.as_ref()),
-        None => motion.map(default_stop),
-    };
-    limit_notices::of_range(table, position_rad, notices);
-    limit_notices::of_motion(table, motion.as_ref(), notices);
-    if let (Some(stop), Known::Urdf(joint_info)) = (&stop, known) {
-        limit_notices::of_stop(joint_info, stop, notices);
-    }
-    Some(JointLimits { position_rad: position_rad?, motion: motion?, stop: stop? })
-}
-
-/// The greatest torque, from the table or else from the URDF; the outer `None` is a fault.
-fn read_torque(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<Option<f64>> {
-    const KEY: &str = "torque_nm_max";
-    let stated = if let Known::Urdf(joint_info) = known { joint_info.limits.effort } else { None };
-    if !table.has(KEY) {
-        table.take(KEY);
-        return Some(stated);
-    }
-    let given = table.number(KEY, &TORQUE_NM)?;
-    if let (Known::Urdf(joint_info), Some(stated)) = (known, stated.filter(|stated| given > *stated)) {
-        let name = shown(&joint_info.name);
-        notices.push(format!("joint {name}: {KEY} = {given} is above the URDF's effort of {stated} Nm"));
-    }
-    Some(Some(given))
-}
-
-/// A URDF's range is where the mechanics end, so a file may narrow it and never widen it.
-fn read_position(table: &mut Table<'_>, known: &Known<'_>) -> Option<[f64; 2]> {
-    let stated = match known {
-        Known::Nothing => return table.interval("position_rad", &POSITION_RAD),
-        Known::Something if !table.has("position_rad") => {
-            table.take("position_rad");
-            return None;
-        }
-        Known::Something => None,
-        Known::Urdf(joint_info) => joint_info.position_rad,
-    };
-    if table.has("position_rad") {
-        let [low, high] = table.interval("position_rad", &POSITION_RAD)?;
-        if let Some([lowest, highest]) = stated
-            && (low < lowest || high > highest)
-        {
-            let value = format!("[{low:?}, {high:?}]");
-            table.fault(
-                "position_rad",
-                &value,
-                &format!("a range inside the URDF's [{lowest:?}, {highest:?}]"),
-            );
-            return None;
-        }
-        return Some([low, high]);
-    }
-    table.take("position_rad");
-    match stated {
-        Some([low, high]) if low < high && POSITION_RAD.hold(low) && POSITION_RAD.hold(high) => {
-            Some([low, high])
-        }
-        Some([low, high]) => {
-            let value = format!("[{low:?}, {high:?}] by the URDF");
-            table.fault(
-                "position_rad",
-                &value,
-                "a range with the lowest below the highest, within 100 rad; give one here",
-            );
-            None
-        }
-        None => {
-            let expected =
-                "[lowest, highest]: the URDF states no range (the joint is continuous, or has no limit)";
-            table.fault("position_rad", "missing", expected);
-            None
-        }
-    }
-}
-
-/// The three motion limits, each from the table or else from the URDF. Nothing that moves an arm has another default.
-fn read_motion(table: &mut Table<'_>, known: &Known<'_>, notices: &mut Vec<String>) -> Option<LimitSet> {
-    const EXPECTED: &str = "a table of velocity_rad_s, acceleration_rad_s2, jerk_rad_s3";
-    let stated =
-        if let Known::Urdf(joint_info) = known { joint_info.limits } else { StatedLimits::default() };
-    let whole =
-        [stated.velocity, stated.acceleration, stated.jerk].iter().all(|v| v.is_some_and(|v| v > 0.0));
-    if whole && !table.has("motion") {
-        table.take("motion");
-        return from_urdf(table, &stated);
-    }
-    let mut motion = table.table("motion", EXPECTED)?;
-    let mut limit = |key, (attribute, unit), stated, bounds: &Bounds| {
-        let read = read_limit(&mut motion, known, (key, attribute, stated), bounds);
-        let (given, stated, Known::Urdf(joint_info)) = (read?, stated.filter(|v| *v > 0.0), known) else {
-            return read;
-        };
-        if stated.is_some_and(|stated| given > stated) {
-            let (name, stated) = (shown(&joint_info.name), stated.unwrap_or(0.0));
-            notices.push(format!(
-                "joint {name}: motion.{key} = {given} is above the URDF's limit of {stated} {unit}"
-            ));
-        }
-        Some(given)
-    };
-    let velocity_rad_s = limit("velocity_rad_s", ("velocity", "rad/s"), stated.velocity, &VELOCITY_RAD_S);
-    let acceleration_rad_s2 =
-        limit("acceleration_rad_s2", ("acceleration", "rad/s2"), stated.acceleration, &ACCELERATION_RAD_S2);
-    let jerk_rad_s3 = limit("jerk_rad_s3", ("jerk", "rad/s3"), stated.jerk, &JERK_RAD_S3);
-    motion.done();
-    Some(LimitSet {
-        velocity_rad_s: velocity_rad_s?,
-        acceleration_rad_s2: acceleration_rad_s2?,
-        jerk_rad_s3: jerk_rad_s3?,
-    })
-}
-
-/// All motion limits by the URDF, whose numbers must be inside the bounds of the file's.
-fn from_urdf(table: &Table<'_>, stated: &StatedLimits) -> Option<LimitSet> {
-    let checked = |attribute: &str, value: Option<f64>, bounds: &Bounds| {
-        let value = value?;
-        if bounds.hold(value) {
-            return Some(value);
-        }
-        let expected =
-            format!("{} as limit.{attribute} of the URDF; give motion limits here", bounds.words());
-        table.fault("motion", &format!("{value} by the URDF"), &expected);
-        None
-    };
-    let velocity_rad_s = checked("velocity", stated.velocity, &VELOCITY_RAD_S);
-    let acceleration_rad_s2 = checked("acceleration", stated.acceleration, &ACCELERATION_RAD_S2);
-    let jerk_rad_s3 = checked("jerk", stated.jerk, &JERK_RAD_S3);
-    Some(LimitSet {
-        velocity_rad_s: velocity_rad_s?,
-        acceleration_rad_s2: acceleration_rad_s2?,
-        jerk_rad_s3: jerk_rad_s3?,
-    })
-}
-
-/// One motion limit: the file's, or else what the URDF states above 0.
-fn read_limit(
-    motion: &mut Table<'_>,
-    known: &Known<'_>,
-    (key, attribute, stated): (&'static str, &str, Option<f64>),
-    bounds: &Bounds,
-) -> Option<f64> {
-    if motion.has(key) {
-        return motion.number(key, bounds);
-    }
-    match (known, stated) {
-        (Known::Nothing, _) => return motion.number(key, bounds),
-        (Known::Urdf(_), Some(stated)) if bounds.hold(stated) => {
-            motion.take(key);
-            return Some(stated);
-        }
-        (Known::Something, _) => {
-            motion.take(key);
-            return None;
-        }
-        (Known::Urdf(_), _) => {}
-    }
-    motion.take(key);
-    let value = match stated {
-        Some(stated) => format!("missing, and the URDF's limit.{attribute} is {stated}"),
-        None => format!("missing, and the URDF states no limit.{attribute}"),
-    };
-    let zero = if stated == Some(0.0) { " (0 in a URDF means that nobody knew it)" } else { "" };
-    motion.fault(key, &value, &format!("{}; state it here{zero}", bounds.words()));
-    None
-}
-
-/// The design's ratios: where `a_m + v_m |sigma'| <= a_s`, they leave one whole motion acceleration for slowing down.
-fn default_stop(motion: LimitSet) -> LimitSet {
-    LimitSet {
-        velocity_rad_s: motion.velocity_rad_s,
-        acceleration_rad_s2: STOP_ACCELERATION_RATIO * motion.acceleration_rad_s2,
-        jerk_rad_s3: STOP_JERK_RATIO * motion.jerk_rad_s3,
-    }
-}
-
-/// Stop limits must lie above the motion limits: the difference is all the room there is for slowing down.
-fn read_stop(mut table: Table<'_>, motion: Option<&LimitSet>) -> Option<LimitSet> {
-    let acceleration_rad_s2 = table.number("acceleration_rad_s2", &ACCELERATION_RAD_S2);
-    let jerk_rad_s3 = table.number("jerk_rad_s3", &JERK_RAD_S3);
-    let above = |key: &'static str, stop: Option<f64>, motion: Option<f64>| {
-        if let (Some(stop), Some(motion)) = (stop, motion)
-            && stop <= motion
-        {
-            let expected =
-                format!("more than the motion limit {motion:?}: the difference is needed for slowing down");
-            table.fault(key, &format!("{stop:?}"), &expected);
-        }
-    };
-    above("acceleration_rad_s2", acceleration_rad_s2, motion.map(|m| m.acceleration_rad_s2));
-    above("jerk_rad_s3", jerk_rad_s3, motion.map(|m| m.jerk_rad_s3));
-    table.done();
-    Some(LimitSet {
-        velocity_rad_s: motion?.velocity_rad_s,
-        acceleration_rad_s2: acceleration_rad_s2?,
-        jerk_rad_s3: jerk_rad_s3?,
-    })
 }
 
 /// What the tip carries, if anything; the outer `None` is a fault.

@@ -13,7 +13,7 @@
 //! | u32 | number of joints |
 //! | per joint, base to tip: | |
 //! | string | name of the joint |
-//! | 2 x f64 | lowest and highest `position_rad` |
+//! | 2 x f64 | lowest and highest `position_rad`, or `position_m` |
 //! | 3 x f64 | motion: `velocity_rad_s`, `acceleration_rad_s2`, `jerk_rad_s3` |
 //! | 3 x f64 | stop: the same (with the defaults filled in) |
 //! | then: | |
@@ -47,6 +47,9 @@
 //! | then, only when the joints have groups: | |
 //! | string | `groups` |
 //! | u32 | number of groups; per group: string name; u32 number of joints, per joint u32; u32 0 without a tip, else its place among the tips, from 1 |
+//! | then, only when some joint is prismatic, whose positions and rates above are in m: | |
+//! | string | `prismatic` |
+//! | u32 | number of prismatic joints; per joint u32 |
 //!
 //! With feed-forward torques (`[feed_forward]` of a settings file) gravity and moments of inertia change what is commanded. The
 //! digest in messages then is that of the torque model, over these bytes:
@@ -145,7 +148,23 @@ fn bytes(description: &Description) -> Vec<u8> {
     put_margins(&mut out, margins);
     put_tips(&mut out, geometry);
     put_groups(&mut out, groups);
+    put_prismatic(&mut out, joints);
     out
+}
+
+/// Which joints slide; nothing when all turn.
+fn put_prismatic(out: &mut Vec<u8>, joints: &[Joint]) {
+    let prismatic: Vec<usize> = joints
+        .iter()
+        .enumerate()
+        .filter(|(_, joint)| joint.kind.is_prismatic())
+        .map(|(index, _)| index)
+        .collect();
+    if !prismatic.is_empty() {
+        put_text(out, "prismatic");
+        put_count(out, prismatic.len());
+        prismatic.iter().for_each(|joint| put_count(out, *joint));
+    }
 }
 
 /// The tips of a tree; nothing for a serial arm.
@@ -239,8 +258,18 @@ fn put_joint(out: &mut Vec<u8>, Joint { name, kind: _, limits, torque_nm_max: _ 
 }
 
 fn put_row(out: &mut Vec<u8>, row: &Row) {
-    // Weights and capsules come after all rows.
-    let Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, capsules: _, weight: _ } = row;
+    // Weights, capsules and kinds of joints come after all rows.
+    let Row {
+        kind,
+        joint_kind: _,
+        a_m,
+        alpha_rad,
+        d_m,
+        theta_offset_rad,
+        link_radius_m,
+        capsules: _,
+        weight: _,
+    } = row;
     out.push(match kind {
         RowKind::Standard => 0,
         RowKind::Modified => 1,

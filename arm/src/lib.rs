@@ -29,6 +29,7 @@ pub mod group;
 pub mod holding_torque;
 pub mod homing;
 mod hull;
+mod joint_limits;
 pub mod journal;
 pub mod last_pose;
 mod limit_notices;

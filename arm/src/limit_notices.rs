@@ -3,7 +3,7 @@ use crate::document::shown;
 use crate::reader::Table;
 use crate::urdf::JointInfo;
 use std::f64::consts::TAU;
-use taustream_motion::LimitSet;
+use taustream_motion::{JointKind, LimitSet};
 
 /// Two revolutions to a side; more is rare, and a range in degrees is common.
 const RANGE_RAD: f64 = 2.0 * TAU;
@@ -12,8 +12,26 @@ const VELOCITY_RAD_S: f64 = 40.0;
 /// A turn by 1 rad that takes longer is hardly meant.
 const TURN_S: f64 = 60.0;
 
-/// A range of many revolutions.
-pub(crate) fn of_range(table: &Table<'_>, position_rad: Option<[f64; 2]>, notices: &mut Vec<String>) {
+/// Farther than lifts and gantries of arms go, and less than most do in millimetres.
+const RANGE_M: f64 = 10.0;
+/// Faster than they go, and slower than most do in millimetres a second.
+const VELOCITY_M_S: f64 = 5.0;
+/// What a prismatic joint shall do in a minute at least.
+const WAY_M: f64 = 0.1;
+
+/// A range of many revolutions, or of many metres.
+pub(crate) fn of_range(
+    table: &Table<'_>,
+    (kind, position_rad): (JointKind, Option<[f64; 2]>),
+    notices: &mut Vec<String>,
+) {
+    if kind.is_prismatic() {
+        if let Some([low, high]) = position_rad.filter(|range| range.iter().any(|m| m.abs() > RANGE_M)) {
+            let path = table.path_of("position_m");
+            notices.push(format!("{path} = [{low}, {high}] m: LOOKS LIKE MILLIMETRES"));
+        }
+        return;
+    }
     let Some([low, high]) = position_rad.filter(|range| range.iter().any(|rad| rad.abs() > RANGE_RAD)) else {
         return;
     };
@@ -28,11 +46,20 @@ pub(crate) fn of_range(table: &Table<'_>, position_rad: Option<[f64; 2]>, notice
 }
 
 /// A velocity of many revolutions a second, and limits so small that the joint hardly moves.
-pub(crate) fn of_motion(table: &Table<'_>, motion: Option<&LimitSet>, notices: &mut Vec<String>) {
+pub(crate) fn of_motion(
+    table: &Table<'_>,
+    (kind, motion): (JointKind, Option<&LimitSet>),
+    notices: &mut Vec<String>,
+) {
     let Some(motion) = motion else { return };
     let path = table.path_of("motion");
     let velocity_rad_s = motion.velocity_rad_s;
-    if velocity_rad_s > VELOCITY_RAD_S {
+    if kind.is_prismatic() {
+        if velocity_rad_s > VELOCITY_M_S {
+            notices
+                .push(format!("{path}.velocity_m_s = {velocity_rad_s} m/s: LOOKS LIKE MILLIMETRES A SECOND"));
+        }
+    } else if velocity_rad_s > VELOCITY_RAD_S {
         notices.push(format!(
             "{path}.velocity_rad_s = {velocity_rad_s} are {:.1} revolutions a second: LOOKS LIKE DEGREES; in rad/s this would be {:.4}",
             velocity_rad_s / TAU,
@@ -40,20 +67,20 @@ pub(crate) fn of_motion(table: &Table<'_>, motion: Option<&LimitSet>, notices: &
         ));
     }
     // From rest to rest with one limit alone: at full speed; half the way speeding up; a quarter of it with rising acceleration.
-    let [by_velocity_s, by_acceleration_s, by_jerk_s] = [
-        velocity_rad_s.recip(),
-        2.0 * motion.acceleration_rad_s2.recip().sqrt(),
-        (32.0 / motion.jerk_rad_s3).cbrt(),
-    ];
+    let (way, words) = match kind {
+        JointKind::Revolute => (1.0, "a turn by 1 rad".to_owned()),
+        JointKind::Prismatic => (WAY_M, format!("a way of {WAY_M} m")),
+    };
     let slowest = [
-        ("velocity_rad_s", velocity_rad_s, by_velocity_s),
-        ("acceleration_rad_s2", motion.acceleration_rad_s2, by_acceleration_s),
-        ("jerk_rad_s3", motion.jerk_rad_s3, by_jerk_s),
+        (velocity_rad_s, way / velocity_rad_s),
+        (motion.acceleration_rad_s2, 2.0 * (way / motion.acceleration_rad_s2).sqrt()),
+        (motion.jerk_rad_s3, (32.0 * way / motion.jerk_rad_s3).cbrt()),
     ];
-    for (key, value, turn_s) in slowest.into_iter().filter(|(_, _, turn_s)| *turn_s > TURN_S) {
-        notices.push(format!(
-            "{path}.{key} = {value:e}: a turn by 1 rad takes at least {turn_s:.0} s; LOOKS TOO SMALL"
-        ));
+    for (key, (value, turn_s)) in
+        kind.rate_keys().into_iter().zip(slowest).filter(|(_, (_, turn_s))| *turn_s > TURN_S)
+    {
+        notices
+            .push(format!("{path}.{key} = {value:e}: {words} takes at least {turn_s:.0} s; LOOKS TOO SMALL"));
     }
 }
 
@@ -63,9 +90,10 @@ pub(crate) fn of_stop(joint_info: &JointInfo, stop: &LimitSet, notices: &mut Vec
         let stated = stated.filter(|stated| *stated > 0.0 && stop > *stated)?;
         Some(format!("stop.{what} = {stop} is above the URDF's {stated}"))
     };
+    let [_, acceleration, jerk] = joint_info.kind.rate_keys();
     let found = [
-        beyond("acceleration_rad_s2", stop.acceleration_rad_s2, joint_info.limits.acceleration),
-        beyond("jerk_rad_s3", stop.jerk_rad_s3, joint_info.limits.jerk),
+        beyond(acceleration, stop.acceleration_rad_s2, joint_info.limits.acceleration),
+        beyond(jerk, stop.jerk_rad_s3, joint_info.limits.jerk),
     ];
     let found: Vec<String> = found.into_iter().flatten().collect();
     if !found.is_empty() {

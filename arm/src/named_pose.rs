@@ -12,7 +12,7 @@ pub struct NamedPose {
     pub name: String,
     /// Index of the group that it is a pose of, into [`crate::Robot::groups`]; none for all joints.
     pub group: Option<usize>,
-    /// One angle a joint; unused slots, and joints of other groups, are zero.
+    /// One angle a joint, or its position in m of a prismatic one; unused slots, and joints of other groups, are zero.
     pub position_rad: JointArray,
 }
 
@@ -32,17 +32,18 @@ pub(crate) fn read(top: &mut Table<'_>, joints: Option<&[Joint]>, groups: &[Grou
     for mut table in top.tables("pose") {
         let name = table.name("name");
         let group = read_group(&mut table, groups);
-        let node = table.need("position_rad", "a list of one angle a joint");
         let members = joints.zip(group).map(|(joints, group)| members(joints, groups, group));
+        let key = key_of(&mut table, members.as_deref());
+        let node = table.need(key, "a list of one position a joint");
         let angles = node.zip(members.as_ref()).and_then(|(node, members)| {
-            let key = table.path_of("position_rad");
+            let key = table.path_of(key);
             numbers_of(table.fault_list(), &key, &node, members.len(), &ANGLE_RAD)
         });
         if let (Some(name), Some(group), Some(angles), Some(members)) = (name, group, angles, members) {
             if poses.iter().any(|pose| pose.name == name && pose.group == group) {
                 table.fault("name", &shown(&name), "each pose's name once");
             } else if let Some(words) = outside(&members, &angles) {
-                table.fault("position_rad", &words, "every joint inside its limits");
+                table.fault(key, &words, "every joint inside its limits");
             } else {
                 poses.push(NamedPose { name, group, position_rad: spread(&members, &angles) });
             }
@@ -50,6 +51,21 @@ pub(crate) fn read(top: &mut Table<'_>, joints: Option<&[Joint]>, groups: &[Grou
         table.done();
     }
     poses
+}
+
+/// The key of a pose's positions: in rad where all of its joints turn, else each in the unit of its joint. The other one is refused.
+fn key_of(table: &mut Table<'_>, members: Option<&[(usize, &Joint)]>) -> &'static str {
+    const KEYS: [&str; 2] = ["position_rad", "position"];
+    let Some(members) = members else {
+        return if table.has(KEYS[1]) { KEYS[1] } else { KEYS[0] };
+    };
+    let slides = members.iter().any(|(_, joint)| joint.kind.is_prismatic());
+    let [other, own] = if slides { KEYS } else { [KEYS[1], KEYS[0]] };
+    if let Some(node) = table.has(other).then(|| table.take(other)).flatten() {
+        let units: Vec<&str> = members.iter().map(|(_, joint)| joint.kind.unit()).collect();
+        table.fault(other, &node.to_string(), &format!("{own}, one number a joint, in {}", units.join(", ")));
+    }
+    own
 }
 
 /// The group that a pose is of; the outer `None` is a fault.
@@ -108,7 +124,7 @@ fn outside(members: &[(usize, &Joint)], angles: &[f64]) -> Option<String> {
     let mut both = members.iter().zip(angles);
     let ((_, joint), angle) = both.find(|((_, joint), angle)| !joint.limits.is_inside(**angle))?;
     let [low, high] = joint.limits.position_rad;
-    Some(format!("joint {:?} at {angle} rad of [{low}, {high}]", joint.name))
+    Some(format!("joint {:?} at {angle} {} of [{low}, {high}]", joint.name, joint.kind.unit()))
 }
 
 fn spread(members: &[(usize, &Joint)], angles: &[f64]) -> JointArray {

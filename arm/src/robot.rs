@@ -262,6 +262,28 @@ impl Robot {
         }
         limits
     }
+    /// The kind of a joint; revolute for one that is not there.
+    #[must_use]
+    pub fn kind(&self, joint: usize) -> JointKind {
+        self.joints.get(joint).map_or(JointKind::Revolute, |joint| joint.kind)
+    }
+    /// The kinds of all joints; revolute for unused slots.
+    #[must_use]
+    pub fn kinds(&self) -> [JointKind; MAX_JOINTS] {
+        let mut kinds = [JointKind::Revolute; MAX_JOINTS];
+        kinds.iter_mut().zip(&self.joints).for_each(|(slot, joint)| *slot = joint.kind);
+        kinds
+    }
+    /// The unit of lengths over all joints, in which a metre of a prismatic joint counts as a radian.
+    #[must_use]
+    pub fn travel_unit(&self) -> &'static str {
+        if self.has_prismatic() { "rad and m" } else { "rad" }
+    }
+    /// True when some joint is prismatic.
+    #[must_use]
+    pub fn has_prismatic(&self) -> bool {
+        self.joints.iter().any(|joint| joint.kind.is_prismatic())
+    }
     /// True when the two links may touch: a link with itself, by the robot file, by the SRDF, or by the contact rule.
     #[must_use]
     pub fn may_touch(&self, a: usize, b: usize) -> bool {
@@ -386,10 +408,13 @@ fn link_mass(joint: usize, row: &Row) -> Option<LinkMass> {
 
 fn chain_joint(row: &Row) -> ChainJoint {
     let (a_m, alpha_rad, d_m, theta_rad) = (row.a_m, row.alpha_rad, row.d_m, row.theta_offset_rad);
-    match row.kind {
-        RowKind::Standard => ChainJoint::from_dh(a_m, alpha_rad, d_m, theta_rad),
-        RowKind::Modified => ChainJoint::from_mdh(a_m, alpha_rad, d_m, theta_rad),
-    }
+    let make = match (row.kind, row.joint_kind) {
+        (RowKind::Standard, JointKind::Revolute) => ChainJoint::from_dh,
+        (RowKind::Standard, JointKind::Prismatic) => ChainJoint::prismatic_from_dh,
+        (RowKind::Modified, JointKind::Revolute) => ChainJoint::from_mdh,
+        (RowKind::Modified, JointKind::Prismatic) => ChainJoint::prismatic_from_mdh,
+    };
+    make(a_m, alpha_rad, d_m, theta_rad)
 }
 
 /// The capsule between the origins of frames i-1 and i.

@@ -3,6 +3,7 @@ use crate::capsule::Capsule;
 use crate::mass::{self, Weight};
 use crate::reader::{Bounds, FaultList, Table};
 use std::f64::consts::TAU;
+use taustream_motion::JointKind;
 
 /// Which convention a row follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,8 @@ pub(crate) enum RowKind {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
     pub(crate) kind: RowKind,
+    /// What the joint adds its position to: theta, or d of a prismatic joint.
+    pub(crate) joint_kind: JointKind,
     pub(crate) a_m: f64,
     pub(crate) alpha_rad: f64,
     pub(crate) d_m: f64,
@@ -35,20 +38,27 @@ const ANGLE_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
 const RADIUS_M: Bounds = Bounds::within(0.0, 1.0, "m (0: no shape)");
 
 /// Takes the row of a joint's table.
-pub(crate) fn read(table: &mut Table<'_>) -> Option<Row> {
+pub(crate) fn read(table: &mut Table<'_>, joint_kind: JointKind) -> Option<Row> {
     let row = read_row(table);
-    let shape = read_shape(table);
+    let shape = read_shape(table, joint_kind);
     let weight = Weight::read(table, mass::LINK);
     let (kind, [a_m, alpha_rad, d_m, theta_offset_rad]) = row?;
     let ((link_radius_m, capsules), weight) = (shape?, weight?);
-    Some(Row { kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, capsules, weight })
+    Some(Row { kind, joint_kind, a_m, alpha_rad, d_m, theta_offset_rad, link_radius_m, capsules, weight })
 }
 
 /// Either a radius along the row or capsules.
-fn read_shape(table: &mut Table<'_>) -> Option<(f64, Vec<Capsule>)> {
+fn read_shape(table: &mut Table<'_>, joint_kind: JointKind) -> Option<(f64, Vec<Capsule>)> {
     if !table.has("link_capsules") {
         table.take("link_capsules");
-        return table.number("link_radius_m", &RADIUS_M).map(|radius_m| (radius_m, Vec::new()));
+        let radius_m = table.number("link_radius_m", &RADIUS_M)?;
+        if radius_m > 0.0 && joint_kind.is_prismatic() {
+            let expected =
+                "link_capsules (or 0: no shape): the line of a prismatic joint's row changes its length";
+            table.fault("link_radius_m", &format!("{radius_m:?}"), expected);
+            return None;
+        }
+        return Some((radius_m, Vec::new()));
     }
     let capsules = Capsule::read_list(table, "link_capsules");
     if table.take("link_radius_m").is_some() {

@@ -315,6 +315,14 @@ impl Settings {
         for faults in [settings.robot.require_modelled(), stops].into_iter().filter_map(Result::err) {
             fault_list.merge(faults);
         }
+        if let Some(joint) = settings.robot.joints.iter().find(|joint| joint.kind.is_prismatic()) {
+            let expected = format!(
+                "a robot of revolute joints: servos of prismatic joints ({}) are not driven; `plan`, `verify` and `check` take it by \
+                 --robot",
+                document::shown(&joint.name)
+            );
+            fault_list.add(None, "robot", &document::shown(&settings.robot.name), &expected);
+        }
         consistency::check_jump(fault_list, &settings);
         axis::check_servos(fault_list, &settings);
         protocol::check_settings(fault_list, &settings);

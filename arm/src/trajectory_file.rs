@@ -4,14 +4,14 @@
 //! stroke has `start_s`, `duration_s`, `n` (1/k of the papers) and `delta_rad`. Numbers are written with as many
 //! digits as it takes to read the same bits back, and read without loss.
 use crate::Faults;
-use crate::document::{self, Node};
+use crate::document::{self, Node, Value};
 use crate::reader::{Bounds, FaultList, Table, numbers_of};
 use crate::text::counted;
 use std::fmt::Write as _;
 use std::path::Path;
 use taustream_motion::stroke::{DURATION_S_MIN, END_S_MAX, N_MAX, N_MIN};
 use taustream_motion::{
-    JointArray, MAX_JOINTS, MAX_STROKES, Stroke, StrokeError, Trajectory, TrajectoryError,
+    JointArray, JointKind, MAX_JOINTS, MAX_STROKES, Stroke, StrokeError, Trajectory, TrajectoryError,
 };
 
 /// A checked trajectory file.
@@ -21,6 +21,8 @@ pub struct TrajectoryFile {
     pub robot: String,
     /// Digest of that robot in hexadecimal; may be absent offline.
     pub digest: Option<String>,
+    /// Which joints slide: their numbers are in m. Revolute for unused slots.
+    pub kinds: [JointKind; MAX_JOINTS],
     /// The motion.
     pub trajectory: Trajectory,
 }
@@ -64,6 +66,7 @@ impl TrajectoryFile {
         }
         let joints =
             top.integer("joints", 1, MAX_JOINTS as i64).and_then(|joints| usize::try_from(joints).ok());
+        let kinds = read_units(&mut top, joints);
         let base_rad = read_angles(&mut top, "base_rad", joints);
         let strokes = read_strokes(&mut top, joints);
         top.done();
@@ -72,7 +75,7 @@ impl TrajectoryFile {
         }
         let trajectory =
             Trajectory::new(joints?, base_rad?, &strokes?).map_err(|e| note(fault_list, &e)).ok()?;
-        Some(Self { robot: robot?, digest, trajectory })
+        Some(Self { robot: robot?, digest, kinds: kinds?, trajectory })
     }
     /// The file's text. Numbers are written so that reading gives the same bits.
     #[must_use]
@@ -84,8 +87,12 @@ impl TrajectoryFile {
         if let Some(digest) = &self.digest {
             let _ = write!(out, ",\"digest\":{}", serde_json::Value::from(digest.as_str()));
         }
-        let _ =
-            write!(out, ",\"joints\":{joints},\"base_rad\":{}", numbers(self.trajectory.base_rad(), joints));
+        let _ = write!(out, ",\"joints\":{joints}");
+        if self.kinds.iter().any(|kind| kind.is_prismatic()) {
+            let units: Vec<&str> = self.kinds.iter().take(joints).map(|kind| kind.unit()).collect();
+            let _ = write!(out, ",\"units\":{}", serde_json::Value::from(units));
+        }
+        let _ = write!(out, ",\"base_rad\":{}", numbers(self.trajectory.base_rad(), joints));
         out.push_str(",\"strokes\":[");
         for (i, stroke) in self.trajectory.strokes().iter().enumerate() {
             out.push_str(if i == 0 { "\n" } else { ",\n" });
@@ -105,6 +112,28 @@ impl TrajectoryFile {
 fn numbers(values: &JointArray, joints: usize) -> String {
     let texts: Vec<String> = values.iter().take(joints).map(|value| format!("{value:?}")).collect();
     format!("[{}]", texts.join(","))
+}
+
+/// The units of the joints, written where some slide; all in rad without.
+fn read_units(table: &mut Table<'_>, joints: Option<usize>) -> Option<[JointKind; MAX_JOINTS]> {
+    const EXPECTED: &str = "a list of \"rad\" or \"m\", one a joint";
+    let mut kinds = [JointKind::Revolute; MAX_JOINTS];
+    let Some(node) = table.take("units") else { return Some(kinds) };
+    let units = if let Value::List(items) = &node.value { items.as_slice() } else { &[] };
+    if Some(units.len()) != joints {
+        table.fault("units", &node.to_string(), EXPECTED);
+        return None;
+    }
+    for (slot, unit) in kinds.iter_mut().zip(units) {
+        let word = if let Value::Text(word) = &unit.value { word.as_str() } else { "" };
+        let kind = [JointKind::Revolute, JointKind::Prismatic].into_iter().find(|kind| kind.unit() == word);
+        let Some(kind) = kind else {
+            table.fault("units", &unit.to_string(), EXPECTED);
+            return None;
+        };
+        *slot = kind;
+    }
+    Some(kinds)
 }
 
 /// One number a joint; unused slots are zero. Without a good joint count there is nothing to hold the list against.

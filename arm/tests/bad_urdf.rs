@@ -201,8 +201,14 @@ const CASES: &[Case] = &[
     (
         "two.urdf",
         "type=\"revolute\"",
+        "type=\"planar\"",
+        &["two.toml", "joint \"one\" (planar) between base and tip", "each has one servo"],
+    ),
+    (
+        "two.urdf",
+        "type=\"revolute\"",
         "type=\"prismatic\"",
-        &["two.toml", "joint \"one\" (prismatic) between base and tip", "radians"],
+        &["two.toml", "acceleration_rad_s2", "acceleration_m_s2: the joint is prismatic"],
     ),
     (
         "two.urdf",

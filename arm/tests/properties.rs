@@ -150,7 +150,7 @@ proptest! {
         strokes in prop::collection::vec(stroke(), 0..20),
         digest in prop::option::of("[0-9a-f]{64}"),
     ) {
-        let file = TrajectoryFile { robot: "ur5".to_owned(), digest, trajectory: trajectory(joints, base_rad, strokes) };
+        let file = TrajectoryFile { robot: "ur5".to_owned(), digest, kinds: Default::default(), trajectory: trajectory(joints, base_rad, strokes) };
         let read = TrajectoryFile::from_json(Path::new("t.json"), &file.to_json());
         prop_assert_eq!(read.as_ref().map(|read| bits(&read.trajectory)), Ok(bits(&file.trajectory)));
         prop_assert_eq!(read, Ok(file));

@@ -366,8 +366,8 @@ fn limits_of_urdf_1_2_are_used_where_the_file_gives_none_and_said_where_it_gives
     let robot = two_joints(stated, given).unwrap_or_else(|faults| panic!("{faults}"));
     let words = robot.notices.join("\n");
     for part in [
-        "joint \"j1\": motion.acceleration_rad_s2 = 8 is above the URDF's limit of 3 rad/s2",
-        "joint \"j2\": motion.jerk_rad_s3 = 80 is above the URDF's limit of 30 rad/s3",
+        "joint \"j1\": motion.acceleration_rad_s2 = 8 is above the URDF's limit of 3 rad/s^2",
+        "joint \"j2\": motion.jerk_rad_s3 = 80 is above the URDF's limit of 30 rad/s^3",
     ] {
         assert!(words.contains(part), "{part:?} is missing in {words}");
     }

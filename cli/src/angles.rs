@@ -1,14 +1,45 @@
-//! Lists of joint angles on the command line: `"0,-1.57,1.57,0,0,0"`, in rad where no unit says otherwise (`90deg`).
+//! Lists of joint positions on the command line: `"0,-1.57,1.57,0,0,0"`, in rad where no unit says otherwise (`90deg`); those of
+//! prismatic joints in m (`0.2`, `0.2m`, `200mm`), whatever the option says of angles.
 use crate::failure::Failure;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
-use taustream_arm::{Group, Robot};
-use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_arm::{Group, Robot, RobotJoint};
+use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 
-/// One to eight finite angles, base to tip.
+/// Finite positions of joints, base to tip.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Angles(Vec<f64>);
+pub(crate) struct Angles(Vec<Given>);
+
+/// What stands for one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Given {
+    /// A number without a unit: what it is in rad by the option, and as it stands, which is m for a prismatic joint.
+    Plain { angle_rad: f64, number: f64 },
+    /// With a unit of angles.
+    Angle(f64),
+    /// With a unit of lengths.
+    Length(f64),
+}
+
+impl Given {
+    /// The position of a joint: rad, or m.
+    fn of(self, joint: &RobotJoint, option: &str) -> Result<f64, Failure> {
+        match (self, joint.kind) {
+            (Self::Plain { angle_rad, .. } | Self::Angle(angle_rad), JointKind::Revolute) => Ok(angle_rad),
+            (Self::Plain { number, .. }, JointKind::Prismatic) => Ok(number),
+            (Self::Length(length_m), JointKind::Prismatic) => Ok(length_m),
+            (Self::Angle(_), JointKind::Prismatic) => Err(Failure::Usage(format!(
+                "{option} has an angle for joint {}, which is prismatic; write its position in m (0.2, 0.2m or 200mm)",
+                joint.name
+            ))),
+            (Self::Length(_), JointKind::Revolute) => Err(Failure::Usage(format!(
+                "{option} has a length for joint {}, which is revolute; write its angle (1.2, 1.2rad or 90deg)",
+                joint.name
+            ))),
+        }
+    }
+}
 
 /// Why text is no list of angles.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -68,17 +99,30 @@ impl Angles {
         for (i, word) in text.split(',').enumerate() {
             let (position, word) = (i + 1, word.trim());
             let refused = || AnglesError::Word { position, word: word.to_owned() };
-            let value = angle_rad(word, factor).ok_or_else(refused)?;
+            let given = given(word, factor).ok_or_else(refused)?;
+            let (Given::Plain { angle_rad: value, .. } | Given::Angle(value) | Given::Length(value)) = given;
             if !value.is_finite() {
                 return Err(AnglesError::NotFinite { position, value });
             }
-            values.push(value);
+            values.push(given);
         }
         match values.len() {
             1..=MAX_JOINTS => Ok(Self(values)),
             count => Err(AnglesError::Count { count }),
         }
     }
+}
+
+/// One position, with or without a unit; `factor` turns a bare number into rad.
+fn given(word: &str, factor: f64) -> Option<Given> {
+    const LENGTHS: [(&str, f64); 2] = [("mm", 1e-3), ("m", 1.0)];
+    if let Some((number, unit_m)) = LENGTHS.iter().find_map(|(unit, m)| Some((word.strip_suffix(unit)?, m))) {
+        return number.trim_end().parse::<f64>().ok().map(|value| Given::Length(value * unit_m));
+    }
+    if let Ok(number) = word.parse::<f64>() {
+        return Some(Given::Plain { angle_rad: number * factor, number });
+    }
+    angle_rad(word, factor).map(Given::Angle)
 }
 
 /// One angle in rad: a number with `deg`, `rad`, or neither, which `factor` turns into rad.
@@ -91,8 +135,16 @@ pub(crate) fn angle_rad(word: &str, factor: f64) -> Option<f64> {
 
 impl From<Vec<f64>> for Angles {
     fn from(values: Vec<f64>) -> Self {
-        Self(values)
+        Self(values.into_iter().map(|number| Given::Plain { angle_rad: number, number }).collect())
     }
+}
+
+/// What one number a joint is wanted for: the names, and the unit of those that are not in rad.
+fn wanted<'j>(joints: impl Iterator<Item = &'j RobotJoint>) -> String {
+    let name = |joint: &RobotJoint| {
+        if joint.kind.is_prismatic() { format!("{} (m)", joint.name) } else { joint.name.clone() }
+    };
+    joints.map(name).collect::<Vec<_>>().join(", ")
 }
 
 impl Angles {
@@ -103,16 +155,15 @@ impl Angles {
     pub(crate) fn pose_of(&self, robot: &Robot, option: &str) -> Result<JointArray, Failure> {
         let (got, joints) = (self.0.len(), robot.joints.len());
         if got != joints {
-            let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
             return Err(Failure::Usage(format!(
                 "{option} has {got} values, but robot `{}` has {joints} joints; give one angle (rad) for each of: {}",
                 robot.name,
-                names.join(", ")
+                wanted(robot.joints.iter())
             )));
         }
         let mut pose = [0.0; MAX_JOINTS];
-        for (slot, value) in pose.iter_mut().zip(&self.0) {
-            *slot = *value;
+        for ((slot, given), joint) in pose.iter_mut().zip(&self.0).zip(&robot.joints) {
+            *slot = given.of(joint, option)?;
         }
         Ok(pose)
     }
@@ -130,18 +181,17 @@ impl Angles {
         let Some(group) = group else { return self.pose_of(robot, option) };
         let (got, joints) = (self.0.len(), group.joints.len());
         if got != joints {
-            let names = group.joints.iter().filter_map(|joint| robot.joints.get(*joint));
-            let names: Vec<&str> = names.map(|joint| joint.name.as_str()).collect();
+            let members = group.joints.iter().filter_map(|joint| robot.joints.get(*joint));
             return Err(Failure::Usage(format!(
                 "{option} has {got} values, but group `{}` has {joints} joints; give one angle (rad) for each of: {}",
                 group.name,
-                names.join(", ")
+                wanted(members)
             )));
         }
         let mut pose = *others_rad;
-        for (joint, value) in group.joints.iter().zip(&self.0) {
-            if let Some(slot) = pose.get_mut(*joint) {
-                *slot = *value;
+        for (index, given) in group.joints.iter().zip(&self.0) {
+            if let (Some(slot), Some(joint)) = (pose.get_mut(*index), robot.joints.get(*index)) {
+                *slot = given.of(joint, option)?;
             }
         }
         Ok(pose)
@@ -153,13 +203,18 @@ impl Angles {
         let is_in = |joint: usize| group.is_none_or(|group| group.joints.contains(&joint));
         let joints =
             robot.joints.iter().enumerate().filter(|(joint, _)| is_in(*joint)).map(|(_, joint)| joint);
-        let suspicious = self.0.iter().zip(joints).find(|(value, joint)| {
+        let mut plain = self.0.iter().zip(joints).filter_map(|(given, joint)| match given {
+            Given::Plain { angle_rad, .. } | Given::Angle(angle_rad) if !joint.kind.is_prismatic() => {
+                Some((*angle_rad, joint))
+            }
+            Given::Plain { .. } | Given::Angle(_) | Given::Length(_) => None,
+        });
+        let (degrees, _) = plain.find(|(value, joint)| {
             let [low, high] = joint.limits.position_rad;
-            let outside = **value < low || **value > high;
-            let as_degrees = **value * PI / 180.0;
+            let outside = *value < low || *value > high;
+            let as_degrees = *value * PI / 180.0;
             outside && value.abs() > TAU && (low..=high).contains(&as_degrees)
         })?;
-        let degrees = suspicious.0;
         Some(format!(
             "angles are in rad, and {degrees} looks like degrees: {degrees} deg = {:.4} rad",
             degrees * PI / 180.0
@@ -280,18 +335,52 @@ impl FromStr for Times {
 mod tests {
     use super::*;
 
+    fn in_rad(angles: Result<Angles, AnglesError>) -> Vec<f64> {
+        let value = |given: &Given| match given {
+            Given::Plain { angle_rad, .. } | Given::Angle(angle_rad) => *angle_rad,
+            Given::Length(_) => f64::NAN,
+        };
+        angles.map(|angles| angles.0.iter().map(value).collect()).unwrap_or_default()
+    }
+
     #[test]
     fn angles_parse_one_value_a_joint() {
-        assert_eq!("0, -1.5,2e-3".parse::<Angles>(), Ok(Angles(vec![0.0, -1.5, 0.002])));
+        assert_eq!(in_rad("0, -1.5,2e-3".parse()), [0.0, -1.5, 0.002]);
+    }
+
+    #[test]
+    fn positions_of_prismatic_joints_are_metres_whatever_the_option_says() {
+        let text = "name = \"r\"\n[[joint]]\nname = \"lift\"\nkind = \"prismatic\"\nlink_radius_m = 0.0\nposition_m = [0, 1]\n\
+            dh = { a_m = 0.0, alpha_rad = 0.0, d_m = 0.0, theta_offset_rad = 0.0 }\n\
+            motion = { velocity_m_s = 1.0, acceleration_m_s2 = 2.0, jerk_m_s3 = 20.0 }\n\
+            [[joint]]\nname = \"arm\"\nlink_radius_m = 0.0\nposition_rad = [-3, 3]\n\
+            dh = { a_m = 0.5, alpha_rad = 0.0, d_m = 0.0, theta_offset_rad = 0.0 }\n\
+            motion = { velocity_rad_s = 1.0, acceleration_rad_s2 = 2.0, jerk_rad_s3 = 20.0 }\n";
+        let robot = Robot::from_toml(std::path::Path::new("r.toml"), text).unwrap();
+        let pose = |angles: Angles| angles.pose_of(&robot, "--goal").map(|pose| [pose[0], pose[1]]);
+        for (text, expected) in
+            [("0.25,90", [0.25, PI / 2.0]), ("0.25m,1rad", [0.25, 1.0]), ("250 mm,-90deg", [0.25, -PI / 2.0])]
+        {
+            let got = pose(Angles::of_degrees(text).unwrap()).unwrap();
+            assert!(
+                (got[0] - expected[0]).abs() < 1e-12 && (got[1] - expected[1]).abs() < 1e-12,
+                "{text}: {got:?}"
+            );
+        }
+        for (text, words) in [
+            ("10deg,0", "joint lift, which is prismatic"),
+            ("0,0.1m", "joint arm, which is revolute"),
+            ("0", "lift (m), arm"),
+        ] {
+            let refused = pose(text.parse().unwrap()).unwrap_err().to_string();
+            assert!(refused.contains(words), "{text}: {refused}");
+        }
     }
 
     #[test]
     fn angles_with_a_unit_are_taken_by_it_and_others_by_the_option() {
-        assert_eq!(
-            "90deg,1, -180 deg,0.5rad,45\u{b0}".parse::<Angles>(),
-            Ok(Angles(vec![PI / 2.0, 1.0, -PI, 0.5, PI / 4.0]))
-        );
-        assert_eq!(Angles::of_degrees("90,1rad,-180deg"), Ok(Angles(vec![PI / 2.0, 1.0, -PI])));
+        assert_eq!(in_rad("90deg,1, -180 deg,0.5rad,45\u{b0}".parse()), [PI / 2.0, 1.0, -PI, 0.5, PI / 4.0]);
+        assert_eq!(in_rad(Angles::of_degrees("90,1rad,-180deg")), [PI / 2.0, 1.0, -PI]);
         assert!(Angles::of_degrees("x").is_err());
     }
 

@@ -6,6 +6,7 @@ use std::{env, fs};
 use taustream_arm::{Kind, PathFile, Robot, Scene, Settings, TrajectoryFile, shipped};
 use taustream_messages::Report;
 use taustream_messages::service::is_arm_name;
+use taustream_motion::JointKind;
 use taustream_streamer::names::{AxisName, BusName, Names, ServoName};
 
 /// Where a controller keeps the settings of its one arm.
@@ -22,6 +23,8 @@ pub(crate) struct ArmName {
     pub(crate) name: String,
     /// Names of the joints, base to tip; empty when the robot file could not be read.
     pub(crate) joints: Vec<String>,
+    /// Which joints slide; those beyond the list turn.
+    pub(crate) kinds: Vec<JointKind>,
     /// The axes beside the path; empty when the settings could not be read.
     pub(crate) axes: Vec<AxisName>,
     /// Names of the buses; empty when the settings could not be read.
@@ -40,8 +43,8 @@ impl ArmName {
 
     /// The names, for sentences about joints and buses.
     pub(crate) fn names(&self) -> Names {
-        let Self { joints, axes, buses, servos, .. } = self.clone();
-        Names { joints, axes, buses, servos, ..Names::default() }
+        let Self { joints, kinds, axes, buses, servos, .. } = self.clone();
+        Names { joints, kinds, axes, buses, servos, ..Names::default() }
     }
 
     /// The names where the buses are those of this report: local links have no cable to look at.
@@ -51,9 +54,9 @@ impl ArmName {
 
     /// The arm of settings that were read as a whole.
     pub(crate) fn of(settings: &Settings) -> Self {
-        let Names { joints, axes, buses, servos, .. } = Names::of(settings);
+        let Names { joints, kinds, axes, buses, servos, .. } = Names::of(settings);
         let unmodelled_links = settings.robot.unmodelled_links.clone();
-        Self { name: settings.name.clone(), joints, axes, buses, servos, unmodelled_links }
+        Self { name: settings.name.clone(), joints, kinds, axes, buses, servos, unmodelled_links }
     }
 
     /// The arm that settings name. A fault elsewhere in them must not keep anybody from stopping the arm: the name

@@ -64,6 +64,7 @@ fn kinds() -> Vec<Kind> {
                     &[("name = ", &format!("{payload}name = ")), ("[[joint]]", &format!("{pose}[[joint]]"))],
                 ),
                 shipped("config/robots/piper.toml", &[]),
+                shipped("config/robots/ur5-lift.toml", &[]),
                 shipped("tests/robots/nasty.toml", &[]),
                 shipped("tests/robots/two_arms.toml", &[]),
             ],

@@ -2,6 +2,7 @@
 //!
 //! A refusal that reads "3.1416 is outside [-3.1416, 3.1416]" tells nothing. Every message that puts a value beside its
 //! limit goes through here.
+use crate::JointKind;
 use core::fmt;
 
 /// Decimals beyond which a number is written in full.
@@ -68,9 +69,11 @@ impl fmt::Display for Amount {
     }
 }
 
-/// An angle that lies outside a range, with the range: "3.2500 rad is 0.1084 rad outside [-3.1416, 3.1416]".
+/// A position that lies outside a range, with the range: "3.2500 rad is 0.1084 rad outside [-3.1416, 3.1416]".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsideRange {
+    /// Of the joint: rad, or m.
+    pub kind: JointKind,
     /// The angle.
     pub position_rad: f64,
     /// Lowest and highest angle.
@@ -79,12 +82,13 @@ pub struct OutsideRange {
 
 impl fmt::Display for OutsideRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { position_rad, range_rad: [low_rad, high_rad] } = *self;
+        let Self { kind, position_rad, range_rad: [low_rad, high_rad] } = *self;
+        let unit = kind.unit();
         let decimals = Decimals::apart(&[position_rad, low_rad, high_rad], 4);
         let by_rad = (low_rad - position_rad).max(position_rad - high_rad);
         let (position, low, high) =
             (decimals.show(position_rad), decimals.show(low_rad), decimals.show(high_rad));
-        write!(f, "{position} rad is {} rad outside [{low}, {high}]", Amount(by_rad))
+        write!(f, "{position} {unit} is {} {unit} outside [{low}, {high}]", Amount(by_rad))
     }
 }
 
@@ -126,8 +130,10 @@ mod tests {
 
     #[test]
     fn angle_outside_its_range_shows_that_it_is() {
-        let outside =
-            |position_rad| format!("{}", OutsideRange { position_rad, range_rad: [-3.1416, 3.1416] });
+        let outside = |position_rad| {
+            let kind = JointKind::Revolute;
+            format!("{}", OutsideRange { kind, position_rad, range_rad: [-3.1416, 3.1416] })
+        };
         assert_eq!(outside(3.25), "3.2500 rad is 0.1084 rad outside [-3.1416, 3.1416]");
         assert_eq!(outside(-3.141_606), "-3.141606 rad is 6.0e-6 rad outside [-3.141600, 3.141600]");
         assert_eq!(

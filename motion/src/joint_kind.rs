@@ -44,12 +44,28 @@ impl JointKind {
             (Self::Prismatic, _) => "m/s^3",
         }
     }
+    /// The keys of its velocity, acceleration and jerk in files and reports.
+    #[must_use]
+    pub const fn rate_keys(self) -> [&'static str; 3] {
+        match self {
+            Self::Revolute => ["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"],
+            Self::Prismatic => ["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"],
+        }
+    }
     /// The unit of what its drive gives.
     #[must_use]
     pub const fn force_unit(self) -> &'static str {
         match self {
             Self::Revolute => "Nm",
             Self::Prismatic => "N",
+        }
+    }
+    /// The key of the greatest torque or force in files.
+    #[must_use]
+    pub const fn force_key(self) -> &'static str {
+        match self {
+            Self::Revolute => "torque_nm_max",
+            Self::Prismatic => "force_n_max",
         }
     }
     /// True for a joint that slides.

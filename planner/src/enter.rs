@@ -22,7 +22,7 @@ impl Entry {
         for (position_rad, joint) in pose_rad.iter_mut().zip(&robot.joints) {
             if !joint.limits.is_inside(*position_rad) {
                 let by_rad = joint.limits.outside_rad(*position_rad).abs();
-                outside.push(format!("{} by {} rad", joint.name, Amount(by_rad)));
+                outside.push(format!("{} by {} {}", joint.name, Amount(by_rad), joint.kind.unit()));
                 *position_rad = joint.limits.nearest_inside(*position_rad);
             }
         }

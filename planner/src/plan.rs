@@ -15,7 +15,7 @@ use taustream_arm::{NoMasses, Robot, Scene};
 use taustream_messages::way_points::Blend;
 use taustream_motion::digits::{Amount, OutsideRange};
 use taustream_motion::range::INSIDE_RAD;
-use taustream_motion::{JointArray, LimitSet, MAX_STROKES, Trajectory};
+use taustream_motion::{JointArray, JointKind, LimitSet, MAX_STROKES, Trajectory};
 use taustream_optimizers::Reading;
 
 /// What [`Plan::how`] says when the clock cut the work short, so that one seed may give another answer.
@@ -108,7 +108,7 @@ impl Plan {
     }
 }
 
-/// Length of a motion's path in joint space from an instant on, rad: the sum of the norms of the differences of all joints, by dense samples.
+/// Length of a motion's path in joint space from an instant on, rad, where a metre of a prismatic joint counts as a radian: the sum of the norms of the differences of all joints, by dense samples.
 #[must_use]
 pub fn path_length_rad(trajectory: &Trajectory, from_s: f64) -> f64 {
     const SAMPLES: u32 = 2_000;
@@ -165,7 +165,7 @@ pub enum PlanError {
     #[error(
         "{which} outside limits: joint {} ({name}) at {}; {}",
         joint + 1,
-        OutsideRange { position_rad: *value_rad, range_rad: *range_rad },
+        OutsideRange { kind: *kind, position_rad: *value_rad, range_rad: *range_rad },
         match which {
             PoseOf::Start => "choose a start inside, or lead an arm that stands there back with `taustream recover`",
             PoseOf::Goal => "choose a goal inside",
@@ -179,6 +179,8 @@ pub enum PlanError {
         joint: usize,
         /// The joint's name.
         name: String,
+        /// Rad, or m.
+        kind: JointKind,
         /// The value that was given.
         value_rad: f64,
         /// How far outside.
@@ -228,15 +230,18 @@ pub enum PlanError {
     },
     /// A joint would be on its way for longer than any motion may take.
     #[error(
-        "the motion would take at least {least_s:.0} s, and the longest is {LONGEST_S:.0} s: joint {} ({name}) has to go {} rad with \
-         velocity_rad_s = {}, acceleration_rad_s2 = {}, jerk_rad_s3 = {}; correct its motion limits or choose a nearer goal",
-        joint + 1, Amount(*by_rad), motion.velocity_rad_s, motion.acceleration_rad_s2, motion.jerk_rad_s3
+        "the motion would take at least {least_s:.0} s, and the longest is {LONGEST_S:.0} s: joint {} ({name}) has to go {} {} with \
+         {} = {}, {} = {}, {} = {}; correct its motion limits or choose a nearer goal",
+        joint + 1, Amount(*by_rad), kind.unit(), kind.rate_keys()[0], motion.velocity_rad_s, kind.rate_keys()[1],
+        motion.acceleration_rad_s2, kind.rate_keys()[2], motion.jerk_rad_s3
     )]
     TooSlow {
         /// Zero-based index of the joint.
         joint: usize,
         /// The joint's name.
         name: String,
+        /// Rad, or m.
+        kind: JointKind,
         /// How far it has to go.
         by_rad: f64,
         /// What it may do.
@@ -549,7 +554,8 @@ fn check_duration(task: &Task) -> Result<(), PlanError> {
             .max(2.0 * (by_rad / motion.acceleration_rad_s2).sqrt())
             .max((32.0 * by_rad / motion.jerk_rad_s3).cbrt());
         if by_rad > 0.0 && least_s > LONGEST_S {
-            return Err(PlanError::TooSlow { joint, name: described.name.clone(), by_rad, motion, least_s });
+            let (name, kind) = (described.name.clone(), described.kind);
+            return Err(PlanError::TooSlow { joint, name, kind, by_rad, motion, least_s });
         }
     }
     Ok(())
@@ -561,7 +567,7 @@ fn goal_words(task: &Task, asked_rad: &JointArray) -> Option<String> {
     let moved = joints.filter(|(_, (requested, goal))| (*requested - *goal).abs() > 2.0 * INSIDE_RAD);
     let words: Vec<String> = moved
         .map(|(joint, (requested, goal))| {
-            format!("{} by {} rad", joint.name, Amount((requested - goal).abs()))
+            format!("{} by {} {}", joint.name, Amount((requested - goal).abs()), joint.kind.unit())
         })
         .collect();
     (!words.is_empty()).then(|| format!("goal taken at the limit: {}", words.join(", ")))
@@ -597,7 +603,8 @@ pub fn check_pose(robot: &Robot, which: PoseOf, pose_rad: &JointArray) -> Result
         if !limits.is_inside(value_rad) {
             let (name, range_rad) = (described.name.clone(), limits.position_rad);
             let by_rad = limits.outside_rad(value_rad).abs();
-            return Err(PlanError::OutsideLimits { which, joint, name, value_rad, by_rad, range_rad });
+            let kind = described.kind;
+            return Err(PlanError::OutsideLimits { which, joint, name, kind, value_rad, by_rad, range_rad });
         }
     }
     Ok(())

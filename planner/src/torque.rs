@@ -5,7 +5,7 @@
 use taustream_arm::Robot;
 use taustream_motion::dynamics::Dynamics;
 use taustream_motion::trajectory::Cursor;
-use taustream_motion::{JointArray, Trajectory};
+use taustream_motion::{JointArray, JointKind, Trajectory};
 
 /// Instants a second of a proof, and of a plan, which keeps [`PLANNED_SHARE`] for what lies between them.
 const PROVEN_HZ: f64 = 1_000.0;
@@ -29,21 +29,25 @@ pub struct PeakTorque {
 /// A joint that would have to bear more than it can.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "joint {} ({name}) needs {torque_nm:.1} Nm at t = {at_s:.3} s, {:.1} Nm more than its {limit_nm:.1} Nm (torque_nm_max, or effort in \
-     the URDF); standing still there takes {holding_nm:.1} Nm: {}",
+    "joint {} ({name}) needs {torque_nm:.1} {unit} at t = {at_s:.3} s, {:.1} {unit} more than its {limit_nm:.1} {unit} ({}, or effort in \
+     the URDF); standing still there takes {holding_nm:.1} {unit}: {}",
     joint + 1,
     (torque_nm - limit_nm).max(0.0),
+    kind.force_key(),
     if *slower_helps {
         "move slower"
     } else {
         "no speed helps; keep away from that pose, carry less, or correct the file"
-    }
+    },
+    unit = kind.force_unit()
 )]
 pub struct Overload {
     /// Zero-based index of the joint.
     pub joint: usize,
     /// Its name.
     pub name: String,
+    /// Torques below are in Nm, or forces in N.
+    pub kind: JointKind,
     /// When the torque is greatest.
     pub at_s: f64,
     /// The torque then, without its sign.
@@ -188,7 +192,11 @@ impl<'a> TorqueLimits<'a> {
             let name = self.robot.joints.get(joint)?.name.clone();
             let (torque_nm, holding_nm) = (torque.abs(), held.abs());
             let slower_helps = factor.is_finite();
-            Some((Overload { joint, name, at_s, torque_nm, limit_nm, holding_nm, slower_helps }, factor))
+            let kind = self.robot.kind(joint);
+            Some((
+                Overload { joint, name, kind, at_s, torque_nm, limit_nm, holding_nm, slower_helps },
+                factor,
+            ))
         };
         beyond.into_iter().filter_map(overload).collect()
     }

@@ -165,12 +165,12 @@ impl AnswerReason {
             Self::EnablingOutside { joint, position_rad, range_rad, percent } => format!(
                 "drives are being energised at the measured pose; {} at {}: only motions that lead it inwards are accepted, at {percent} % speed (`taustream recover`)",
                 names.joint(joint),
-                OutsideRange { position_rad, range_rad }
+                OutsideRange { kind: names.kind(joint), position_rad, range_rad }
             ),
             Self::ReferenceOutside { joint, at_rad, range_rad } => format!(
                 "{} cannot be there: {}, and at most {OUTSIDE_RAD_MAX} rad is plausible; measure again",
                 names.joint(joint),
-                OutsideRange { position_rad: at_rad, range_rad }
+                OutsideRange { kind: names.kind(joint), position_rad: at_rad, range_rad }
             ),
             Self::ReferenceFar { joint, at_rad, nearest_rad, limit_rad } => {
                 let by_rad = (nearest_rad - at_rad).abs();

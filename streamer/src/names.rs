@@ -7,6 +7,7 @@ use taustream_drivers::ErrorFrame;
 use taustream_drivers::bring_up::Refusal;
 use taustream_drivers::words::{explain_on, explain_refusal_on, explain_status};
 use taustream_messages::{BusFault, BusReport, Cause, Evidence};
+use taustream_motion::JointKind;
 use taustream_motion::digits::Decimals;
 
 /// A bus as its settings name it.
@@ -45,6 +46,8 @@ pub struct AxisName {
 pub struct Names {
     /// The joints, base to tip.
     pub joints: Vec<String>,
+    /// Which of them slide; those beyond the list turn.
+    pub kinds: Vec<JointKind>,
     /// The axes beside the path.
     pub axes: Vec<AxisName>,
     /// The buses.
@@ -71,6 +74,7 @@ impl Names {
         };
         Self {
             joints: settings.robot.joints.iter().map(|j| j.name.clone()).collect(),
+            kinds: settings.robot.joints.iter().map(|j| j.kind).collect(),
             axes: settings
                 .axes
                 .iter()
@@ -80,6 +84,12 @@ impl Names {
             servos: settings.servos.iter().map(servo).collect(),
             directories: Directories::default(),
         }
+    }
+
+    /// How a joint moves, and with that the unit of its numbers.
+    #[must_use]
+    pub fn kind(&self, joint: usize) -> JointKind {
+        self.kinds.get(joint).copied().unwrap_or_default()
     }
 
     /// The same names where these buses are local links: nobody is sent to look at a cable.

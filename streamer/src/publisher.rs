@@ -28,6 +28,7 @@ use taustream_messages::service::{
 };
 use taustream_messages::trajectory::is_newer;
 use taustream_messages::{Outcome, Receipt, Rejection, Report};
+use taustream_motion::{JointKind, MAX_JOINTS};
 use tracing::{error, info, warn};
 
 /// How often ports and queues are looked at.
@@ -72,6 +73,7 @@ pub struct Publisher {
     candidates: Option<Sender<Candidate>>,
     names: Names,
     robot: String,
+    kinds: [JointKind; MAX_JOINTS],
     digest_hex: String,
     checker: Checker,
     lateness: Histogram<u64>,
@@ -122,6 +124,7 @@ impl Publisher {
             candidates,
             names,
             robot: settings.robot.name.clone(),
+            kinds: settings.robot.kinds(),
             digest_hex: settings.robot.digest_hex(),
             checker: Checker::start(&settings.robot)?,
             lateness: histogram()?,
@@ -250,6 +253,7 @@ impl Publisher {
         let file = TrajectoryFile {
             robot: self.robot.clone(),
             digest: Some(self.digest_hex.clone()),
+            kinds: self.kinds,
             trajectory: checked.trajectory.clone(),
         };
         let (trajectory_id, generation) = (checked.trajectory_id, checked.generation);

@@ -239,7 +239,12 @@ mod tests {
         let stroke = Stroke { delta_rad: joint_array([0.7, 0.1, 0.2, 0.3, 0.4, 0.5]), ..stroke };
         let trajectory = Trajectory::new(6, base_rad, &[stroke]).unwrap();
         let digest = Some(settings.robot.digest_hex());
-        let file = TrajectoryFile { robot: "ur5".into(), digest, trajectory: trajectory.clone() };
+        let file = TrajectoryFile {
+            robot: "ur5".into(),
+            digest,
+            kinds: Default::default(),
+            trajectory: trajectory.clone(),
+        };
         sender.send(Candidate { trajectory_id: 7, generation: 3, file }).unwrap();
         let start_offset_rad = [0.0; MAX_JOINTS];
         let cut = Some(CutRecord { trajectory_id: 6, at_s: 0.1 + 0.2, from_s: 0.25 });

@@ -6,9 +6,12 @@
 Compared are the torques of all joints for angles, speeds and accelerations. Then the comparison itself is tried: the same
 arm with one number changed a little must not agree.
 
+Of prismatic joints, positions are in m and what is compared are forces in N.
+
 The arms: the nasty one of tests/robots with a made-up mass in every link, links on joints that are held included; its UR5 of
 balls as it stands; and the shipped UR5, whose Denavit-Hartenberg rows are built joint by joint, with made-up moments of
-inertia, a payload and a base on a slope.
+inertia, a payload and a base on a slope; the same on its lift; and a gantry whose prismatic joints stand before and behind revolute
+ones.
 """
 import math
 import re
@@ -100,7 +103,9 @@ def of_rows(robot_file):
         for joint in robot["joint"]:
             row = joint["dh"]
             turn = pinocchio.SE3(pinocchio.utils.rotate("z", row["theta_offset_rad"]), numpy.zeros(3))
-            parent = model.addJoint(parent, pinocchio.JointModelRZ(), behind, joint["name"])
+            kind = pinocchio.JointModelPZ() if joint.get("kind") == "prismatic" else pinocchio.JointModelRZ()
+            # Turns about z and shifts along it may change places.
+            parent = model.addJoint(parent, kind, behind, joint["name"])
             shift = pinocchio.SE3(numpy.eye(3), numpy.array([row["a_m"], 0.0, row["d_m"]]))
             behind = turn * shift * pinocchio.SE3(pinocchio.utils.rotate("x", row["alpha_rad"]), numpy.zeros(3))
             body = inertia_of(joint["link_mass_kg"], joint["link_center_m"], joint["link_inertia_kg_m2"])
@@ -142,8 +147,8 @@ def weighed(text, random):
     return re.sub(r'<link name="(?!world)(\w+)"\s*(/?)>', massive, text)
 
 
-def heavy_ur5(shipped, scratch):
-    """The shipped UR5 with moments of inertia, a payload and a base on a slope."""
+def heavy_rows(shipped, scratch):
+    """A shipped arm of rows with moments of inertia, a payload and a base on a slope."""
     random = numpy.random.default_rng(7)
 
     def moments():
@@ -154,7 +159,7 @@ def heavy_ur5(shipped, scratch):
     text = re.sub("link_mass_kg", lambda _: f"link_inertia_kg_m2 = {moments()}\nlink_mass_kg", text)
     payload = f"[payload]\nmass_kg = 1.7\ncenter_m = [0.03, -0.02, 0.11]\ninertia_kg_m2 = {moments()}\n"
     text = text.replace("[[joint]]", payload + "[[joint]]", 1)
-    path = Path(scratch) / "ur5.toml"
+    path = Path(scratch) / Path(shipped).name
     path.write_text(f"gravity_m_s2 = {SLOPE}\n{text}")
     return path
 
@@ -179,8 +184,11 @@ def main():
         balls.write_text(plain((robots / "ur5_balls.urdf").read_text()))
         fingers = {"left_finger_slide": 0.0, "right_finger_slide": 0.0}
         good.append(agrees(program, "ur5_balls", robots / "ur5_balls.toml", of_urdf(balls, "base_link", fingers)))
-        ur5 = heavy_ur5(root / "config/robots/ur5.toml", scratch)
+        ur5 = heavy_rows(root / "config/robots/ur5.toml", scratch)
         good.append(agrees(program, "ur5", ur5, of_rows(ur5)))
+        lift = heavy_rows(root / "config/robots/ur5-lift.toml", scratch)
+        good.append(agrees(program, "ur5-lift", lift, of_rows(lift)))
+        good.append(agrees(program, "gantry", robots / "gantry.toml", of_urdf(robots / "gantry.urdf", "rail", {})))
         # The check must be able to fail: a gram, a hundredth of a millimetre, a part in a thousand of a moment.
         for old, new in [("mass_kg = 1.7", "mass_kg = 1.701"), ("0.11]", "0.11001]"), ("= 2.33", "= 2.331")]:
             text = ur5.read_text()

@@ -28,9 +28,10 @@ pub(crate) const KEYS: [&str; 6] = ["urdf", "srdf", "tip_link", "tip_links", "ba
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointInfo {
     pub(crate) name: String,
-    /// Range; none for continuous joints, and where the file states none.
+    pub(crate) kind: JointKind,
+    /// Range (rad, or m); none for continuous joints, and where the file states none.
     pub(crate) position_rad: Option<[f64; 2]>,
-    /// In rad and s.
+    /// In rad, or m, and s.
     pub(crate) limits: StatedLimits,
 }
 
@@ -134,6 +135,7 @@ impl UrdfArm {
     pub(crate) fn joints(&self) -> Vec<JointInfo> {
         let joint_info = |joint: &Joint| JointInfo {
             name: joint.name.clone(),
+            kind: moving_kind(joint),
             position_rad: if joint.kind == Kind::Continuous { None } else { joint.position },
             limits: joint.limits,
         };
@@ -220,7 +222,7 @@ impl UrdfArm {
             let pre = origins(tip.map_or(Pose::identity(), |tip| tip.inverse()), &path);
             let axis = Unit::new_normalize(Vector3::from(of.axis));
             let post = posts.get(index).copied().flatten().unwrap_or_default();
-            let kind = JointKind::Revolute;
+            let kind = moving_kind(of);
             Some((ChainJoint { kind, pre, axis, offset: 0.0, post }, parent.map_or(0, |parent| parent + 1)))
         };
         self.moving.iter().enumerate().filter_map(chain_joint).collect()
@@ -489,7 +491,17 @@ fn path(
     path
 }
 
-/// The joints of the arm, revolute or continuous ones, each free, in the order of the paths to the tips.
+/// How a joint of the arm moves.
+fn moving_kind(joint: &Joint) -> JointKind {
+    match joint.kind {
+        Kind::Prismatic => JointKind::Prismatic,
+        Kind::Fixed | Kind::Revolute | Kind::Continuous | Kind::Planar | Kind::Floating => {
+            JointKind::Revolute
+        }
+    }
+}
+
+/// The joints of the arm, revolute, continuous or prismatic ones, each free, in the order of the paths to the tips.
 fn moving(top: &Table<'_>, model: &Model, (key, paths): (&'static str, &[Vec<usize>])) -> Option<Vec<usize>> {
     let (mut moving, mut seen) = (Vec::new(), Vec::new());
     for (index, joint) in paths.iter().flatten().filter_map(|index| Some((*index, model.joints.get(*index)?)))
@@ -502,13 +514,13 @@ fn moving(top: &Table<'_>, model: &Model, (key, paths): (&'static str, &[Vec<usi
         let value = format!("joint {} ({}) between base and tip", shown(&joint.name), joint.kind.word());
         match (joint.kind, &joint.mimic) {
             (Kind::Fixed, _) => {}
-            (Kind::Revolute | Kind::Continuous, None) => moving.push(index),
-            (Kind::Revolute | Kind::Continuous, Some(mimic)) => {
+            (Kind::Revolute | Kind::Continuous | Kind::Prismatic, None) => moving.push(index),
+            (Kind::Revolute | Kind::Continuous | Kind::Prismatic, Some(mimic)) => {
                 let expected = "joints that each have a servo of their own; linkages are not supported";
                 top.fault(key, &format!("{value}, which follows joint {}", shown(&mimic.joint)), expected);
             }
-            (Kind::Prismatic | Kind::Planar | Kind::Floating, _) => {
-                let expected = "revolute, continuous and fixed joints only: angles, limits and servos are in radians here";
+            (Kind::Planar | Kind::Floating, _) => {
+                let expected = "revolute, continuous, prismatic and fixed joints only: each has one servo";
                 top.fault(key, &value, expected);
             }
         }

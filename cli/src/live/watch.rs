@@ -29,7 +29,7 @@ const LINE_HZ: f64 = 1.0;
 /// Where reports go.
 enum Sink {
     /// A terminal.
-    Picture(Screen, Picture),
+    Picture(Screen, Box<Picture>),
     /// A log for people.
     Lines,
     /// One JSON object a report.
@@ -99,7 +99,7 @@ impl Watch {
             Form::Json => (Sink::Json, f64::INFINITY),
             Form::Text if is_terminal() => {
                 let screen = Screen::whole().map_err(closed)?;
-                (Sink::Picture(screen, Picture::new(arm.clone(), scale)), PICTURE_HZ)
+                (Sink::Picture(screen, Box::new(Picture::new(arm.clone(), scale))), PICTURE_HZ)
             }
             Form::Text => (Sink::Lines, LINE_HZ),
         };

@@ -3,7 +3,8 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt;
 use taustream_arm::text::counted;
-use taustream_arm::{Group, Robot, Shape};
+use taustream_arm::{Group, Robot, RobotJoint, Shape};
+use taustream_motion::JointKind;
 use taustream_motion::stopping::StopRules;
 use taustream_planner::torque::TorqueLimits;
 
@@ -11,14 +12,100 @@ use taustream_planner::torque::TorqueLimits;
 #[derive(Debug, Serialize)]
 struct JointLine {
     name: String,
-    position_rad: [f64; 2],
-    velocity_rad_s: f64,
-    acceleration_rad_s2: f64,
-    jerk_rad_s3: f64,
-    stop_acceleration_rad_s2: f64,
-    stop_jerk_rad_s3: f64,
-    /// Of the file, or the effort of the URDF; null when neither states one.
-    torque_nm_max: Option<f64>,
+    /// "revolute" or "prismatic".
+    kind: &'static str,
+    #[serde(flatten)]
+    limits: LimitsLine,
+}
+
+/// Limits in the unit of the joint. Torque or force: of the file, or the effort of the URDF; null when neither states one.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum LimitsLine {
+    Revolute {
+        position_rad: [f64; 2],
+        velocity_rad_s: f64,
+        acceleration_rad_s2: f64,
+        jerk_rad_s3: f64,
+        stop_acceleration_rad_s2: f64,
+        stop_jerk_rad_s3: f64,
+        torque_nm_max: Option<f64>,
+    },
+    Prismatic {
+        position_m: [f64; 2],
+        velocity_m_s: f64,
+        acceleration_m_s2: f64,
+        jerk_m_s3: f64,
+        stop_acceleration_m_s2: f64,
+        stop_jerk_m_s3: f64,
+        force_n_max: Option<f64>,
+    },
+}
+
+impl JointLine {
+    fn of(joint: &RobotJoint) -> Self {
+        let (position, motion, stop) = (joint.limits.position_rad, joint.limits.motion, joint.limits.stop);
+        let limits = match joint.kind {
+            JointKind::Revolute => LimitsLine::Revolute {
+                position_rad: position,
+                velocity_rad_s: motion.velocity_rad_s,
+                acceleration_rad_s2: motion.acceleration_rad_s2,
+                jerk_rad_s3: motion.jerk_rad_s3,
+                stop_acceleration_rad_s2: stop.acceleration_rad_s2,
+                stop_jerk_rad_s3: stop.jerk_rad_s3,
+                torque_nm_max: joint.torque_nm_max,
+            },
+            JointKind::Prismatic => LimitsLine::Prismatic {
+                position_m: position,
+                velocity_m_s: motion.velocity_rad_s,
+                acceleration_m_s2: motion.acceleration_rad_s2,
+                jerk_m_s3: motion.jerk_rad_s3,
+                stop_acceleration_m_s2: stop.acceleration_rad_s2,
+                stop_jerk_m_s3: stop.jerk_rad_s3,
+                force_n_max: joint.torque_nm_max,
+            },
+        };
+        Self { name: joint.name.clone(), kind: joint.kind.word(), limits }
+    }
+    /// The greatest torque or force with its unit.
+    fn force(&self) -> Option<String> {
+        match self.limits {
+            LimitsLine::Revolute { torque_nm_max, .. } => torque_nm_max.map(|nm| format!("{nm} Nm")),
+            LimitsLine::Prismatic { force_n_max, .. } => force_n_max.map(|n| format!("{n} N")),
+        }
+    }
+}
+
+impl fmt::Display for JointLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = &self.name;
+        match self.limits {
+            LimitsLine::Revolute {
+                position_rad: [low, high],
+                velocity_rad_s: v,
+                acceleration_rad_s2: a,
+                jerk_rad_s3: j,
+                stop_acceleration_rad_s2,
+                stop_jerk_rad_s3,
+                torque_nm_max: _,
+            } => write!(
+                f,
+                "  {name:<18} {low:>8.4} .. {high:>8.4} {v:>8} rad/s {a:>8} rad/s2 {j:>8} rad/s3; {stop_acceleration_rad_s2}, {stop_jerk_rad_s3}"
+            ),
+            LimitsLine::Prismatic {
+                position_m: [low, high],
+                velocity_m_s: v,
+                acceleration_m_s2: a,
+                jerk_m_s3: j,
+                stop_acceleration_m_s2,
+                stop_jerk_m_s3,
+                force_n_max: _,
+            } => write!(
+                f,
+                "  {name:<18} {low:>8.4} .. {high:>8.4} {v:>8} m/s   {a:>8} m/s2   {j:>8} m/s3;   {stop_acceleration_m_s2}, {stop_jerk_m_s3} (prismatic: all in m)"
+            ),
+        }
+    }
 }
 
 /// A pair of links with a margin of its own.
@@ -188,19 +275,7 @@ impl CheckedRobot {
     pub(super) fn of(robot: &Robot) -> Self {
         let link = |i: usize| robot.links.get(i).cloned().unwrap_or_else(|| format!("link{i}"));
         let names = |pairs: &[(usize, usize)]| pairs.iter().map(|(a, b)| [link(*a), link(*b)]).collect();
-        let joints = robot.joints.iter().map(|joint| {
-            let (motion, stop) = (joint.limits.motion, joint.limits.stop);
-            JointLine {
-                name: joint.name.clone(),
-                position_rad: joint.limits.position_rad,
-                velocity_rad_s: motion.velocity_rad_s,
-                acceleration_rad_s2: motion.acceleration_rad_s2,
-                jerk_rad_s3: motion.jerk_rad_s3,
-                stop_acceleration_rad_s2: stop.acceleration_rad_s2,
-                stop_jerk_rad_s3: stop.jerk_rad_s3,
-                torque_nm_max: joint.torque_nm_max,
-            }
-        });
+        let joints = robot.joints.iter().map(JointLine::of);
         Self {
             kind: "robot",
             name: robot.name.clone(),
@@ -257,17 +332,7 @@ impl fmt::Display for CheckedRobot {
             "  joint               position (rad)         velocity   acceleration  jerk; stop: acceleration, jerk"
         )?;
         for j in &self.joints {
-            let [low, high] = j.position_rad;
-            writeln!(
-                f,
-                "  {:<18} {low:>8.4} .. {high:>8.4} {:>8} rad/s {:>8} rad/s2 {:>8} rad/s3; {}, {}",
-                j.name,
-                j.velocity_rad_s,
-                j.acceleration_rad_s2,
-                j.jerk_rad_s3,
-                j.stop_acceleration_rad_s2,
-                j.stop_jerk_rad_s3
-            )?;
+            writeln!(f, "{j}")?;
         }
         self.geometry(f)?;
         contacts(
@@ -315,7 +380,7 @@ impl CheckedRobot {
 
     /// What the drives can bear, and whether motions are held to it.
     fn torques(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let stated = self.joints.iter().filter_map(|j| Some(format!("{} {} Nm", j.name, j.torque_nm_max?)));
+        let stated = self.joints.iter().filter_map(|j| Some(format!("{} {}", j.name, j.force()?)));
         let stated: Vec<String> = stated.collect();
         if !stated.is_empty() {
             writeln!(f, "  torques of the drives at most {}", stated.join(", "))?;

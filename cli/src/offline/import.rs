@@ -102,10 +102,20 @@ pub(crate) fn run(form: Form, args: &ImportArgs) -> Result<(), Failure> {
     let file = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
+        kinds: robot.kinds(),
         trajectory: imported.trajectory.clone(),
     };
     let summary = summarise(&robot, &imported, source, args);
     deliver(form, args.output.as_deref(), &file.to_json(), &summary)
+}
+
+/// Files of angles say nothing of metres.
+fn refuse_prismatic(robot: &Robot, file: &str) -> Result<(), Failure> {
+    let Some(joint) = robot.joints.iter().find(|joint| joint.kind.is_prismatic()) else { return Ok(()) };
+    Err(Failure::Usage(format!(
+        "{file} holds angles, and joint {} of robot `{}` is prismatic (m); give points by --via",
+        joint.name, robot.name
+    )))
 }
 
 fn from_table(
@@ -114,6 +124,7 @@ fn from_table(
     robot: &Robot,
     scene: &Scene,
 ) -> Result<(Imported, Source), Failure> {
+    refuse_prismatic(robot, "a table")?;
     let joints: Vec<String> = robot.joints.iter().map(|joint| joint.name.clone()).collect();
     let table = if path == Path::new("-") {
         MotionTable::read(Path::new("standard input"), io::stdin().lock(), &joints)?
@@ -135,6 +146,9 @@ fn from_table(
 }
 
 fn from_points(args: &ImportArgs, robot: &Robot, scene: &Scene) -> Result<(Imported, Source), Failure> {
+    if args.path.is_some() {
+        refuse_prismatic(robot, "a path file")?;
+    }
     let path = args.path.as_deref().map(arm::path).transpose()?;
     let points_rad: Vec<JointArray> = match &path {
         Some(path) => poses_of(robot, path).map_err(|e| refused(&e))?,

@@ -48,6 +48,9 @@ struct Summary {
     #[serde(flatten)]
     torques: Torques,
     goal_rad: Vec<f64>,
+    /// Units of `goal_rad`, one a joint; left out where all are rad.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    units: Vec<&'static str>,
     /// Where the tip was to go, when a position was requested.
     target_m: Option<[f64; 3]>,
     /// Upper bound of how far off it ends.
@@ -92,8 +95,9 @@ impl fmt::Display for Summary {
         let (duration_s, length_rad) = (self.duration_s, self.path_length_rad);
         writeln!(
             f,
-            "duration      {duration_s:.3} s, {}, {length_rad:.3} rad long",
-            counted(self.strokes, "stroke")
+            "duration      {duration_s:.3} s, {}, {length_rad:.3} {} long",
+            counted(self.strokes, "stroke"),
+            if self.units.is_empty() { "rad" } else { "rad and m" }
         )?;
         if let Some(energy_j) = self.energy_j {
             writeln!(f, "energy        {energy_j:.2} J of mechanical work, nothing recovered")?;
@@ -110,7 +114,9 @@ impl fmt::Display for Summary {
             let turned = self.orientation_error_rad.map(|rad| format!(", turned by {rad:.1e} rad"));
             let turned = turned.unwrap_or_default();
             writeln!(f, "position      {x}, {y}, {z} m, at most {error_m:.1e} m off{turned}, in the pose")?;
-            let angles: Vec<String> = self.goal_rad.iter().map(|q| format!("{q:.6}")).collect();
+            let unit = |joint: usize| if self.units.get(joint) == Some(&"m") { "m" } else { "" };
+            let goal = self.goal_rad.iter().enumerate();
+            let angles: Vec<String> = goal.map(|(joint, q)| format!("{q:.6}{}", unit(joint))).collect();
             writeln!(f, "              {} rad", angles.join(","))?;
         }
         if let (Some(line_m), Some(off_m)) = (self.line_m, self.line_off_m) {
@@ -181,6 +187,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
     let json = TrajectoryFile {
         robot: robot.name.clone(),
         digest: Some(robot.digest_hex()),
+        kinds: robot.kinds(),
         trajectory: found.plan.trajectory.clone(),
     }
     .to_json();
@@ -265,6 +272,14 @@ fn explain(error: &GoalError, args: &PlanArgs, robot: &Robot) -> Failure {
     })
 }
 
+/// The units of the joints of a robot with prismatic ones; none where all are rad.
+pub(crate) fn units(robot: &Robot) -> Vec<&'static str> {
+    if !robot.has_prismatic() {
+        return Vec::new();
+    }
+    robot.joints.iter().map(|joint| joint.kind.unit()).collect()
+}
+
 fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &PlanArgs) -> Summary {
     let goal_rad = found.trajectory.end_rad().iter().take(robot.joints.len()).copied().collect();
     let path_length_rad = found.path_length_rad();
@@ -298,6 +313,7 @@ fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &
         peak_use: peak_use(robot, &found.proof.peaks),
         torques: Torques::of(robot, &found.trajectory),
         goal_rad,
+        units: units(robot),
         target_m: tip.map(|(target, _)| target.position_m),
         position_error_m: tip.map(|(_, error)| error.position_m),
         target_quaternion_xyzw: tip

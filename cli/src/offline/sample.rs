@@ -6,8 +6,8 @@ use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use taustream_arm::TrajectoryFile;
 use taustream_arm::printable::printable_json;
-use taustream_motion::Setpoint;
 use taustream_motion::trajectory::Cursor;
+use taustream_motion::{JointKind, Setpoint};
 
 /// Highest rate; a bound against absurd arguments, far above any cycle.
 const RATE_HZ_MAX: f64 = 1e6;
@@ -59,11 +59,16 @@ fn write_table(
     let joints = trajectory.joints();
     let mut cursor = Cursor::at_start(trajectory);
     match form {
-        Form::Text => write_header(out, joints)?,
+        Form::Text => write_header(out, file.kinds.get(..joints).unwrap_or(&file.kinds))?,
         Form::Json => {
             let robot = serde_json::to_string(&file.robot)?;
             let robot = printable_json(&robot);
-            write!(out, "{{\"schema\":{SCHEMA},\"robot\":{robot},\"joints\":{joints},\"samples\":[")?;
+            write!(out, "{{\"schema\":{SCHEMA},\"robot\":{robot},\"joints\":{joints},")?;
+            if file.kinds.iter().any(|kind| kind.is_prismatic()) {
+                let units: Vec<&str> = file.kinds.iter().take(joints).map(|kind| kind.unit()).collect();
+                write!(out, "\"units\":{},", serde_json::to_string(&units)?)?;
+            }
+            write!(out, "\"samples\":[")?;
         }
     }
     for (i, t_s) in times.enumerate() {
@@ -79,11 +84,11 @@ fn write_table(
     if form == Form::Json { writeln!(out, "]}}") } else { Ok(()) }
 }
 
-fn write_header(out: &mut impl Write, joints: usize) -> io::Result<()> {
+fn write_header(out: &mut impl Write, kinds: &[JointKind]) -> io::Result<()> {
     out.write_all(b"t_s")?;
-    for (letter, unit) in [("q", "rad"), ("v", "rad_s"), ("a", "rad_s2"), ("j", "rad_s3")] {
-        for joint in 1..=joints {
-            write!(out, ",{letter}{joint}_{unit}")?;
+    for (letter, rate) in [("q", ""), ("v", "_s"), ("a", "_s2"), ("j", "_s3")] {
+        for (joint, kind) in kinds.iter().enumerate() {
+            write!(out, ",{letter}{}_{}{rate}", joint + 1, kind.unit())?;
         }
     }
     writeln!(out)
@@ -131,7 +136,7 @@ mod tests {
     #[test]
     fn table_header_names_every_column_with_its_unit() {
         let mut out = Vec::new();
-        write_header(&mut out, 2).unwrap();
+        write_header(&mut out, &[JointKind::Revolute; 2]).unwrap();
         let expected = "t_s,q1_rad,q2_rad,v1_rad_s,v2_rad_s,a1_rad_s2,a2_rad_s2,j1_rad_s3,j2_rad_s3\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);
     }

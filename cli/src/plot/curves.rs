@@ -1,10 +1,11 @@
 //! Motions of one joint over each other: position, velocity, acceleration and jerk beside their limits.
-use super::panel::{draw_panels, motion_limits, undrawable};
+use super::panel::{draw_panels, motion_limits, titles, undrawable};
 use crate::failure::Failure;
 use plotters::prelude::{IntoDrawingArea, IntoFont, SVGBackend, WHITE};
 use std::path::Path;
 use taustream_arm::RobotJoint;
 use taustream_claims::chart::{Area, Curve, Drawn, palette, thinned};
+use taustream_motion::JointKind;
 
 const SIZE_PX: (u32, u32) = (1200, 900);
 
@@ -56,6 +57,7 @@ fn draw(root: &Area<'_>, title: &str, motions: &[JointMotion], joint: &[RobotJoi
         order += 1;
         panel
     });
-    draw_panels(&body, &panels, &limits)?;
+    let kinds: Vec<JointKind> = joint.iter().map(|joint| joint.kind).collect();
+    draw_panels((&body, titles(&kinds)), &panels, &limits)?;
     Ok(root.present()?)
 }

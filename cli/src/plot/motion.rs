@@ -1,6 +1,6 @@
 //! A trajectory: position, velocity, acceleration and jerk of every joint, beside its limits where the robot is known,
 //! and the arm in three views.
-use super::panel::{JOINT_COLOURS, draw_panels, motion_limits, undrawable};
+use super::panel::{JOINT_COLOURS, draw_panels, motion_limits, titles, undrawable};
 use super::views::Stage;
 use crate::failure::Failure;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
@@ -58,7 +58,7 @@ fn draw(root: &Area<'_>, path: &Path, file: &TrajectoryFile, arm: Option<(&Robot
     };
     let robot = arm.map(|(robot, _)| robot);
     let joints = robot.map_or(&[][..], |robot| &robot.joints);
-    draw_panels(&curves_area, &curves(file, robot), &motion_limits(joints))?;
+    draw_panels((&curves_area, titles(&file.kinds)), &curves(file, robot), &motion_limits(joints))?;
     Ok(root.present()?)
 }
 
@@ -108,6 +108,7 @@ mod tests {
         TrajectoryFile {
             robot: "ur5".into(),
             digest: None,
+            kinds: Default::default(),
             trajectory: Trajectory::new(6, base_rad, strokes).unwrap(),
         }
     }

@@ -4,6 +4,7 @@ use plotters::prelude::RGBColor;
 use std::path::Path;
 use taustream_arm::RobotJoint;
 use taustream_claims::chart::{Area, COLOURS, Curve, Drawn, LimitLine, Panel, draw_panel};
+use taustream_motion::JointKind;
 
 /// One colour a joint.
 pub(super) const JOINT_COLOURS: [RGBColor; COLOURS.len()] = COLOURS;
@@ -19,10 +20,30 @@ pub(super) fn undrawable(file: &Path, why: &dyn std::error::Error) -> Failure {
     Failure::Failed(format!("{} cannot be drawn: {why}", file.display()))
 }
 
-/// The four panels below each other.
-pub(super) fn draw_panels(body: &Area<'_>, panels: &[Vec<Curve>; 4], limits: &[Vec<LimitLine>; 4]) -> Drawn {
+/// The titles for joints of these kinds.
+pub(super) fn titles(kinds: &[JointKind]) -> [&'static str; 4] {
+    const BOTH: [&str; 4] = [
+        "position (rad, or m)",
+        "velocity (rad/s, or m/s)",
+        "acceleration (rad/s^2, or m/s^2)",
+        "jerk (rad/s^3, or m/s^3)",
+    ];
+    const METRES: [&str; 4] = ["position (m)", "velocity (m/s)", "acceleration (m/s^2)", "jerk (m/s^3)"];
+    match kinds.iter().filter(|kind| kind.is_prismatic()).count() {
+        0 => PANELS,
+        sliding if sliding == kinds.len() => METRES,
+        _ => BOTH,
+    }
+}
+
+/// The four panels below each other, with their titles.
+pub(super) fn draw_panels(
+    (body, titles): (&Area<'_>, [&str; 4]),
+    panels: &[Vec<Curve>; 4],
+    limits: &[Vec<LimitLine>; 4],
+) -> Drawn {
     let areas = body.split_evenly((4, 1));
-    for ((area, name), (curves, limits)) in areas.iter().zip(PANELS).zip(panels.iter().zip(limits)) {
+    for ((area, name), (curves, limits)) in areas.iter().zip(titles).zip(panels.iter().zip(limits)) {
         let (curves, limits) = (curves.clone(), limits.clone());
         draw_panel(area, &Panel { curves, limits, ..Panel::new("time (s)", name) })?;
     }

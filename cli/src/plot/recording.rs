@@ -3,14 +3,14 @@
 //! Commanded derivatives are the streamer's own. Drives send positions only, so measured velocity and acceleration are those of a
 //! cubic fitted to the measured positions around each instant (Savitzky and Golay, Analytical Chemistry 36, 1964, for
 //! uneven times); the pictures say so. Text stays text: no font file is needed to draw, the viewer's sans-serif is used.
-use super::panel::{JOINT_COLOURS, PANELS, draw_panels, motion_limits, undrawable};
+use super::panel::{JOINT_COLOURS, PANELS, draw_panels, motion_limits, titles, undrawable};
 use crate::failure::Failure;
 use crate::output::write_whole;
 use plotters::prelude::{IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE};
 use std::path::{Path, PathBuf};
 use taustream_arm::RobotJoint;
 use taustream_claims::chart::{Area, Curve, Drawn, LimitLine, Point, thinned};
-use taustream_motion::{JointArray, Setpoint};
+use taustream_motion::{JointArray, JointKind, Setpoint};
 
 /// One instant of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,8 @@ pub(crate) fn write_all(
     let panels = PANELS.map(|_| Vec::new());
     let panels = add_overview(panels, joints, samples, &measured);
     let title = "All joints: commanded (thin, dark) over measured (wide, light)";
-    draw(&overview, title, &panels, &motion_limits(joints))?;
+    let kinds: Vec<JointKind> = joints.iter().map(|joint| joint.kind).collect();
+    draw((&overview, title), titles(&kinds), &panels, &motion_limits(joints))?;
     files.push(overview);
 
     for (j, joint) in joints.iter().enumerate() {
@@ -54,8 +55,8 @@ pub(crate) fn write_all(
         let title = format!("Joint {} {name}: commanded and measured", j + 1);
         let measured = measured.get(j).map_or(&[][..], Vec::as_slice);
         draw(
-            &file,
-            &title,
+            (&file, &title),
+            titles(&[joint.kind]),
             &joint_panels(j, samples, measured),
             &motion_limits(std::slice::from_ref(joint)),
         )?;
@@ -186,22 +187,27 @@ fn solve(mut m: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     Some(x)
 }
 
-fn draw_on(root: &Area<'_>, title: &str, panels: &[Vec<Curve>; 4], limits: &[Vec<LimitLine>; 4]) -> Drawn {
+fn draw_on(
+    root: &Area<'_>,
+    (title, titles): (&str, [&str; 4]),
+    panels: &[Vec<Curve>; 4],
+    limits: &[Vec<LimitLine>; 4],
+) -> Drawn {
     root.fill(&WHITE)?;
     let body = root.titled(title, ("sans-serif", 24).into_font())?;
-    draw_panels(&body, panels, limits)?;
+    draw_panels((&body, titles), panels, limits)?;
     Ok(root.present()?)
 }
 
 fn draw(
-    file: &Path,
-    title: &str,
+    (file, title): (&Path, &str),
+    titles: [&str; 4],
     panels: &[Vec<Curve>; 4],
     limits: &[Vec<LimitLine>; 4],
 ) -> Result<(), Failure> {
     let mut svg = String::new();
     let root = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
-    let drawn = draw_on(&root, title, panels, limits);
+    let drawn = draw_on(&root, (title, titles), panels, limits);
     drop(root);
     drawn.map_err(|e| undrawable(file, e.as_ref()))?;
     write_whole(file, &svg)

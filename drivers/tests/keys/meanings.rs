@@ -11,6 +11,27 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Robot files: pose", "A pose with a name, for `--to-named`."),
     ("Robot files: pose[].name", "Its name."),
     ("Robot files: pose[].position_rad", "One angle for each joint, base to tip."),
+    (
+        "Robot files: pose[].position",
+        "Instead of `position_rad` where a joint of the pose is prismatic: each number in the unit of its joint, rad or m.",
+    ),
+    (
+        "Robot files: joint[].kind",
+        "With rows: whether the joint turns or slides; `revolute` without it. A URDF says it itself.",
+    ),
+    (
+        "Robot files: joint[].position_m",
+        "Range of a prismatic joint, beside `position_rad` of a revolute one.",
+    ),
+    (
+        "Robot files: joint[].force_n_max",
+        "Greatest force of a prismatic joint's drive; with a URDF the `effort` without it.",
+    ),
+    ("Robot files: joint[].motion.velocity_m_s", "Velocity limit of a prismatic joint."),
+    ("Robot files: joint[].motion.acceleration_m_s2", "Acceleration limit of a prismatic joint."),
+    ("Robot files: joint[].motion.jerk_m_s3", "Jerk limit of a prismatic joint."),
+    ("Robot files: joint[].stop.acceleration_m_s2", "Acceleration limit of stops of a prismatic joint."),
+    ("Robot files: joint[].stop.jerk_m_s3", "Jerk limit of stops of a prismatic joint."),
     ("Robot files: pose[].group", "The group that the pose is of; without it, it is one of all joints."),
     ("Robot files: tip_link", "Link of the URDF whose frame is the tip; or `tip_links`."),
     ("Robot files: tip_links", "Instead of `tip_link`: several, as of a robot with two arms."),

@@ -276,8 +276,9 @@ impl JointTrack {
                 }))
             } else if let Some((joint, by_rad)) = jump.filter(|(_, by_rad)| *by_rad > JUMP_RAD) {
                 Some(format!(
-                    "joint {} would turn by {by_rad:.3} rad within {:.1} mm: the line passes a singularity",
+                    "joint {} would move by {by_rad:.3} {} within {:.1} mm: the line passes a singularity",
                     joint.name,
+                    joint.kind.unit(),
                     1e3 * line.length_m / steps
                 ))
             } else {
@@ -391,5 +392,5 @@ fn at_limit(robot: &Robot, pose_rad: &JointArray) -> Option<String> {
         let [low, high] = joint.limits.position_rad;
         **q <= low || **q >= high
     })?;
-    Some(format!("joint {} is at its limit of {q:.4} rad", joint.name))
+    Some(format!("joint {} is at its limit of {q:.4} {}", joint.name, joint.kind.unit()))
 }

@@ -24,6 +24,7 @@ use crate::verify::{Proof, Violation, verify_in};
 use crate::world::World;
 use fit::{Candidate, candidates, scaled};
 use taustream_arm::{Robot, Scene};
+use taustream_motion::JointKind;
 use taustream_motion::digits::OutsideRange;
 use taustream_motion::limits::{LimitViolation, Peaks, check_motion};
 use taustream_motion::profile::KError;
@@ -139,13 +140,15 @@ pub enum ImportError {
     /// A position that the joint cannot have.
     #[error(
         "at t = {at_s:.3} s joint {} ({name}) at {}; import a motion that stays inside",
-        joint + 1, OutsideRange { position_rad: *value_rad, range_rad: *range_rad }
+        joint + 1, OutsideRange { kind: *kind, position_rad: *value_rad, range_rad: *range_rad }
     )]
     OutsideLimits {
         /// Zero-based index of the joint.
         joint: usize,
         /// The joint's name.
         name: String,
+        /// Rad, or m.
+        kind: JointKind,
         /// When.
         at_s: f64,
         /// Where it is.
@@ -155,17 +158,20 @@ pub enum ImportError {
     },
     /// A tear in a table.
     #[error(
-        "joint {} ({name}) jumps by {by_rad:.4} rad before t = {at_s:.3} s, at {speed_rad_s:.1} rad/s, {:.0} times its limit \
-         of {limit_rad_s} rad/s{}",
-        joint + 1, speed_rad_s / limit_rad_s,
-        if is_turn(*by_rad) { "; that is a full revolution, a whole turn: unwrap the angles" }
-        else { "; correct the table there, or split it" }
+        "joint {} ({name}) jumps by {by_rad:.4} {} before t = {at_s:.3} s, at {speed_rad_s:.1} {unit}, {:.0} times its limit \
+         of {limit_rad_s} {unit}{}",
+        joint + 1, kind.unit(), speed_rad_s / limit_rad_s,
+        if !kind.is_prismatic() && is_turn(*by_rad) { "; that is a full revolution, a whole turn: unwrap the angles" }
+        else { "; correct the table there, or split it" },
+        unit = kind.rate_unit(1)
     )]
     Jump {
         /// Zero-based index of the joint.
         joint: usize,
         /// The joint's name.
         name: String,
+        /// Rad, or m.
+        kind: JointKind,
         /// The time of the row behind it.
         at_s: f64,
         /// How far.
@@ -314,7 +320,16 @@ fn check(robot: &Robot, reference: &Reference, tolerance_rad: f64) -> Result<(),
     let jump_rad = tolerance_rad.min(TOLERANCE_RAD_DEFAULT);
     if let Some((at_s, joint, by_rad, speed_rad_s)) = reference.first_jump(&robot.limits(), JUMP, jump_rad) {
         let limit_rad_s = robot.joints.get(joint).map_or(0.0, |j| j.limits.motion.velocity_rad_s);
-        return Err(ImportError::Jump { joint, name: name(joint), at_s, by_rad, speed_rad_s, limit_rad_s });
+        let kind = robot.kind(joint);
+        return Err(ImportError::Jump {
+            joint,
+            name: name(joint),
+            kind,
+            at_s,
+            by_rad,
+            speed_rad_s,
+            limit_rad_s,
+        });
     }
     for at_s in reference.joins_s() {
         let position_rad = reference.at(at_s);
@@ -325,6 +340,7 @@ fn check(robot: &Robot, reference: &Reference, tolerance_rad: f64) -> Result<(),
                 return Err(ImportError::OutsideLimits {
                     joint,
                     name: name(joint),
+                    kind: described.kind,
                     at_s,
                     value_rad,
                     range_rad,

@@ -221,9 +221,9 @@ impl Service<'_> {
                     continue;
                 }
                 if note.is_empty() {
-                    let [low, high] = joint.limits.position_rad;
+                    let ([low, high], unit) = (joint.limits.position_rad, joint.kind.unit());
                     note = format!(
-                        "{} is kept inside its limits, {low} to {high} rad: {q} rad asked",
+                        "{} is kept inside its limits, {low} to {high} {unit}: {q} {unit} asked",
                         joint.name
                     );
                 }
