@@ -207,7 +207,10 @@ impl Surroundings<'_> {
                     return Ok(Replacement {
                         trajectory: timed.trajectory,
                         least: LeastDistance::of(&proof, 0.0),
-                        how: format!("on past {end_s:.3} s, rounded by at most {off_rad:.3} rad: {how}"),
+                        how: format!(
+                            "on past {end_s:.3} s, rounded by at most {off_rad:.3} {}: {how}",
+                            world.robot().travel_unit()
+                        ),
                         planned_ns,
                         replaces: cut.replaces(),
                     });

@@ -107,6 +107,10 @@ impl Clone for InLanes {
     }
 }
 
+/// How far outside its stroke a prismatic joint may stand in a pose that is asked for (m): an arm that stands outside is led in, and the
+/// rounding of the f32 lanes is bounded by how far it extends.
+const OUTSIDE_M: f64 = 1.0;
+
 /// Everything that can collide.
 #[derive(Clone)]
 pub struct World<'a> {
@@ -230,7 +234,8 @@ impl<'a> World<'a> {
         let step_m = |index: usize| {
             let joint = self.robot.chain.joint(index);
             let fixed = |j: &ChainJoint| j.pre.translation.vector.norm() + j.post.translation.vector.norm();
-            joint.map_or(0.0, fixed) + self.robot.extension_m(index)
+            let outside_m = if self.robot.chain.kind(index).is_prismatic() { OUTSIDE_M } else { 0.0 };
+            joint.map_or(0.0, fixed) + self.robot.extension_m(index) + outside_m
         };
         let body_m = |(body, at): (&LinkBody, &Posed)| {
             let frame = snapshot.frames.get(body.frame);

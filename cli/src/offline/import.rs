@@ -10,7 +10,7 @@ use std::io;
 use std::path::Path;
 use taustream_arm::text::counted;
 use taustream_arm::{MotionTable, Robot, Scene, TrajectoryFile};
-use taustream_motion::JointArray;
+use taustream_motion::{JointArray, JointKind};
 use taustream_optimizers::papers::spline_time::SplineCost;
 use taustream_planner::import::{
     ImportError, Imported, Reference, TimedBy, Via, ViaProfile, fitted_durations_s, import, import_path,
@@ -38,6 +38,9 @@ struct Summary {
     delay_s: f64,
     deviation_rad: f64,
     deviation_joint: String,
+    /// Unit of the deviation; left out where it is rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deviation_unit: Option<&'static str>,
     deviation_at_s: f64,
     notes: Vec<String>,
     clearance_m: f64,
@@ -65,7 +68,12 @@ impl fmt::Display for Summary {
             writeln!(f, "deviation     none: the profile is a stroke")?;
         } else {
             let (joint, at_s) = (&self.deviation_joint, self.deviation_at_s);
-            writeln!(f, "deviation     at most {:.6} rad, {joint} at t = {at_s:.3} s", self.deviation_rad)?;
+            writeln!(
+                f,
+                "deviation     at most {:.6} {}, {joint} at t = {at_s:.3} s",
+                self.deviation_rad,
+                self.deviation_unit.unwrap_or("rad")
+            )?;
         }
         for note in &self.notes {
             writeln!(f, "note          {note}")?;
@@ -267,6 +275,9 @@ fn summarise(robot: &Robot, imported: &Imported, source: Source, args: &ImportAr
         delay_s: imported.kernel.map_or(0.0, |kernel| kernel.delay_s),
         deviation_rad: deviation.rad,
         deviation_joint: robot.joints.get(deviation.joint).map(|j| j.name.clone()).unwrap_or_default(),
+        deviation_unit: Some(robot.kind(deviation.joint))
+            .filter(|kind| kind.is_prismatic())
+            .map(JointKind::unit),
         deviation_at_s: deviation.at_s,
         notes,
         clearance_m: imported.proof.clearance_m,

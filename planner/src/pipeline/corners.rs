@@ -137,8 +137,8 @@ impl Pipeline<'_> {
     }
 
     fn prove_rounded(&mut self, corners: usize, timed: &Timed, source: &str) -> bool {
-        let at_most_rad = timed.deviation_rad;
-        self.prove(timed, &format!("{source}, {corners} corners rounded by at most {at_most_rad:.3} rad"))
+        let (at_most_rad, unit) = (timed.deviation_rad, self.space.world.robot().travel_unit());
+        self.prove(timed, &format!("{source}, {corners} corners rounded by at most {at_most_rad:.3} {unit}"))
     }
 
     /// Duration of the best motion so far; without limit where duration is not what counts.
