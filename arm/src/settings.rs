@@ -2,6 +2,7 @@
 use crate::axis::{self, Axis};
 use crate::document::{self, Node};
 use crate::feed_forward::{self, FeedForward};
+use crate::neighbour::{self, Neighbour, NeighbourEntry};
 use crate::protocol::{self, Protocol};
 use crate::reader::{Bounds, FaultList, Table};
 use crate::stopping::STOP_S_MAX;
@@ -186,6 +187,10 @@ pub struct Settings {
     pub supervision: Supervision,
     /// Torque that is commanded beside the position, if any.
     pub feed_forward: Option<FeedForward>,
+    /// Other arms in the same room, as this file names them.
+    pub neighbour_entries: Vec<NeighbourEntry>,
+    /// The same with what their files say; empty for the settings of a neighbour.
+    pub neighbours: Vec<Neighbour>,
     /// The section of the simulated servos as it stands; whoever simulates checks its keys.
     pub simulator: Option<toml::Table>,
 }
@@ -220,8 +225,12 @@ const PERCENT: Bounds = Bounds::above(0.0, 100.0, "percent");
 /// The arm's name stands in file names of shared memory, beside a prefix and a service's name.
 const ARM_NAME_BYTES_MAX: usize = 32;
 
-/// What reads the robot file.
-type ReadRobot = fn(&Path) -> Result<Robot, Faults>;
+/// How the files are read that a settings file names.
+#[derive(Clone, Copy)]
+struct Readers {
+    robot: fn(&Path) -> Result<Robot, Faults>,
+    follows_neighbours: bool,
+}
 
 impl Settings {
     /// Reads and checks a settings file and the robot and scene files that it names.
@@ -255,17 +264,23 @@ impl Settings {
     /// Every other fault at once.
     pub fn load_untried(file: &Path) -> Result<Self, Faults> {
         let text = document::read_text(file, "a settings file in TOML")?;
-        let settings = Self::read_with(file, &text, Robot::load_untried)?;
+        let readers = Readers { robot: Robot::load_untried, follows_neighbours: true };
+        let settings = Self::read_with(file, &text, readers)?;
         let fault_list = FaultList::new(file);
         consistency::check_loads(&fault_list, &settings);
         fault_list.close(Some(settings))
     }
-    fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
-        Self::read_with(file, text, Robot::load)
+    /// The settings of a neighbour: its own neighbours are not followed.
+    pub(crate) fn load_alone(file: &Path) -> Result<Self, Faults> {
+        let text = document::read_text(file, "a settings file in TOML")?;
+        Self::read_with(file, &text, Readers { robot: Robot::load_untried, follows_neighbours: false })
     }
-    fn read_with(file: &Path, text: &str, robot: ReadRobot) -> Result<Self, Faults> {
+    fn from_toml_overloaded(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::read_with(file, text, Readers { robot: Robot::load, follows_neighbours: true })
+    }
+    fn read_with(file: &Path, text: &str, readers: Readers) -> Result<Self, Faults> {
         let fault_list = FaultList::new(file);
-        let settings = Self::read(&fault_list, document::parse_toml(file, text)?, (text, robot));
+        let settings = Self::read(&fault_list, document::parse_toml(file, text)?, (text, readers));
         fault_list.close(settings)
     }
     /// Cycles in a row that a bus may lose. Where the others continue, the drives of the lost one must not be commanded to catch
@@ -275,10 +290,10 @@ impl Settings {
         let stated = self.supervision.lost_cycles_max;
         if self.buses.len() > 1 { stated.min(self.cycle.tolerated_gap_periods) } else { stated }
     }
-    fn read(fault_list: &FaultList, node: Node, (text, robot): (&str, ReadRobot)) -> Option<Self> {
+    fn read(fault_list: &FaultList, node: Node, (text, readers): (&str, Readers)) -> Option<Self> {
         let mut top = Table::top(fault_list, node)?;
         let name = read_name(&mut top);
-        let robot = named_file(&mut top, "robot", robot);
+        let robot = named_file(&mut top, "robot", readers.robot);
         let scene = named_file(&mut top, "scene", Scene::load);
         let buses = binding::read_buses(&mut top);
         let axes = axis::read(&mut top, robot.as_ref());
@@ -286,8 +301,13 @@ impl Settings {
         let cycle = top.table("cycle", "a table [cycle]").and_then(read_cycle);
         let supervision = top.table("supervision", "a table [supervision]").and_then(read_supervision);
         let feed_forward = feed_forward::read(&mut top, robot.as_ref(), &servos);
+        let neighbour_entries = neighbour::read(&mut top);
         let simulator = read_simulator(&mut top, text);
         top.done();
+        let neighbours = match &name {
+            Some(name) if readers.follows_neighbours => neighbour::load(fault_list, name, &neighbour_entries),
+            Some(_) | None => Vec::new(),
+        };
         if let (Some(cycle), Some(supervision)) = (&cycle, &supervision) {
             consistency::check_times(fault_list, cycle, supervision);
         }
@@ -305,6 +325,8 @@ impl Settings {
             cycle: cycle?,
             supervision: supervision?,
             feed_forward: feed_forward?,
+            neighbour_entries,
+            neighbours,
             simulator,
         };
         if settings.feed_forward.is_some() {

@@ -98,6 +98,7 @@ fn kinds() -> Vec<Kind> {
                 shipped("config/settings/damiao6.toml", &[("[cycle]", FEED_FORWARD)]),
                 shipped("config/settings/damiao6-gripper.toml", &[]),
                 shipped("config/settings/damiao6-gripper.toml", AXIS_IN_RAD),
+                shipped("config/settings/pair-left.toml", &[]),
             ],
             load: settings,
         },

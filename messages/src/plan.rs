@@ -266,6 +266,10 @@ pub struct PlanStages {
     pub receipt_ns: u64,
 }
 
+const REFUSED: u32 = 0;
+const PLANNED: u32 = 1;
+const REFUSED_FOR_NOW: u32 = 2;
+
 /// The planner's answer on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
@@ -320,7 +324,7 @@ impl PlanReply {
         let nothing = Receipt::new(0, 0, &crate::Outcome::Rejected(crate::Rejection::Busy));
         let mut reply = Self {
             layout_version: LAYOUT_VERSION,
-            planned: 0,
+            planned: REFUSED,
             trajectory_id: 0,
             planning_s: 0.0,
             duration_s: 0.0,
@@ -344,7 +348,7 @@ impl PlanReply {
                 receipt,
                 stages,
             } => {
-                (reply.planned, reply.stages) = (1, *stages);
+                (reply.planned, reply.stages) = (PLANNED, *stages);
                 reply.trajectory_id = *trajectory_id;
                 (reply.planning_s, reply.duration_s) = (*planning_s, *duration_s);
                 (reply.clearance_m, reply.stroke_count) = (*clearance_m, *strokes);
@@ -355,6 +359,21 @@ impl PlanReply {
             }
         }
         reply
+    }
+
+    /// The same refusal, when a neighbour moves and the answer may be another one once it rests.
+    #[must_use]
+    pub fn for_now(mut self) -> Self {
+        if self.planned == REFUSED {
+            self.planned = REFUSED_FOR_NOW;
+        }
+        self
+    }
+
+    /// True for a refusal that may not last: a neighbour moves.
+    #[must_use]
+    pub fn is_for_now(&self) -> bool {
+        self.layout_version == LAYOUT_VERSION && self.planned == REFUSED_FOR_NOW
     }
 
     /// What the planner says beside it.
@@ -371,7 +390,7 @@ impl PlanReply {
             let reason = format!("the planner answers in layout version {got}, expected {LAYOUT_VERSION}");
             return PlanOutcome::Failed { reason };
         }
-        if self.planned != 1 {
+        if self.planned != PLANNED {
             return PlanOutcome::Failed { reason: self.text.read() };
         }
         PlanOutcome::Planned {

@@ -65,8 +65,8 @@ pub(crate) const NODES_MAX: usize = 32;
 const SUBSCRIBERS_MAX: usize = 24;
 /// Most processes that may send trajectories at one time.
 const PUBLISHERS_MAX: usize = 4;
-/// The streamer and the planner, and one each that has died and is not cleared away yet.
-const TRAJECTORY_READERS_MAX: usize = 4;
+/// The streamer, the planner and those of three neighbours, and some that have died and are not cleared away yet.
+const TRAJECTORY_READERS_MAX: usize = 8;
 /// Reports that a slow reader may lag behind; older ones are overwritten.
 const REPORT_BUFFER: usize = 64;
 /// Receipts that a slow reader may lag behind.

@@ -178,6 +178,8 @@ pub enum SceneChangeError {
 pub struct LiveScene {
     settings_robot: Arc<Robot>,
     attached: Vec<Attached>,
+    /// Obstacles of the scene behind its own, in which other arms are, or come to.
+    occupied: Vec<Obstacle>,
     current: SceneRevision,
     history: VecDeque<(u64, Changed)>,
 }
@@ -203,7 +205,8 @@ impl LiveScene {
         let (robot, scene) = (Arc::new(robot.clone()), Arc::new(scene.clone()));
         let world = World::shared(robot.clone(), &scene).map_err(|name| SceneChangeError::Shape { name })?;
         let current = SceneRevision { number: 1, robot: robot.clone(), scene, world: Arc::new(world) };
-        Ok(Self { settings_robot: robot, attached: Vec::new(), current, history: VecDeque::new() })
+        let (attached, occupied, history) = (Vec::new(), Vec::new(), VecDeque::new());
+        Ok(Self { settings_robot: robot, attached, occupied, current, history })
     }
 
     /// The newest revision.
@@ -227,7 +230,7 @@ impl LiveScene {
     /// Every object, obstacles first.
     #[must_use]
     pub fn objects(&self) -> Vec<ListedObject> {
-        let obstacles = self.current.scene.obstacles.iter().map(|object| (object, FixedTo::Base, 0.0));
+        let obstacles = self.own_obstacles().iter().map(|object| (object, FixedTo::Base, 0.0));
         let attached = self.attached.iter().map(|held| (&held.object, FixedTo::Tip, held.mass_kg));
         let listed = |(object, fixed_to, mass_kg): (&Obstacle, FixedTo, f64)| ListedObject {
             name: object.name.clone(),
@@ -240,6 +243,52 @@ impl LiveScene {
             mass_kg,
         };
         obstacles.chain(attached).map(listed).collect()
+    }
+
+    /// The obstacles without those of other arms.
+    fn own_obstacles(&self) -> &[Obstacle] {
+        let all = &self.current.scene.obstacles;
+        all.get(..all.len() - self.occupied.len()).unwrap_or(all)
+    }
+
+    /// Puts other arms where they are, or may come to: obstacles that nobody lists or moves.
+    ///
+    /// # Errors
+    /// When a shape cannot be built.
+    pub fn occupy(&mut self, obstacles: Vec<Obstacle>) -> Result<Changed, SceneChangeError> {
+        let before = std::mem::replace(&mut self.occupied, obstacles);
+        let scene = &self.current.scene;
+        let own = scene.obstacles.len() - before.len();
+        let names: BTreeSet<String> = self.occupied.iter().map(|obstacle| obstacle.name.clone()).collect();
+        let scene = Arc::new(Scene {
+            obstacles: scene.obstacles.iter().take(own).chain(&self.occupied).cloned().collect(),
+            file: scene.file.clone(),
+            margin_m: scene.margin_m,
+        });
+        let world = match self.current.world.in_scene(&scene, &names) {
+            Ok(world) => Arc::new(world),
+            Err(name) => {
+                self.occupied = before;
+                return Err(SceneChangeError::Shape { name });
+            }
+        };
+        let changed = Changed { obstacles: names, links: BTreeSet::new() };
+        let number = self.current.number + 1;
+        self.current = SceneRevision { number, robot: self.current.robot.clone(), scene, world };
+        self.remember(number, changed.clone());
+        Ok(changed)
+    }
+
+    /// The names of the obstacles of other arms.
+    pub fn occupied_names(&self) -> impl Iterator<Item = &str> {
+        self.occupied.iter().map(|obstacle| obstacle.name.as_str())
+    }
+
+    fn remember(&mut self, number: u64, changed: Changed) {
+        if self.history.len() == HISTORY {
+            self.history.pop_front();
+        }
+        self.history.push_back((number, changed));
     }
 
     /// Makes changes, all or none. `at_rest` is the pose in which the arm rests, where it is known to.
@@ -279,7 +328,7 @@ impl LiveScene {
         let mut draft = Draft {
             robot: &self.settings_robot,
             at_rest,
-            obstacles: scene.obstacles.clone(),
+            obstacles: self.own_obstacles().to_vec(),
             attached: self.attached.clone(),
             changed: Changed::default(),
             reshaped: BTreeSet::new(),
@@ -287,11 +336,13 @@ impl LiveScene {
         };
         make(&mut draft)?;
         let count = draft.obstacles.len() + draft.attached.len();
-        if count > OBSTACLES_MAX && count > scene.obstacles.len() + self.attached.len() {
+        if count > OBSTACLES_MAX && count > self.own_obstacles().len() + self.attached.len() {
             return Err(SceneChangeError::Full { count });
         }
+        // Several bodies of another arm may have one name.
+        draft.reshaped.extend(self.occupied.iter().map(|obstacle| obstacle.name.clone()));
         let scene = Arc::new(Scene {
-            obstacles: draft.obstacles,
+            obstacles: draft.obstacles.iter().chain(&self.occupied).cloned().collect(),
             file: scene.file.clone(),
             margin_m: scene.margin_m,
         });
@@ -306,12 +357,10 @@ impl LiveScene {
         };
         let number = number + 1;
         self.current = SceneRevision { number, robot, scene, world: Arc::new(world) };
-        self.attached = draft.attached;
-        if self.history.len() == HISTORY {
-            self.history.pop_front();
-        }
-        self.history.push_back((number, draft.changed.clone()));
-        Ok(draft.changed)
+        let Draft { attached, changed, .. } = draft;
+        self.attached = attached;
+        self.remember(number, changed.clone());
+        Ok(changed)
     }
 }
 

@@ -95,6 +95,7 @@ fn serve(
     let wire = Wire::join(&settings.name, "taustream-planner", runtime)?;
     let mut service = Service::open(&wire, &settings.robot, &settings.scene, stop)?;
     drop(opening);
+    service.mind_neighbours(&settings.name, &settings.neighbours, runtime)?;
     if let Some(path) = keep_scene {
         service.keep_scene(path)?;
     }

@@ -138,6 +138,11 @@ impl<'a> Outbox<'a> {
         Ok(newest)
     }
 
+    /// The newest report that was received, however old it is.
+    pub(crate) fn last_report(&self) -> Option<(Report, Phase)> {
+        self.newest.get()
+    }
+
     /// The newest report, if the streamer has written it just now by the clock that both share; else the next one to come,
     /// within `timeout`. So a report that a dead streamer left behind is not believed, and nobody waits for a living one.
     ///

@@ -4,30 +4,31 @@
 //! commanded pose; while a motion runs, it is replaced (`moving`). The streamer takes a replacement in advance and keeps it
 //! until its cut, so that nothing of it hangs on this process. A motion whose requester has gone in the meantime is not sent:
 //! no client waits for the arm to move.
-mod foreign;
 mod moving;
+mod neighbours;
 mod reported;
 mod scene;
 mod scene_effect;
 mod streaming;
 mod tip;
 
+use crate::foreign::Foreign;
 use crate::held::check_held;
 use crate::kept_scene::{SceneFile, restore};
 use crate::kind::PlannerKind;
-use crate::live_scene::LiveScene;
+use crate::live_scene::{LiveScene, SceneRevision};
+use crate::neighbours::Neighbours;
 use crate::plan::{
     Plan, PlanError, PlanOptions, STACK_BYTES, StartMargin, Task, plan_through_until, plan_until,
 };
 use crate::send::{Outbox, RECEIPT_TAKES, REPORT_WITHIN, SendError, SentTrajectory, check_robot};
 use crate::verify::LeastDistance;
-use foreign::Foreign;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::prelude::ipc;
 use moving::Latency;
 use reported::Reported;
 use std::borrow::Cow;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -41,6 +42,7 @@ use taustream_messages::event::{Events, Topic};
 use taustream_messages::files::Footprint;
 use taustream_messages::plan::{CheckedPlanRequest, PlanOutcome, PlanStages, When};
 use taustream_messages::plan_detail::PlanDetail;
+use taustream_messages::scene::FixedTo;
 use taustream_messages::service::{
     CloudServer, CommandClient, PlanServer, SceneServer, ServiceError, TargetServer, Wire,
 };
@@ -121,6 +123,9 @@ pub struct Service<'a> {
     /// What became of a motion by a change of the scene last.
     last_effect: RefCell<String>,
     foreign: Foreign,
+    neighbours: Neighbours,
+    /// When a neighbour made the streamer stop this arm last.
+    stopped_for_neighbour: Cell<Option<Instant>>,
     commands: CommandClient,
     command_events: Events,
     outbox: Outbox<'a>,
@@ -137,6 +142,12 @@ pub struct Service<'a> {
     promise: Promise,
     reported: Reported,
     footprint: Footprint,
+}
+
+/// A plan, and the revision of the scene that it was made in.
+struct Planned {
+    plan: Plan,
+    revision: SceneRevision,
 }
 
 /// What is known of the streamer between requests.
@@ -177,6 +188,8 @@ impl<'a> Service<'a> {
             cloud_server: wire.cloud_server()?,
             last_effect: RefCell::default(),
             foreign: Foreign::open(wire)?,
+            neighbours: Neighbours::none(),
+            stopped_for_neighbour: Cell::new(None),
             commands: wire.command_client()?,
             command_events: wire.events(Topic::Command),
             outbox,
@@ -201,6 +214,11 @@ impl<'a> Service<'a> {
     /// When the file makes no sense, or there is no thread to write it from.
     pub fn keep_scene(&mut self, path: &Path) -> Result<(), OpenError> {
         restore(&mut self.live_scene.borrow_mut(), path).map_err(|e| OpenError::Scene(e.to_string()))?;
+        let holds = self.live_scene.borrow().objects().iter().any(|object| object.fixed_to == FixedTo::Tip);
+        if holds && !self.neighbours.is_empty() {
+            let why = "the tip holds an object, which the planners of neighbours ([[neighbour]]) do not know; detach it first";
+            return Err(OpenError::Scene(format!("{}: {why}", path.display())));
+        }
         let file = SceneFile::open(path).map_err(|e| OpenError::Thread(e.to_string()))?;
         self.scene_file = Some(file);
         Ok(())
@@ -235,6 +253,7 @@ impl<'a> Service<'a> {
             Err(e) => warn!("{e}"),
         }
         self.foreign.look();
+        self.watch_neighbours();
         self.take_scene_requests();
         match self.server.receive() {
             Ok(Some(request)) => self.take(&request),
@@ -250,10 +269,16 @@ impl<'a> Service<'a> {
         // Copied out before it is checked.
         let copy = *request.payload();
         let outcome = match CheckedPlanRequest::try_from(&copy) {
-            Ok(checked) => self.answer(request, &checked).unwrap_or_else(|reason| failed(&reason)),
+            Ok(checked) => match self.answer(request, &checked) {
+                Ok(outcome) => outcome,
+                Err(reason) => failed(&self.with_neighbours(reason)),
+            },
             Err(e) => failed(&e.to_string()),
         };
-        self.reply(request, (&outcome, &self.reported.detail()));
+        let reply = PlanReply::new(&outcome, &self.reported.detail());
+        // What others are in the way of now may be possible later.
+        let for_now = matches!(outcome, PlanOutcome::Failed { .. }) && self.neighbours.busy().is_some();
+        self.reply_with(request, (&outcome, if for_now { reply.for_now() } else { reply }));
     }
 
     fn answer(&mut self, request: &Request, requested: &CheckedPlanRequest) -> Result<PlanOutcome, String> {
@@ -265,14 +290,15 @@ impl<'a> Service<'a> {
         let options = options(requested)?;
         let (report, phase) = self.outbox.current_report(REPORT_WITHIN).map_err(|e| e.to_string())?;
         check_robot(self.robot, &report).map_err(|e| e.to_string())?;
+        self.know_neighbours()?;
         if let Some(tip) = requested.tip.filter(|_| requested.when != When::Cancel) {
             return self.go_to_tip(request, (requested, &options), (&tip, &report, phase));
         }
         match (phase, requested.when) {
             (Phase::Holding, When::Cancel) => Err("nothing runs that could be cancelled".to_owned()),
             (Phase::Holding, When::AtOnce | When::AfterCurrent | When::Queue) if report.energised == 1 => {
-                let plan = self.plan(request, report.command_rad, (requested, &options))?;
-                Ok(self.send(request, &plan))
+                let planned = self.plan(request, report.command_rad, (requested, &options))?;
+                Ok(self.send(request, &planned))
             }
             (phase, _) if moving::runs(phase) => {
                 self.replan_in_motion(request, (requested, &options), report)
@@ -295,8 +321,8 @@ impl<'a> Service<'a> {
             }
             Some(line) if rests => {
                 let start = (report.command_rad, requested.held_joints);
-                let plan = self.plan_straight(request, start, (tip, line, options))?;
-                Ok(self.send(request, &plan))
+                let planned = self.plan_straight(request, start, (tip, line, options))?;
+                Ok(self.send(request, &planned))
             }
             Some(_) if moving::runs(phase) => {
                 Err("a straight line of the tip begins at rest; wait until the motion has ended".to_owned())
@@ -319,8 +345,9 @@ impl<'a> Service<'a> {
         request: &Request,
         start_rad: JointArray,
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
-    ) -> Result<Plan, String> {
+    ) -> Result<Planned, String> {
         let (revision, requested) = (self.revision(), requested.holding_at(&start_rad));
+        self.check_start(&revision, &start_rad)?;
         let robot = holding(&revision.robot, requested.held_joints, &start_rad);
         let (robot, scene, goal_rad) = (&*robot, &*revision.scene, requested.goal_rad);
         // The arm stands where it stands: after a stop or a sag it could not be moved otherwise.
@@ -339,8 +366,7 @@ impl<'a> Service<'a> {
         })?;
         self.reported.stages(&plan.stages);
         check_held(robot, &plan.trajectory, requested.held_joints).map_err(|e| e.to_string())?;
-        self.still_free(&revision, (&plan.trajectory, 0.0))?;
-        Ok(plan)
+        Ok(Planned { plan, revision })
     }
 
     /// Works on a thread of its own: whatever goes wrong there, the service continues. The work ends when its requester goes;
@@ -385,6 +411,7 @@ impl<'a> Service<'a> {
                 cancel.store(true, Ordering::Relaxed);
             }
             self.foreign.look();
+            self.watch_neighbours();
             self.take_scene_requests();
             if self.stop.load(Ordering::Relaxed) {
                 cancel.store(true, Ordering::Relaxed);
@@ -400,12 +427,17 @@ impl<'a> Service<'a> {
         }
     }
 
-    fn send(&self, request: &Request, plan: &Plan) -> PlanOutcome {
+    fn send(&self, request: &Request, Planned { plan, revision }: &Planned) -> PlanOutcome {
+        let proven_ns = now_ns();
+        let turn = match self.commit(revision, (&plan.trajectory, 0.0), RECEIPT_WITHIN) {
+            Ok(turn) => turn,
+            Err(reason) => return failed(&reason),
+        };
         if !request.is_connected() {
             return failed("the client has disconnected; motion not sent");
         }
-        let proven_ns = now_ns();
         let sent = self.outbox.send(self.robot, &plan.trajectory, Replaces::Rest, RECEIPT_WITHIN);
+        turn.settle(&sent);
         // After it was sent: nobody moves later for it.
         self.reported.motion((&plan.trajectory, 0.0), LeastDistance::of(&plan.proof, 0.0));
         match sent {
@@ -432,8 +464,12 @@ impl Service<'_> {
     }
 
     fn reply(&self, request: &Request, (outcome, detail): (&PlanOutcome, &PlanDetail)) {
+        self.reply_with(request, (outcome, PlanReply::new(outcome, detail)));
+    }
+
+    fn reply_with(&self, request: &Request, (outcome, reply): (&PlanOutcome, PlanReply)) {
         // A requester that has gone needs no answer.
-        if let Err(e) = request.send_copy(PlanReply::new(outcome, detail)) {
+        if let Err(e) = request.send_copy(reply) {
             info!("the answer was not taken: {e:?}");
         }
         self.events.notify();

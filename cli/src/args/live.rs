@@ -104,6 +104,7 @@ Examples:
   taustream replan --to-named home
   taustream replan --via \"0.4,-1.2,1.2,-1.6,-1.57,0\" --via \"0.8,-1,1,-1.6,-1.57,0\" --goal \"..\" --blend-rad 0.1
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
+  taustream replan --to-named home --wait-s 20
   taustream replan --goal \"..\" && taustream replan --goal \"..\" --queue && taustream replan --goal \"..\" --queue
 
 At rest the motion starts at the commanded pose. An arm that moves, or is paused, gets a replacement of its motion: the planner
@@ -149,6 +150,18 @@ pub(crate) struct ReplanArgs {
     /// Return only when the motion has ended.
     #[arg(long)]
     pub(crate) wait: bool,
+    /// While a neighbour (`[[neighbour]]` in the settings) is in the way with a motion that will end, or its pose is not known, ask
+    /// again for so many seconds.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value_t = 0.0, value_parser = wait_s)]
+    pub(crate) wait_s: f64,
+}
+
+/// Longest wait for a neighbour, s.
+const WAIT_S_MAX: f64 = 3_600.0;
+
+fn wait_s(text: &str) -> Result<f64, String> {
+    let seconds = text.trim().parse::<f64>().ok().filter(|s| (0.0..=WAIT_S_MAX).contains(s));
+    seconds.ok_or_else(|| format!("expected 0 to {WAIT_S_MAX} s"))
 }
 
 impl ReplanArgs {

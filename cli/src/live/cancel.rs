@@ -21,5 +21,5 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &CancelArgs) -> Res
         deadline_ms: DEADLINE_MS,
         ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), [0.0; MAX_JOINTS])
     };
-    go(form, (&client, &settings), &request, (args.wait, false))
+    go(form, (&client, &settings), &request, (args.wait, false, 0.0))
 }

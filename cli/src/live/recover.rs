@@ -37,5 +37,5 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RecoverArgs) -> Re
         deadline_ms: args.deadline_ms,
         ..CheckedPlanRequest::to_pose(settings.robot.joints.len(), entry.pose_rad)
     };
-    go(form, (&client, &settings), &request, (args.wait, false))
+    go(form, (&client, &settings), &request, (args.wait, false, 0.0))
 }

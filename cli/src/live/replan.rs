@@ -4,6 +4,7 @@ use super::follow::{Executed, follow, say_pauses};
 use crate::args::{Goal, ReplanArgs};
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::offline::verify::{Unmodelled, clearance_words};
 use crate::output::Form;
 use crate::progress::Waiting;
@@ -12,7 +13,8 @@ use crate::words::receipt_sentence;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 use taustream_arm::Settings;
 use taustream_arm::text::counted;
 use taustream_messages::clock::now_ns;
@@ -213,7 +215,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         planner: args.planner.name().to_owned(),
         ..CheckedPlanRequest::to_pose(robot.joints.len(), goal_rad)
     };
-    go(form, (&client, &settings), &request, (args.wait, args.explain)).map_err(|failure| {
+    go(form, (&client, &settings), &request, (args.wait, args.explain, args.wait_s)).map_err(|failure| {
         let hint = args.goal.angles().find_map(|(goal, _)| goal.degrees_hint(robot, group));
         match hint {
             Some(hint) if matches!(failure, Failure::Refused(_)) => {
@@ -256,10 +258,16 @@ pub(crate) fn go(
     form: Form,
     (client, settings): (&Client, &Settings),
     request: &CheckedPlanRequest,
-    (wait, explain): (bool, bool),
+    (wait, explain, wait_s): (bool, bool, f64),
 ) -> Result<(), Failure> {
+    let request = (request, Duration::from_secs_f64(wait_s));
     let arm = ArmName::of(settings);
-    let (mut waiting, words) = (Waiting::begin(), format!("planning, {:.1} s at most", deadline_s(request)));
+    let words = if wait_s > 0.0 {
+        format!("planning; for a neighbour's motion {wait_s:.1} s are waited")
+    } else {
+        format!("planning, {:.1} s at most", deadline_s(request.0))
+    };
+    let mut waiting = Waiting::begin();
     let mut say = || {
         waiting.say(form, &words);
         Ok(())
@@ -269,7 +277,7 @@ pub(crate) fn go(
             steps.iter().for_each(|step| form.progress(step));
         }
     };
-    let planned = Planned { explain, ..ask_while(client, &arm, request, &mut say, &mut tell)? };
+    let planned = Planned { explain, ..ask_within(client, &arm, request, &mut say, &mut tell)? };
     let answered_ns = now_ns();
     let mut first_setpoint_ns = None;
     let executed = if wait {
@@ -296,12 +304,26 @@ fn deadline_s(request: &CheckedPlanRequest) -> f64 {
     if request.deadline_ms == 0 { default_s } else { f64::from(request.deadline_ms) * 1e-3 }
 }
 
-/// Sends a request and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
-/// planner plans; `said` is given what was tried in vain.
+/// How often a planner is asked again while a neighbour is in the way.
+const AGAIN_AFTER: Duration = Duration::from_millis(100);
+
+/// [`ask_within`] at once.
 pub(crate) fn ask_while(
     client: &Client,
     arm: &ArmName,
     request: &CheckedPlanRequest,
+    meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+    said: &mut dyn FnMut(&[StepLine]),
+) -> Result<Planned, Failure> {
+    ask_within(client, arm, (request, Duration::ZERO), meanwhile, said)
+}
+
+/// Sends a request, again until `wait` has passed while a neighbour is in the way, and reads the answer; an answer without an accepting receipt is a failure. `meanwhile` runs while the
+/// planner plans; `said` is given what was tried in vain.
+fn ask_within(
+    client: &Client,
+    arm: &ArmName,
+    (request, wait): (&CheckedPlanRequest, Duration),
     meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
     said: &mut dyn FnMut(&[StepLine]),
 ) -> Result<Planned, Failure> {
@@ -311,8 +333,17 @@ pub(crate) fn ask_while(
         When::AfterCurrent | When::Queue => remaining_s(&client.report()?.0),
     };
     let limit_s = deadline_s(request) + ANSWER_S + remaining_s;
-    let asked_ns = now_ns();
-    let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
+    let since = Instant::now();
+    let (reply, asked_ns) = loop {
+        let asked_ns = now_ns();
+        let reply = client.plan(PlanRequest::from(request), limit_s, meanwhile)?;
+        if !reply.is_for_now() || since.elapsed() >= wait {
+            break (reply, asked_ns);
+        }
+        meanwhile()?;
+        interrupt::check()?;
+        thread::sleep(AGAIN_AFTER);
+    };
     let PlanDetail { path_length_rad, nearest, steps } = reply.detail();
     let steps: Vec<StepLine> = steps.into_iter().map(StepLine::from).collect();
     match reply.outcome() {

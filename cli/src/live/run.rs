@@ -14,6 +14,7 @@ use std::time::Duration;
 use taustream_arm::{Settings, TrajectoryFile};
 use taustream_messages::{Phase, Report};
 use taustream_motion::digits::Amount;
+use taustream_planner::neighbours::{Neighbours, settle};
 use taustream_planner::send::{SendError, send_trajectory};
 use taustream_planner::verify;
 
@@ -71,7 +72,15 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
     let client = Client::join(&arm.name)?;
     let (report, phase) = client.report()?;
     check_ready(&report, phase, &file, &settings)?;
-    let sent = send_trajectory(client.wire(), &settings.robot, &file.trajectory, RECEIPT).map_err(explain)?;
+    let neighbours = open_neighbours(&settings)?;
+    let turn = neighbours.commit_one((&settings.robot, &settings.scene), &file.trajectory, RECEIPT).map_err(
+        |why| Failure::Refused(format!("{}: nothing was sent: {why}", args.trajectory.path().display())),
+    )?;
+    let sent = send_trajectory(client.wire(), &settings.robot, &file.trajectory, RECEIPT);
+    if let Some(turn) = turn {
+        settle(&turn, &sent).map_err(|e| Failure::Failed(e.to_string()))?;
+    }
+    let sent = sent.map_err(explain)?;
     let Some(receipt) = sent.receipt else {
         return Err(Failure::Failed(format!(
             "trajectory {} was sent, but the streamer gave no receipt within {} s; `taustream status` shows whether it runs",
@@ -99,6 +108,12 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &RunArgs) -> Result
         tick,
         executed,
     })
+}
+
+/// The other arms in the room; their first reports come soon.
+pub(crate) fn open_neighbours(settings: &Settings) -> Result<Neighbours, Failure> {
+    let runtime = taustream_arm::runtime::directory().map_err(|e| Failure::Failed(e.to_string()))?;
+    Neighbours::open(&settings.name, &settings.neighbours, &runtime).map_err(Failure::Failed)
 }
 
 /// A trajectory file that says which robot it was made for; offline use may leave that out, the streamer may not.

@@ -1,5 +1,6 @@
 //! `taustream scene`: lists and changes the running planner's scene.
 use super::client::{Client, Limit, PLANNER};
+use super::run::open_neighbours;
 use crate::args::{AddArgs, MoveArgs, SceneAction, SceneArgs, Triple};
 use crate::arm::{self, ArmName};
 use crate::failure::Failure;
@@ -22,6 +23,7 @@ use taustream_messages::scene::{CHANGES_MAX, FixedTo, ObjectPose, ObjectShape, S
 use taustream_messages::scene_reply::{ListedObject, MotionEffect, SceneOutcome};
 use taustream_messages::service::SceneClient;
 use taustream_messages::{CheckedSceneRequest, SceneReply, SceneRequest};
+use taustream_planner::neighbours::NeighbourWords;
 
 /// A planner that reroutes a motion answers after that.
 const ANSWER_S_MAX: f64 = 3.0;
@@ -48,7 +50,18 @@ struct Listed {
     arm: String,
     revision: u64,
     objects: Vec<Object>,
+    /// Other arms in the room.
+    neighbours: Vec<NeighbourStatus>,
     last_effect: Option<String>,
+}
+
+/// Another arm in the room.
+#[derive(Debug, Serialize)]
+struct NeighbourStatus {
+    name: String,
+    /// Null before its first report.
+    report_age_s: Option<f64>,
+    state: String,
 }
 
 impl fmt::Display for Listed {
@@ -65,6 +78,12 @@ impl fmt::Display for Listed {
             )?;
             if object.mass_kg > 0.0 {
                 write!(f, ", {} kg", object.mass_kg)?;
+            }
+        }
+        for NeighbourStatus { report_age_s, state, .. } in &self.neighbours {
+            write!(f, "\n{state}")?;
+            if let Some(age_s) = report_age_s {
+                write!(f, "; its report is {age_s:.3} s old")?;
             }
         }
         match &self.last_effect {
@@ -111,7 +130,10 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &SceneArgs) -> Resu
     let client = Client::join(&arm.name)?;
     let mut port = ScenePort::open(&client)?;
     let changes = match &args.action {
-        SceneAction::List => return form.print(&port.list(arm.name)?),
+        SceneAction::List => {
+            let neighbours = neighbours(settings)?;
+            return form.print(&Listed { neighbours, ..port.list(arm.name)? });
+        }
         SceneAction::Add(add) => match &add.cloud {
             Some(file) => return form.print(&port.put(&arm.name, &cloud(file, add)?)?),
             None => additions(add)?,
@@ -130,6 +152,28 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &SceneArgs) -> Resu
     match changed {
         Some(changed) => form.print(&changed),
         None => Err(Failure::Usage("the file has no objects".to_owned())),
+    }
+}
+
+/// How long first reports of neighbours are waited for.
+const FIRST_REPORTS_S: f64 = 0.3;
+
+/// What is known of the other arms.
+fn neighbours(settings: Option<&Path>) -> Result<Vec<NeighbourStatus>, Failure> {
+    let neighbours = open_neighbours(&arm::settings_to_talk(settings)?)?;
+    let limit = Limit::after_s(FIRST_REPORTS_S);
+    loop {
+        neighbours.look();
+        let words = neighbours.words();
+        if words.iter().all(|words| words.report_age_s.is_some()) || limit.is_over() {
+            let status = |NeighbourWords { name, report_age_s, what }| NeighbourStatus {
+                name,
+                report_age_s,
+                state: what,
+            };
+            return Ok(words.into_iter().map(status).collect());
+        }
+        thread::sleep(LOOK_AGAIN);
     }
 }
 
@@ -182,7 +226,8 @@ impl<'a> ScenePort<'a> {
     fn list(&mut self, arm: String) -> Result<Listed, Failure> {
         let (revision, objects, effect) = self.objects()?;
         let last_effect = Some(effect).filter(|effect| !effect.is_empty());
-        Ok(Listed { arm, revision, objects: objects.into_iter().map(object).collect(), last_effect })
+        let (objects, neighbours) = (objects.into_iter().map(object).collect(), Vec::new());
+        Ok(Listed { arm, revision, objects, neighbours, last_effect })
     }
 
     /// All pages of one revision.

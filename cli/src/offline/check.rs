@@ -3,6 +3,7 @@ use super::axis_line::AxisLine;
 use super::bus_table::BusTable;
 use super::checked_robot::CheckedRobot;
 use super::feed_forward_line::FeedForwardLine;
+use super::neighbour_line::NeighbourLine;
 use super::protocol_line::ProtocolLine;
 use crate::args::CheckArgs;
 use crate::arm;
@@ -190,6 +191,7 @@ struct CheckedSettings {
     servos: Vec<ServoLine>,
     axes: Vec<AxisLine>,
     feed_forward: Option<FeedForwardLine>,
+    neighbours: Vec<NeighbourLine>,
 }
 
 impl CheckedSettings {
@@ -223,6 +225,7 @@ impl CheckedSettings {
             servos: settings.servos.iter().map(line).collect(),
             axes: AxisLine::all(settings),
             feed_forward: FeedForwardLine::of(settings),
+            neighbours: NeighbourLine::all(settings),
         }
     }
 }
@@ -254,6 +257,9 @@ impl fmt::Display for CheckedSettings {
         }
         if let Some(feed_forward) = &self.feed_forward {
             writeln!(f, "{feed_forward}")?;
+        }
+        for neighbour in &self.neighbours {
+            writeln!(f, "{neighbour}")?;
         }
         writeln!(f, "  when setpoints stop coming, because of a failure of streamer or bus:")?;
         for reaction in Reaction::ALL {

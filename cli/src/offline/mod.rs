@@ -13,6 +13,7 @@ mod follow_bench;
 pub(crate) mod import;
 mod limit_sets;
 mod mbm;
+mod neighbour_line;
 mod papers;
 mod pictures;
 pub(crate) mod plan;

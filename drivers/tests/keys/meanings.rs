@@ -183,6 +183,20 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
     ("Settings files: cycle", "The control cycle."),
     ("Settings files: supervision", "When the arm stops by itself."),
     ("Settings files: bus", "One table for each CAN interface."),
+    (
+        "Settings files: neighbour",
+        "One table for each other arm in the room, at most 3; see [neighbours.md](neighbours.md). Its settings must name this arm, too.",
+    ),
+    ("Settings files: neighbour[].settings", "Settings file of the other arm, relative to this one."),
+    ("Settings files: neighbour[].position_m", "Origin of its base in the frame of this arm's base."),
+    (
+        "Settings files: neighbour[].rpy_rad",
+        "Rotation of its base in that frame: roll, pitch, yaw about fixed axes (default 0).",
+    ),
+    (
+        "Settings files: neighbour[].margin_m",
+        "Distance that plans keep from it; the larger one of the two files counts, and at least the scene's margin.",
+    ),
     ("Settings files: servo", "One table for each joint."),
     (
         "Settings files: simulator",

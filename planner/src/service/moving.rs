@@ -140,8 +140,8 @@ impl Service<'_> {
                     self.outbox.fresh_report(super::REPORT_WITHIN).map_err(|e| e.to_string())?;
                 if phase == Phase::Holding && next.energised == 1 && requested.when != When::Cancel {
                     // It has ended meanwhile.
-                    let plan = self.plan(request, next.command_rad, (requested, options))?;
-                    return Ok(self.send(request, &plan));
+                    let planned = self.plan(request, next.command_rad, (requested, options))?;
+                    return Ok(self.send(request, &planned));
                 }
                 if !runs(phase) {
                     return Err(not_ready(phase));
@@ -199,17 +199,22 @@ impl Service<'_> {
             Replaces::Cut { at_s, .. } => at_s,
             Replaces::Rest => 0.0,
         };
-        if let Err(reason) = self.still_free(&revision, (&made.trajectory, from_s)) {
-            return Ok(Tried::NoWay(reason));
-        }
+        let turn = match self.commit(&revision, (&made.trajectory, from_s), super::RECEIPT_WITHIN) {
+            Ok(turn) => turn,
+            Err(reason) => return Ok(Tried::NoWay(reason)),
+        };
         let (planning_s, proven_ns) = (begun.elapsed().as_secs_f64(), now_ns());
         if !request.is_connected() {
             return Ok(Tried::Done(failed("the client has disconnected; motion not sent")));
         }
-        let sent = self
-            .outbox
-            .send_after(self.robot, report, (&made.trajectory, made.replaces), super::RECEIPT_WITHIN)
-            .map_err(|e| e.to_string())?;
+        let sent = self.outbox.send_after(
+            self.robot,
+            report,
+            (&made.trajectory, made.replaces),
+            super::RECEIPT_WITHIN,
+        );
+        turn.settle(&sent);
+        let sent = sent.map_err(|e| e.to_string())?;
         // What came too late counts as well: the next one is aimed further ahead.
         let latency = if way == Way::PastEnd { &mut self.corner_latency } else { &mut self.latency };
         latency.note((begun.elapsed().as_secs_f64() - search_s).max(0.0));

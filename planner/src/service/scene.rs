@@ -124,6 +124,7 @@ impl Service<'_> {
         match CheckedSceneRequest::try_from(copy).map_err(|e| e.to_string())? {
             CheckedSceneRequest::List { first } => Ok(Some(self.page(first))),
             CheckedSceneRequest::Change(changes) => {
+                self.check_tip_changes(&changes)?;
                 let at_rest = self.rests_at(&changes);
                 let made = self.live_scene.borrow_mut().apply(&changes, at_rest.as_ref());
                 changed.join(&made.map_err(|e| e.to_string())?);

@@ -199,7 +199,7 @@ impl Service<'_> {
             } else {
                 surroundings.direct((&cut, &[goal_rad]), &options)
             };
-            if let Some(sent) = self.send_reroute(&report, (&cut, made)) {
+            if let Some(sent) = self.send_reroute(revision, &report, (&cut, made)) {
                 return Some(sent);
             }
         }
@@ -208,12 +208,16 @@ impl Service<'_> {
 
     fn send_reroute(
         &self,
+        revision: &SceneRevision,
         report: &Report,
         (cut, made): (&CutPoint, Result<Replacement, NoReplacement>),
     ) -> Option<(u64, String)> {
         let made = made.map_err(|e| info!("no other way from {:.3} s: {e}", cut.at_s)).ok()?;
         let replaced = (&made.trajectory, made.replaces);
+        let turn = self.commit(revision, (&made.trajectory, cut.at_s), VALID + RECEIPT_TAKES);
+        let turn = turn.map_err(|reason| info!("the other way is not sent: {reason}")).ok()?;
         let sent = self.outbox.send_after(self.robot, report, replaced, VALID + RECEIPT_TAKES);
+        turn.settle(&sent);
         let sent = sent.map_err(|e| warn!("{e}")).ok()?;
         match sent.receipt.and_then(|receipt| receipt.outcome()) {
             Some(Outcome::Accepted { .. }) => Some((sent.trajectory_id, made.how)),
@@ -225,7 +229,11 @@ impl Service<'_> {
     }
 
     /// Lets the streamer stop the arm on its path.
-    fn stop(&self, (effect, fast): (MotionEffect, bool), (why, checked_ns): (&str, u64)) -> Effect {
+    pub(super) fn stop(
+        &self,
+        (effect, fast): (MotionEffect, bool),
+        (why, checked_ns): (&str, u64),
+    ) -> Effect {
         let (command, words) = if fast {
             (Command::FastStop, "a fast stop on the path, which ends in a fault")
         } else {

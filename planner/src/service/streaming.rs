@@ -7,6 +7,7 @@ use super::moving::{LATENCY_MARGIN_S, Latency, is_too_late, runs};
 use super::{RECEIPT_WITHIN, Service, is_alive, not_ready};
 use crate::budget::Budget;
 use crate::in_motion::folded;
+use crate::live_scene::SceneRevision;
 use crate::replacement::to_rest;
 use crate::send::{RECEIPT_TAKES, REPORT_WITHIN, check_robot};
 use crate::stream::{Follower, Lead, Piece, Reference, Trend};
@@ -247,20 +248,20 @@ impl Service<'_> {
             (report, phase) = self.outbox.fresh_report(REPORT_WITHIN).map_err(|e| refused(&e))?;
         }
         check_robot(self.robot, &report).map_err(|e| refused(&e))?;
+        self.know_neighbours().map_err(Failed::Refused)?;
         let latency_s = (self.stream.latency.quantile_s() + LATENCY_MARGIN_S) * f64::from(1 << number);
         let start = self.start(&report, phase, latency_s)?;
-        let (piece, note) = self.proven(&start, targets, (lead, note))?;
+        let revision = self.revision();
+        let (piece, note) = self.proven(&revision, &start, targets, (lead, note))?;
         let planning_s = begun.elapsed().as_secs_f64();
         let left = still_valid(targets).map_err(|e| refused(&e))?;
-        let sent = self
-            .outbox
-            .send_after(
-                self.robot,
-                &report,
-                (&piece.trajectory, start.replaces),
-                left.min(RECEIPT_WITHIN) + RECEIPT_TAKES,
-            )
-            .map_err(|e| refused(&e))?;
+        let within = left.min(RECEIPT_WITHIN) + RECEIPT_TAKES;
+        let turn =
+            self.commit(&revision, (&piece.trajectory, start.cut_s), within).map_err(Failed::Refused)?;
+        let motion = (&piece.trajectory, start.replaces);
+        let sent = self.outbox.send_after(self.robot, &report, motion, within);
+        turn.settle(&sent);
+        let sent = sent.map_err(|e| refused(&e))?;
         match sent.receipt.and_then(|receipt| receipt.outcome()) {
             Some(Outcome::Accepted { .. }) => {}
             Some(Outcome::Rejected(rejection)) if is_too_late(&rejection, start.folded_s < start.cut_s) => {
@@ -287,12 +288,12 @@ impl Service<'_> {
     /// A piece that is proven free and inside the limits, as far towards the target as there is one.
     fn proven(
         &mut self,
+        revision: &SceneRevision,
         start: &Start,
         targets: &CheckedTargets,
         (lead, note): (Option<&Lead>, &str),
     ) -> Result<(Piece, String), Failed> {
-        // Nothing changes the scene until the piece is sent.
-        let world = &*self.revision().world;
+        let world = &*revision.world;
         let kept = kept(&start.base, start.kept_until_s, start.folded_s);
         let from = (&start.reference, start.cut_s);
         let budget = Budget::until(PROOF_WITHIN, None);

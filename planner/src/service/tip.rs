@@ -1,10 +1,10 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
-use super::{Request, Service, holding};
+use super::{Planned, Request, Service, holding};
 use crate::budget::Budget;
 use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
 use crate::held::check_held;
 use crate::live_scene::SceneRevision;
-use crate::plan::{Plan, PlanOptions, StartMargin};
+use crate::plan::{PlanOptions, StartMargin};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::time::{Duration, Instant};
 use taustream_arm::Robot;
@@ -63,9 +63,10 @@ impl Service<'_> {
         request: &Request,
         (start_rad, held_joints): (JointArray, u32),
         (tip, line, options): (&TipGoal, &TipLine, &PlanOptions),
-    ) -> Result<Plan, String> {
+    ) -> Result<Planned, String> {
         let started = Instant::now();
         let revision = self.revision();
+        self.check_start(&revision, &start_rad)?;
         let robot = holding(&revision.robot, held_joints, &start_rad);
         let (situation, target) = (situation((&robot, &revision), start_rad), target(tip));
         let TipLine { linear_m_s, angular_rad_s, off_m_max } = *line;
@@ -79,7 +80,6 @@ impl Service<'_> {
         let plan = line.into_plan(how, started.elapsed().as_secs_f64());
         self.reported.stages(&plan.stages);
         check_held(&robot, &plan.trajectory, held_joints).map_err(|e| e.to_string())?;
-        self.still_free(&revision, (&plan.trajectory, 0.0))?;
-        Ok(plan)
+        Ok(Planned { plan, revision })
     }
 }

@@ -222,3 +222,22 @@ pub(crate) fn assert_safe(robot: &Robot, scene: &Scene, motion: &Trajectory, goa
         assert!((end - goal).abs() < 1e-9, "{who}: joint {j} ends at {end}, not at {goal}");
     }
 }
+
+/// Least distance of the links of two UR5s that may meet, the second one's base in the frame of the first: one of them moves.
+pub(crate) fn ur5_pair_distance_m(
+    robot: &Robot,
+    [a_rad, b_rad]: [&JointArray; 2],
+    base_of_b: &Isometry3<f64>,
+) -> f64 {
+    let moved = |p: [f64; 3]| -> [f64; 3] { (base_of_b * Point3::from(p)).into() };
+    let (a, b) = (ur5_capsules(robot, a_rad), ur5_capsules(robot, b_rad));
+    let mut least_m = f64::INFINITY;
+    for one in &a {
+        for other in b.iter().filter(|other| one.link > 0 || other.link > 0) {
+            let [from, to] = one.ends_m;
+            let [c, d] = other.ends_m.map(moved);
+            least_m = least_m.min(segments_m(from, to, c, d) - one.radius_m - other.radius_m);
+        }
+    }
+    least_m
+}

@@ -11,19 +11,19 @@ use tracing::info;
 const FOREIGN_MAX: usize = 8;
 
 /// What goes to the streamer, as it is received here.
-pub(super) struct Foreign {
+pub(crate) struct Foreign {
     trajectories: TrajectorySubscriber,
     /// Newest last.
     seen: RefCell<VecDeque<(u64, Trajectory)>>,
 }
 
 impl Foreign {
-    pub(super) fn open(wire: &Wire) -> Result<Self, SendError> {
+    pub(crate) fn open(wire: &Wire) -> Result<Self, SendError> {
         Ok(Self { trajectories: wire.trajectory_subscriber()?, seen: RefCell::default() })
     }
 
     /// Takes what was sent since the last look.
-    pub(super) fn look(&self) {
+    pub(crate) fn look(&self) {
         loop {
             match self.trajectories.receive() {
                 Ok(Some(sample)) => {
@@ -44,7 +44,7 @@ impl Foreign {
     }
 
     /// The strokes of a trajectory.
-    pub(super) fn known(&self, trajectory_id: u64) -> Option<Trajectory> {
+    pub(crate) fn known(&self, trajectory_id: u64) -> Option<Trajectory> {
         let seen = self.seen.borrow();
         seen.iter().rev().find(|(id, _)| *id == trajectory_id).map(|(_, trajectory)| trajectory.clone())
     }
