@@ -95,7 +95,7 @@ impl Service<'_> {
     pub(super) fn with_neighbours(&self, reason: String) -> String {
         match self.neighbours.busy() {
             Some(busy) if !reason.contains(&busy) => {
-                format!("{reason}; {busy}: ask again then, or --wait-s")
+                format!("{reason}; --wait-s waits for this: {busy}")
             }
             Some(_) | None => reason,
         }
