@@ -3,16 +3,19 @@
 //! Neighbouring samples are so near that no point of the arm moves by more than a spacing between them. What is thinner can be
 //! missed: a path of such edges is a proposal, and its motion is proven like any other. So that most proofs succeed, samples
 //! keep a little more than the margin.
+use crate::collide::StraightEdge;
 use crate::lanes::Lanes;
 use crate::rng::SeededRng;
 use crate::tree::{Field, Space};
-use std::cell::RefCell;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
 /// Share of the random poses that are drawn near start and goal.
 const NEAR: f64 = 0.7;
 /// How far beyond start and goal those are drawn (rad).
 const BEYOND_RAD: f64 = 1.2;
+
+/// Most samples of an edge.
+const SAMPLES_MAX: f64 = 1e6;
 
 /// How edges are sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +35,6 @@ pub struct Sampled<'s, 'a> {
     sampling: Sampling,
     /// Where poses near start and goal are drawn.
     near_rad: [[f64; 2]; MAX_JOINTS],
-    poses_rad: RefCell<Vec<JointArray>>,
 }
 
 impl<'s, 'a> Sampled<'s, 'a> {
@@ -50,7 +52,7 @@ impl<'s, 'a> Sampled<'s, 'a> {
         for ((near, [low, high]), (a, b)) in near_rad.iter_mut().zip(joints).zip(start.iter().zip(goal)) {
             *near = [low.max(a.min(*b) - BEYOND_RAD), high.min(a.max(*b) + BEYOND_RAD)];
         }
-        Self { space, lanes, sampling, near_rad, poses_rad: RefCell::default() }
+        Self { space, lanes, sampling, near_rad }
     }
 
     /// True when poses keep what the edges of a search keep.
@@ -76,15 +78,12 @@ impl Field for Sampled<'_, '_> {
         let joints = self.space.world.joints();
         let moves = reach.iter().zip(a.iter().zip(b)).take(joints).map(|(r, (a, b))| r * (a - b).abs());
         let moves_m: f64 = moves.sum();
-        let count = (moves_m / self.sampling.spacing_m).ceil().max(1.0);
-        let poses = &mut *self.poses_rad.borrow_mut();
-        poses.clear();
-        let mut i = 1.0;
-        while i <= count {
-            poses.push(Space::between(a, b, i / count));
-            i += 1.0;
-        }
-        !self.space.budget.is_over_after(poses.len()) && self.are_free(poses)
+        let count = (moves_m / self.sampling.spacing_m).ceil().clamp(1.0, SAMPLES_MAX);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let count = count as usize;
+        self.space.note_checks(count);
+        let edge = StraightEdge { from_rad: a, to_rad: b };
+        !self.space.budget.is_over_after(count) && self.lanes.is_edge_free(edge, count, self.sampling.extra_m)
     }
 
     fn checks(&self) -> usize {

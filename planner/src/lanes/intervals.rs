@@ -50,18 +50,19 @@ impl Pass<'_> {
         let lanes = S::F32_LANES.min(LANES_MAX);
         scratch.centres.resize(model.spheres.len() * 3 * S::F32_LANES, 0.0);
         kept.clear();
+        let chunk = Chunk::<S, FRAMES>::new(simd, (model, 0.0));
+        let (zero, enough) = (chunk.ops.all(0.0), chunk.ops.all(up(enough_m)));
+        let mut intervals = Intervals { chunk, turns: [zero; FRAMES], least: enough, spare: enough };
         for first in (0..poses_rad.len()).step_by(lanes) {
-            let chunk = Chunk::<S, FRAMES>::new(simd, (model, 0.0), (poses_rad, first, 1));
-            let mut turns = [chunk.ops.all(0.0); FRAMES];
-            for (joint, turn) in turns.iter_mut().enumerate().take(model.joints.len()) {
+            intervals.chunk.pose(poses_rad, first, 1);
+            for (joint, turn) in intervals.turns.iter_mut().enumerate().take(model.joints.len()) {
                 let mut values = [0.0_f32; LANES_MAX];
                 for (lane, value) in values.iter_mut().enumerate().take(S::F32_LANES) {
                     *value = up(turns_rad[(first + lane).min(turns_rad.len() - 1)][joint]);
                 }
                 *turn = S::as_simd_f32s(&values).0[0];
             }
-            let enough = chunk.ops.all(up(enough_m));
-            let mut intervals = Intervals { chunk, turns, least: enough, spare: enough };
+            (intervals.least, intervals.spare) = (enough, enough);
             intervals.measure(scratch);
             let [mut least, mut spare] = [[0.0_f32; LANES_MAX]; 2];
             S::as_mut_simd_f32s(&mut least).0[0] = intervals.least;

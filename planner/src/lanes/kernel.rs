@@ -4,6 +4,7 @@ use super::arithmetic::{Ops, Vector, Vector3};
 use super::grid::Bounds;
 use super::model::{Form, Group, GroupPair, Joint, Model, Obstacle};
 use super::rounding::down;
+use crate::collide::{Motion, StraightEdge};
 use pulp::{Simd, WithSimd};
 use std::f64::consts::PI;
 use taustream_arm::cloud::Cloud;
@@ -31,15 +32,15 @@ pub(super) struct Suspect {
 }
 
 /// Poses to look at.
-pub(super) struct Pass<'a> {
+pub(super) struct Pass<'a, P: Poses + ?Sized> {
     pub(super) model: &'a Model,
-    pub(super) poses_rad: &'a [JointArray],
+    pub(super) poses: &'a P,
     /// Kept beyond what every pair must.
     pub(super) extra_m: f64,
     pub(super) scratch: &'a mut Scratch,
 }
 
-impl WithSimd for Pass<'_> {
+impl<P: Poses + ?Sized> WithSimd for Pass<'_, P> {
     /// False when some pose is surely not free.
     type Output = bool;
 
@@ -53,22 +54,93 @@ impl WithSimd for Pass<'_> {
     }
 }
 
-impl Pass<'_> {
+impl<P: Poses + ?Sized> Pass<'_, P> {
     /// For arms with at most so many frames.
     #[inline(always)]
     fn search<S: Simd, const FRAMES: usize>(self, simd: S) -> bool {
-        let Self { model, poses_rad, extra_m, scratch } = self;
+        let Self { model, poses, extra_m, scratch } = self;
         let lanes = S::F32_LANES.min(LANES_MAX);
-        let strides = poses_rad.len().div_ceil(lanes);
+        let strides = poses.count().div_ceil(lanes);
         scratch.centres.resize(model.spheres.len() * 3 * S::F32_LANES, 0.0);
+        let mut chunk = Chunk::<S, FRAMES>::new(simd, (model, extra_m));
         // Lanes are spread over the poses: what blocks an edge is met in its first chunk.
         for first in 0..strides {
-            let mut chunk = Chunk::<S, FRAMES>::new(simd, (model, extra_m), (poses_rad, first, strides));
+            chunk.pose(poses, first, strides);
             if chunk.is_blocked(scratch) {
                 return false;
             }
         }
         true
+    }
+}
+
+/// Where poses come from; there is at least one.
+pub(super) trait Poses {
+    /// What is known of one.
+    type Place: Copy;
+
+    /// How many.
+    fn count(&self) -> usize;
+
+    /// The one of a number.
+    fn place(&self, index: usize) -> Self::Place;
+
+    /// The position of a joint there.
+    fn position(&self, place: Self::Place, joint: usize) -> f64;
+
+    /// All positions.
+    fn pose(&self, index: usize) -> JointArray;
+}
+
+impl Poses for [JointArray] {
+    type Place = usize;
+
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)]
+    fn place(&self, index: usize) -> usize {
+        index
+    }
+
+    #[inline(always)]
+    fn position(&self, place: usize, joint: usize) -> f64 {
+        self[place][joint]
+    }
+
+    fn pose(&self, index: usize) -> JointArray {
+        self[index]
+    }
+}
+
+/// Poses at even distances on a straight edge, its end the last of them.
+pub(super) struct Along<'a> {
+    pub(super) edge: StraightEdge<'a>,
+    pub(super) count: usize,
+}
+
+impl Poses for Along<'_> {
+    /// Share of the way.
+    type Place = f64;
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    fn place(&self, index: usize) -> f64 {
+        (index + 1) as f64 / self.count as f64
+    }
+
+    #[inline(always)]
+    fn position(&self, place: f64, joint: usize) -> f64 {
+        let StraightEdge { from_rad, to_rad } = self.edge;
+        from_rad[joint] + (to_rad[joint] - from_rad[joint]) * place
+    }
+
+    fn pose(&self, index: usize) -> JointArray {
+        self.edge.at(self.place(index))
     }
 }
 
@@ -103,25 +175,35 @@ pub(super) struct Chunk<'a, S: Simd, const FRAMES: usize> {
 
 impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
     #[inline(always)]
-    pub(super) fn new(
-        simd: S,
-        (model, extra_m): (&'a Model, f64),
-        (poses_rad, first, strides): (&[JointArray], usize, usize),
-    ) -> Self {
+    pub(super) fn new(simd: S, (model, extra_m): (&'a Model, f64)) -> Self {
         let ops = Ops(simd);
+        let zero = ops.all(0.0);
+        #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
+        let extra = extra_m as f32;
+        Self { ops, model, extra, poses: [0; 3], frames: [([[zero; 3]; 3], [zero; 3]); FRAMES], placed: 0 }
+    }
+
+    /// The arm in the poses from `first` on, one in `strides` a lane.
+    #[inline(always)]
+    pub(super) fn pose(&mut self, poses: &(impl Poses + ?Sized), first: usize, strides: usize) {
+        let (ops, model) = (self.ops, self.model);
         let (one, zero) = (ops.all(1.0), ops.all(0.0));
         let mut columns = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
         let mut origin = [zero; 3];
-        let mut frames = [(columns, origin); FRAMES];
+        self.frames[0] = (columns, origin);
+        let last = poses.count() - 1;
+        let mut places = [poses.place(last); LANES_MAX];
+        for (lane, place) in places.iter_mut().enumerate().take(S::F32_LANES) {
+            *place = poses.place((first + lane * strides).min(last));
+        }
         for (j, joint) in model.joints.iter().enumerate() {
             let mut positions = [0.0_f32; LANES_MAX];
-            for (lane, position) in positions.iter_mut().enumerate().take(S::F32_LANES) {
-                let pose = &poses_rad[(first + lane * strides).min(poses_rad.len() - 1)];
-                *position = reduced(joint, pose[j]);
+            for (position, place) in positions.iter_mut().zip(&places) {
+                *position = reduced(joint, poses.position(*place, j));
             }
             let (position, _) = S::as_simd_f32s(&positions);
             if joint.parent != j {
-                (columns, origin) = frames[joint.parent];
+                (columns, origin) = self.frames[joint.parent];
             }
             origin = ops.moved(origin, &columns, joint.shift);
             let zero3 = [zero; 3];
@@ -147,11 +229,10 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
                     }
                 }
             }
-            frames[j + 1] = (columns, origin);
+            self.frames[j + 1] = (columns, origin);
         }
-        #[expect(clippy::cast_possible_truncation, reason = "counted in the tolerance")]
-        let extra = extra_m as f32;
-        Self { ops, model, extra, poses: [first, strides, poses_rad.len()], frames, placed: 0 }
+        self.poses = [first, strides, last + 1];
+        self.placed = 0;
     }
 
     /// True when some pose is surely not free; writes down the pairs that f32 leaves open.
@@ -162,7 +243,8 @@ impl<'a, S: Simd, const FRAMES: usize> Chunk<'a, S, FRAMES> {
             let (columns, origin) = &self.frames[group.frame];
             *middle = self.ops.moved(*origin, columns, group.centre);
         }
-        for (index, group) in self.model.groups.iter().enumerate() {
+        // What is at the tip meets something first as a rule.
+        for (index, group) in self.model.groups.iter().enumerate().rev() {
             if group.frame > 0 && self.meets_obstacles((index, group), middles[index], scratch) {
                 return true;
             }

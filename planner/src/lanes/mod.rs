@@ -14,8 +14,9 @@ mod kernel;
 mod model;
 mod rounding;
 
+use crate::collide::StraightEdge;
 use crate::world::{Frames, Other, Pair, World};
-use kernel::{Pass, Question, Suspect};
+use kernel::{Along, Pass, Poses, Question, Suspect};
 pub(crate) use model::Model;
 use pulp::Arch;
 use std::cell::RefCell;
@@ -64,13 +65,26 @@ impl<'a> Lanes<'a> {
     /// True when every one of the poses keeps what every pair must, and `extra_m` more.
     #[must_use]
     pub fn are_free(&self, poses_rad: &[JointArray], extra_m: f64) -> bool {
+        self.all_free(poses_rad, extra_m)
+    }
+
+    /// The same of so many poses at even distances on an edge, of which the last is its end.
+    #[must_use]
+    pub fn is_edge_free(&self, edge: StraightEdge, count: usize, extra_m: f64) -> bool {
+        self.all_free(&Along { edge, count }, extra_m)
+    }
+
+    fn all_free(&self, poses: &(impl Poses + ?Sized), extra_m: f64) -> bool {
+        if poses.count() == 0 {
+            return true;
+        }
         let scratch = &mut *self.scratch.borrow_mut();
         scratch.suspects.clear();
-        let pass = Pass { model: self.model, poses_rad, extra_m, scratch };
+        let pass = Pass { model: self.model, poses, extra_m, scratch };
         if !self.arch.dispatch(pass) {
             return false;
         }
-        self.are_suspects_free(poses_rad, extra_m, &mut scratch.suspects)
+        self.are_suspects_free(poses, extra_m, &mut scratch.suspects)
     }
 
     /// The first of the poses that is not free.
@@ -112,14 +126,20 @@ impl<'a> Lanes<'a> {
     }
 
     /// Measures the pairs that f32 leaves open.
-    fn are_suspects_free(&self, poses_rad: &[JointArray], extra_m: f64, suspects: &mut [Suspect]) -> bool {
+    fn are_suspects_free(
+        &self,
+        poses: &(impl Poses + ?Sized),
+        extra_m: f64,
+        suspects: &mut [Suspect],
+    ) -> bool {
         suspects.sort_unstable_by_key(|suspect| suspect.pose);
         let mut placed: Option<(u32, Frames)> = None;
         suspects.iter().all(|suspect| {
-            let Some(pose_rad) = poses_rad.get(suspect.pose as usize) else { return false };
             let frames = match &placed {
                 Some((pose, frames)) if *pose == suspect.pose => frames,
-                Some(_) | None => &placed.insert((suspect.pose, self.world.frames(pose_rad))).1,
+                Some(_) | None => {
+                    &placed.insert((suspect.pose, self.world.frames(&poses.pose(suspect.pose as usize)))).1
+                }
             };
             self.pair(suspect.question).is_some_and(|pair| self.world.keeps(&pair, frames, extra_m))
         })

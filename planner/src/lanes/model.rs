@@ -13,6 +13,9 @@ use taustream_arm::body::{Body, Core, Posed};
 use taustream_arm::cloud::Cloud;
 use taustream_motion::JointKind;
 
+/// Entries of a rotation below this are 0, far below the rounding of f32.
+const NOTHING: f64 = 1e-12;
+
 /// Fewer obstacles than this are looked at one by one.
 const TREE_MIN: usize = 24;
 
@@ -290,7 +293,11 @@ fn joints(world: &World, aligned: &[Aligned]) -> Vec<Joint> {
     debug_assert_eq!(world.joints(), aligned.len());
     let one = |a: &Aligned| {
         let (turn, shift) = (a.before.rotation.to_rotation_matrix(), a.before.translation.vector);
-        let entry = |row: usize, column: usize| turn[(row, column)] as f32;
+        // What a quaternion's rounding leaves of a right angle is none: the kernel leaves out what is 0.
+        let entry = |row: usize, column: usize| {
+            let entry = turn[(row, column)];
+            if entry.abs() < NOTHING { 0.0 } else { entry as f32 }
+        };
         Joint {
             parent: a.parent,
             columns: std::array::from_fn(|column| std::array::from_fn(|row| entry(row, column))),
