@@ -13,6 +13,9 @@ pub(crate) struct TorqueUse {
     at_s: f64,
     /// Null for a joint that states none.
     torque_nm_max: Option<f64>,
+    /// "N" for a prismatic joint, whose numbers above are forces; left out where they are Nm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit: Option<&'static str>,
 }
 
 /// The torques of a motion, or why nobody knows them.
@@ -47,6 +50,7 @@ impl Torques {
                     torque_nm: peak.torque_nm,
                     at_s: peak.at_s,
                     torque_nm_max: joint.torque_nm_max,
+                    unit: joint.kind.is_prismatic().then(|| joint.kind.force_unit()),
                 });
                 Self { torque_use: joints.collect(), torque_unchecked: None, mass_doubt }
             }
@@ -61,9 +65,10 @@ impl fmt::Display for Torques {
         if let Some((share, use_)) = most.max_by(|a, b| a.0.total_cmp(&b.0)) {
             writeln!(
                 f,
-                "torque        at most {:.0} % of what a joint can: {:.1} Nm of {} at t = {:.3} s",
+                "torque        at most {:.0} % of what a joint can: {:.1} {} of {} at t = {:.3} s",
                 100.0 * share,
                 use_.torque_nm,
+                use_.unit.unwrap_or("Nm"),
                 use_.joint,
                 use_.at_s
             )?;
