@@ -18,6 +18,8 @@ pub enum OptionalObject {
     AbortConnection = 0x6007,
     /// Quick stop option: how a quick stop ends.
     QuickStopOption = 0x605A,
+    /// Rated torque of the motor.
+    RatedTorque = 0x6076,
     /// Home offset.
     HomeOffset = 0x607C,
     /// Max profile velocity: beyond it the drive cuts speeds off.
@@ -48,11 +50,12 @@ pub enum OptionalObject {
 
 impl OptionalObject {
     /// Every object.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::SyncPeriod,
         Self::ProducerHeartbeat,
         Self::AbortConnection,
         Self::QuickStopOption,
+        Self::RatedTorque,
         Self::HomeOffset,
         Self::MaxProfileVelocity,
         Self::MaxMotorSpeed,
@@ -86,6 +89,7 @@ impl OptionalObject {
             Self::ProducerHeartbeat => "producer heartbeat time",
             Self::AbortConnection => "abort connection option",
             Self::QuickStopOption => "quick stop option",
+            Self::RatedTorque => "rated torque",
             Self::HomeOffset => "home offset",
             Self::MaxProfileVelocity => "max profile velocity",
             Self::MaxMotorSpeed => "max motor speed",
@@ -101,12 +105,14 @@ impl OptionalObject {
             Self::SupportedModes => "supported drive modes",
         }
     }
-    /// It limits speeds or accelerations: looked at where `[servo.profile_limits]` says so, and not otherwise.
+    /// It limits speeds or accelerations, or is the unit of torques: looked at where `[servo.profile_limits]` or `[servo.torque]` is
+    /// stated, and not otherwise.
     #[must_use]
-    pub const fn is_profile_limit(self) -> bool {
+    pub const fn is_of_a_table(self) -> bool {
         matches!(
             self,
-            Self::MaxProfileVelocity
+            Self::RatedTorque
+                | Self::MaxProfileVelocity
                 | Self::MaxMotorSpeed
                 | Self::ProfileAcceleration
                 | Self::ProfileDeceleration
@@ -128,6 +134,7 @@ impl OptionalObject {
             Self::ProducerHeartbeat => "only missing feedback shows that the drive is gone",
             Self::AbortConnection => "what the drive does when its master is lost is the drive's own setting",
             Self::QuickStopOption => "whether the drive holds after a quick stop is the drive's own setting",
+            Self::RatedTorque => "that torques are in thousandths of rated_torque_nm is its owner's word",
             Self::HomeOffset => "the position that homing gives the home position is the drive's own setting",
             Self::MaxProfileVelocity | Self::MaxMotorSpeed => {
                 "whether the drive cuts speeds off is the drive's own setting"
@@ -165,6 +172,7 @@ impl OptionalObject {
             Self::QuickStopDeceleration => 1 << 14,
             Self::MaxAcceleration => 1 << 15,
             Self::MaxDeceleration => 1 << 16,
+            Self::RatedTorque => 1 << 17,
         }
     }
 }

@@ -131,7 +131,7 @@ fn check_torque(table: &Table<'_>, (joint, torque_nm): (&RobotJoint, f64), servo
     let Some(servo) = servo else { return };
     if !servo.protocol.carries_torque() {
         let expected = format!(
-            "a joint whose protocol carries a torque beside the position (a Damiao motor in mode \"mit\"); that of joint {} is {:?}",
+            "a joint whose protocol carries a torque beside the position (a Damiao motor in mode \"mit\", a CiA 402 drive with offset = true in [servo.torque]); that of joint {} is {:?}",
             joint.name,
             servo.protocol.name()
         );

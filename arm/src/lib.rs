@@ -22,6 +22,7 @@ mod document;
 pub mod drive_epochs;
 pub mod drive_features;
 pub mod drive_scale;
+pub mod drive_torque;
 mod dynamics;
 pub mod fault;
 pub mod feed_forward;
@@ -74,6 +75,7 @@ pub use drive_features::{
     AbsentObjects, DriveFeatures, MasterSupervision, OptionalObject, PositionMode, WrittenLimits,
 };
 pub use drive_scale::{Overruled, ScaleObject};
+pub use drive_torque::TorqueSettings;
 pub use dynamics::NoMasses;
 pub use fault::{Fault, Faults};
 pub use feed_forward::{FeedForward, JointTorque};

@@ -122,7 +122,7 @@ fn meanings() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
 
 /// The homing of the first servo, its brake and its own limits, behind its other keys.
 const HOMING: &str = "limp_is_safe = true\n[servo.homing]\nmethod = 18\nvelocity_unit = \"rpm\"\nswitch_speed_rad_s = 0.1\n\
-    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n[servo.brake]\nreleased_by = 1\nrelease_ms = 50\nclose_ms = 50\n[servo.profile_limits]\napply = \"compare\"\nvelocity_unit = \"rpm\"\n\n[[servo]]";
+    zero_speed_rad_s = 0.1\nacceleration_rad_s2 = 1.0\ntimeout_s = 5.0\ncollision_risk_acknowledged = true\n[servo.torque]\nrated_torque_nm = 1.3\noffset = true\n[servo.brake]\nreleased_by = 1\nrelease_ms = 50\nclose_ms = 50\n[servo.profile_limits]\napply = \"compare\"\nvelocity_unit = \"rpm\"\n\n[[servo]]";
 
 /// The shipped axis in rad.
 const AXIS_IN_RAD: &[(&str, &str)] = &[

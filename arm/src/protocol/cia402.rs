@@ -4,8 +4,9 @@ use super::{FdUse, Protocol, Registration, ServoProtocol};
 use crate::brake::{self, BrakeSettings};
 use crate::bus_load::flow::{Cia402Bus, Flow};
 use crate::bus_load::frame::{Format, Frame};
-use crate::drive_features::{self, DriveFeatures, OptionalObject};
+use crate::drive_features::{self, DriveFeatures, OptionalObject, PositionMode};
 use crate::drive_scale::{self, Overruled, ScaleObject};
+use crate::drive_torque::{self, TorqueSettings};
 use crate::homing::{self, HomingSettings};
 use crate::profile_limits::ProfileLimits;
 use crate::reader::{Bounds, FaultList, Table};
@@ -33,6 +34,8 @@ pub struct Cia402 {
     pub homing: Option<HomingSettings>,
     /// The brake that its master releases; `None`: it works its brake by itself, or has none.
     pub brake: Option<BrakeSettings>,
+    /// Its torques; `None`: none are sent, and none read.
+    pub torque: Option<TorqueSettings>,
 }
 
 pub(super) const REGISTRATION: Registration = Registration {
@@ -55,6 +58,7 @@ pub(super) const REGISTRATION: Registration = Registration {
         "profile_limits",
         "homing",
         "brake",
+        "torque",
     ],
     // 127 is refused later, because it is this master.
     node_id: [1, 127],
@@ -70,6 +74,8 @@ pub const DIGITAL_INPUTS_MS: u16 = 200;
 const SDO_BYTES: u32 = 8;
 /// Control or status word and a 32-bit position.
 const PDO_BYTES: u32 = 6;
+/// A torque behind them.
+const TORQUE_BYTES: u32 = 2;
 
 /// Identifiers with which a CANopen node sends and receives, each plus its node id.
 ///
@@ -110,6 +116,7 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
     let features = drive_features::read(table);
     let homing = homing::read(table);
     let brake = brake::read(table);
+    let torque = drive_torque::read(table);
     Some(Cia402 {
         gear_ratio: gear_ratio?,
         counts_per_rev: counts_per_rev?,
@@ -118,6 +125,7 @@ fn read(table: &mut Table<'_>) -> Option<Cia402> {
         features: features?,
         homing: homing?,
         brake: brake?,
+        torque: torque?,
     })
 }
 
@@ -150,6 +158,14 @@ impl ServoProtocol for Cia402 {
 
     fn shapes_traffic(&self) -> bool {
         true
+    }
+
+    fn carries_torque(&self) -> bool {
+        self.torque.is_some_and(|torque| torque.offset)
+    }
+
+    fn measures_torque(&self) -> bool {
+        self.torque.is_some_and(|torque| torque.actual)
     }
 
     fn identifiers(&self, node_id: u8) -> Vec<Use> {
@@ -190,11 +206,22 @@ impl ServoProtocol for Cia402 {
     }
 
     /// Times and traffic are those of the whole arm, which are checked for all of it.
-    fn check_settings(&self, fault_list: &FaultList, at: usize, servo: &Servo, _: &Settings) {
+    fn check_settings(&self, fault_list: &FaultList, at: usize, servo: &Servo, settings: &Settings) {
         if self.homing.is_some() && servo.feedback == Feedback::Wraps {
             let expected = "feedback = \"incremental\" or \"multi-turn\": homing resolves no offset of feedback that wraps; \
                             `taustream reference` does";
             fault_list.add(None, &format!("servo[{at}].homing"), "feedback = \"wraps\"", expected);
+        }
+        let is_packed = settings.buses.get(servo.bus).is_some_and(|bus| bus.traffic.packed);
+        let interpolates = self.features.position_mode == PositionMode::Interpolated;
+        if self.carries_torque() && (is_packed || interpolates) {
+            let given = if is_packed {
+                "offset = true on a bus with packed = true"
+            } else {
+                "offset = true in interpolated position"
+            };
+            let expected = "a bus without `packed` and position_mode = \"cyclic\": the torque follows the position in the drive's own frame";
+            fault_list.add(None, &format!("servo[{at}].torque"), given, expected);
         }
         if self.brake.is_some() && servo.reaction != Reaction::Hold {
             let given = format!("reaction = {:?}", servo.reaction.word());
@@ -204,12 +231,17 @@ impl ServoProtocol for Cia402 {
     }
 
     fn flows(&self, servos: &[Protocol], bus: &Bus, cycle_hz: f64, format: Format) -> Vec<Flow> {
+        // One with a torque counts for all: which of them it is does not matter to the fullest cycle.
+        let bytes = |has: fn(&Self) -> bool| {
+            let any = servos.iter().filter_map(Protocol::get::<Self>).any(has);
+            if any { PDO_BYTES + TORQUE_BYTES } else { PDO_BYTES }
+        };
         let cia402 = Cia402Bus {
             drives: u32::try_from(servos.len()).unwrap_or(u32::MAX),
             cycle_hz,
             traffic: bus.traffic,
-            setpoint_bytes: PDO_BYTES,
-            answer_bytes: PDO_BYTES,
+            setpoint_bytes: bytes(Self::carries_torque),
+            answer_bytes: bytes(Self::measures_torque),
             format,
         };
         let reads_inputs =
@@ -242,6 +274,7 @@ impl ServoProtocol for Cia402 {
             ("digital_inputs", self.features.digital_inputs.into()),
             ("profile_limits", self.features.profile_limits.map_or(Value::Null, ProfileLimits::entries)),
             ("homing", self.homing.map_or(Value::Null, |homing| homing.entries())),
+            ("torque", self.torque.map_or(Value::Null, |torque| torque.entries())),
             ("brake", self.brake.map_or(Value::Null, |brake| brake.entries())),
         ]
     }
@@ -259,6 +292,9 @@ impl ServoProtocol for Cia402 {
         }
         if let Some(homing) = &self.homing {
             let _ = write!(text, ", {}", homing.sentence());
+        }
+        if let Some(torque) = &self.torque {
+            let _ = write!(text, ", {}", torque.sentence());
         }
         if let Some(brake) = &self.brake {
             let _ = write!(text, ", {}", brake.sentence());

@@ -20,7 +20,7 @@ pub(crate) const CASES: &[Case] = &[
         CYCLE,
         section!("joint = \"elbow\"\ntorque_nm_max = 20.0\nrate_nm_s_max = 50.0"),
         "feed_forward.joint[0].joint",
-        "carries a torque beside the position (a Damiao motor in mode \"mit\"); that of joint elbow is \"cia402\"",
+        "carries a torque beside the position (a Damiao motor in mode \"mit\", a CiA 402 drive with offset = true in [servo.torque]); that of joint elbow is \"cia402\"",
     ),
     (
         Damiao,

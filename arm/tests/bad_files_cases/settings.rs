@@ -392,6 +392,27 @@ pub(crate) const CASES: &[Case] = &[
     (
         Settings,
         "gear_ratio = 101.0",
+        "gear_ratio = 101.0\ntorque = { rated_torque_nm = 1.3 }",
+        "servo[0].torque.offset",
+        "the table does nothing",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\ntorque = { rated_torque_nm = 0.0, offset = true }",
+        "servo[0].torque.rated_torque_nm",
+        "from 0.001",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
+        "gear_ratio = 101.0\nposition_mode = \"interpolated\"\ntorque = { rated_torque_nm = 1.3, offset = true }",
+        "servo[0].torque",
+        "position_mode = \"cyclic\"",
+    ),
+    (
+        Settings,
+        "gear_ratio = 101.0",
         "gear_ratio = 101.0\ndigital_inputs = 1",
         "servo[0].digital_inputs",
         "true or false",

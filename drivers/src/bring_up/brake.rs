@@ -88,6 +88,13 @@ impl Node {
         }
     }
 
+    /// Closes the brake of a drive that has left process data, as far as it still takes requests.
+    pub(super) fn close_brake(&mut self) {
+        if let Some(settings) = &self.plan.brake {
+            self.sdo.begin(command(settings, false));
+        }
+    }
+
     /// Takes the answer.
     pub(super) fn take_brake(&mut self, now: Nanos, job: SdoJob, outcome: SdoOutcome) {
         let Some(settings) = self.plan.brake else { return };

@@ -4,7 +4,7 @@
 //! communication part is reset, the drive configured by SDO, and started. All times are on the driver's stall-free
 //! clock, which does not advance while the master itself is stalled, so that our own lateness is no fault of a drive.
 use crate::bring_up::adopt::Adoption;
-use crate::bring_up::brake::{self, Brake};
+use crate::bring_up::brake::Brake;
 use crate::bring_up::fault::BringUpFault;
 use crate::bring_up::homing::{Homing, HomingTarget};
 use crate::bring_up::homing_plan::HomingPlan;
@@ -38,6 +38,7 @@ const START_TRIES: u8 = 3;
 
 pub(super) const SCALE_DIFFERS: u32 = BringUpFault::ScaleDiffers.code();
 const LIMIT_TOO_LOW: u32 = BringUpFault::LimitTooLow.code();
+const RATED_TORQUE_DIFFERS: u32 = BringUpFault::RatedTorqueDiffers.code();
 const NOT_TAKEN: u32 = BringUpFault::NotTaken.code();
 
 /// What the modes display (0x6061) has said.
@@ -101,6 +102,8 @@ pub struct Target {
     pub counts: Option<i32>,
     /// Close enough to the measured position to energise.
     pub near: bool,
+    /// Torque beside it, at the joint.
+    pub torque_nm: f64,
 }
 
 /// The master's image of one node.
@@ -285,7 +288,7 @@ impl Node {
     pub fn refused_numbers(&self) -> [f64; 2] {
         let homing = if let HomingState::Failed { code, .. } = self.homing() { code } else { 0 };
         match self.error().0.max(homing) {
-            SCALE_DIFFERS | LIMIT_TOO_LOW | NOT_TAKEN => self.numbers,
+            SCALE_DIFFERS | LIMIT_TOO_LOW | RATED_TORQUE_DIFFERS | NOT_TAKEN => self.numbers,
             _ => [0.0; 2],
         }
     }
@@ -430,13 +433,6 @@ impl Node {
         self.sdo.begin(SdoJob::Write(object::CONTROLWORD, SdoBytes::from_u16(0)));
     }
 
-    /// Closes the brake of a drive that has left process data, as far as it still takes requests.
-    pub(super) fn close_brake(&mut self) {
-        if let Some(settings) = &self.plan.brake {
-            self.sdo.begin(brake::command(settings, false));
-        }
-    }
-
     pub(super) fn refuse(&mut self, code: u32, job: SdoJob) {
         self.stage = NodeStage::Refused { code, object: job.address().packed() };
     }
@@ -545,16 +541,6 @@ impl Node {
             self.mode.asked = now;
             self.sdo.begin(SdoJob::Read(object::MODE_DISPLAY));
         }
-    }
-
-    /// Asks a drive in fault for its error code, once: its emergency message was lost, or came before we listened.
-    pub(super) fn request_error(&mut self) -> bool {
-        let due = self.in_fault() && self.emcy == 0 && !self.requested_error && self.sdo.is_idle();
-        if due {
-            self.requested_error = true;
-            self.sdo.begin(SdoJob::Read(object::ERROR_CODE));
-        }
-        due
     }
 
     /// What an answer means for the stage.

@@ -97,6 +97,11 @@ impl Node {
         {
             self.numbers = profile.numbers(step.job.address(), number);
         }
+        if matches!(step.check, Check::RatedTorque(..))
+            && let Some(torque) = &self.plan.torque
+        {
+            self.numbers = [f64::from(number) * 1e-3, torque.rated_nm];
+        }
         steps::passes(step.check, number)?;
         match step.check {
             Check::NotEnergised => {
@@ -131,6 +136,7 @@ impl Node {
             | Check::Scale
             | Check::OffOrOwn(_)
             | Check::AtLeast(_)
+            | Check::RatedTorque(..)
             | Check::Equals { .. } => Ok(true),
         }
     }

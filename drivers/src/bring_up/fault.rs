@@ -75,6 +75,8 @@ pub enum BringUpFault {
     BrakeNotReleased = 0x0001_001F,
     /// It has not taken the command to close its brake.
     BrakeNotClosed = 0x0001_0020,
+    /// Its motor has another rated torque than the settings say.
+    RatedTorqueDiffers = 0x0001_0021,
 }
 
 const NEGATIVE_SWITCH: &str = "the drive's negative limit switch has become active (object 0x60FD, bit 0); lead the joint off it, then see its position_rad";
@@ -85,7 +87,7 @@ const NOT_CLOSED: &str = "the drive has not taken the command to close its brake
 
 impl BringUpFault {
     /// Every finding.
-    pub const ALL: [Self; 32] = [
+    pub const ALL: [Self; 33] = [
         Self::NoAnswer,
         Self::NoBootUp,
         Self::HeartbeatLost,
@@ -118,6 +120,7 @@ impl BringUpFault {
         Self::PositiveLimitSwitch,
         Self::BrakeNotReleased,
         Self::BrakeNotClosed,
+        Self::RatedTorqueDiffers,
     ];
 
     /// As [`crate::ServoStatus::error_code`].
@@ -176,6 +179,7 @@ impl BringUpFault {
             Self::NegativeLimitSwitch => NEGATIVE_SWITCH,
             Self::PositiveLimitSwitch => POSITIVE_SWITCH,
             Self::BrakeNotReleased => NOT_RELEASED,
+            Self::RatedTorqueDiffers => "the rated torque of the drive differs from rated_torque_nm",
             Self::BrakeNotClosed => NOT_CLOSED,
             Self::NotTaken => "the drive confirmed a write and holds another value",
             Self::HomingError => {
@@ -238,7 +242,8 @@ const fn unwired(fault: BringUpFault) -> Option<&'static str> {
         | BringUpFault::NegativeLimitSwitch
         | BringUpFault::PositiveLimitSwitch
         | BringUpFault::BrakeNotReleased
-        | BringUpFault::BrakeNotClosed => None,
+        | BringUpFault::BrakeNotClosed
+        | BringUpFault::RatedTorqueDiffers => None,
     }
 }
 
@@ -266,6 +271,13 @@ pub fn explain_refusal(refusal: &Refusal, has_cable: bool) -> String {
         && let Some(sentence) = profile_limits::sentence(object, stated, expected)
     {
         return sentence;
+    }
+    if code == BringUpFault::RatedTorqueDiffers.code() {
+        return format!(
+            "object 0x6076 (rated torque) of the drive is {stated} Nm, and rated_torque_nm of [servo.torque] is {expected} Nm: every \
+             torque would be {:.3} times the one that is meant; correct the one that is wrong, or state absent_objects = [0x6076]",
+            stated / expected
+        );
     }
     let (index, sub) = (object >> 8, object & 0xFF);
     let advice = advice(code, u16::try_from(index).unwrap_or(0));

@@ -62,6 +62,16 @@ impl Node {
         }
     }
 
+    /// Asks a drive in fault for its error code, once: its emergency message was lost, or came before we listened.
+    pub(super) fn request_error(&mut self) -> bool {
+        let due = self.in_fault() && self.emcy == 0 && !self.requested_error && self.sdo.is_idle();
+        if due {
+            self.requested_error = true;
+            self.sdo.begin(SdoJob::Read(object::ERROR_CODE));
+        }
+        due
+    }
+
     pub(super) fn rejoin(&mut self, now: Nanos, tries: u8) {
         self.nmt = Some(NmtCommand::Start);
         self.stage = NodeStage::Rejoin { since: now, tries };

@@ -11,6 +11,7 @@ use crate::codec::setpoint_frames::shared_cob_id;
 use crate::servo::Nanos;
 use taustream_arm::{
     BrakeSettings, DriveFeatures, HomingSettings, MasterSupervision, OptionalObject, PositionMode, Reaction,
+    TorqueSettings,
 };
 use taustream_motion::range::POSITION_TOLERANCE_RAD;
 
@@ -27,6 +28,8 @@ const ON_LOST_MASTER_QUICK_STOP: i16 = 3;
 const QUICK_STOP_THEN_OFF: i16 = 2;
 /// Quick stop that ends holding, energised: for joints that would fall.
 const QUICK_STOP_THEN_HOLD: i16 = 6;
+/// Share by which rated torques may differ: a data sheet has them rounded.
+const RATED_SAME: f64 = 0.01;
 /// Transmission type: every SYNC.
 const EVERY_SYNC: u8 = 1;
 
@@ -73,6 +76,8 @@ pub struct NodePlan {
     pub homing: Option<HomingSettings>,
     /// The brake that it does not work by itself.
     pub brake: Option<BrakeSettings>,
+    /// Its torques.
+    pub torque: Option<TorqueSettings>,
     /// Distance between a command and the measured position up to which they belong together, in counts.
     pub near_counts: u32,
 }
@@ -86,7 +91,9 @@ impl NodePlan {
         self.supervise(&mut steps);
         let rpdos = self.receive_pdos(&mut steps);
         let tpdo1 = Pdo { number: 0, cob_id: cob_id(object::TPDO_COMMUNICATION, COB_TPDO1, self.node) };
-        steps.pdo(object::TPDO_COMMUNICATION, tpdo1, self.feedback_every, &TPDO1_ENTRIES);
+        let measures = self.torque.is_some_and(|torque| torque.actual);
+        let entries = if measures { &TPDO1_ENTRIES[..] } else { &TPDO1_ENTRIES[..2] };
+        steps.pdo(object::TPDO_COMMUNICATION, tpdo1, self.feedback_every, entries);
         for number in 1..4 {
             if number >= rpdos {
                 steps.no_pdo(object::RPDO_COMMUNICATION, COB_RPDO1, self.node, number);
@@ -110,7 +117,9 @@ impl NodePlan {
         let target = PdoEntry::new(self.target_object(), 32);
         match self.target {
             TargetPdo::Own => {
-                steps.pdo(communication, rpdo1, EVERY_SYNC, &[CONTROLWORD, target]);
+                let carries = self.torque.is_some_and(|torque| torque.offset);
+                let entries = [CONTROLWORD, target, TORQUE_OFFSET];
+                steps.pdo(communication, rpdo1, EVERY_SYNC, if carries { &entries } else { &entries[..2] });
                 self.watch_setpoints(steps, rpdo1);
                 1
             }
@@ -171,6 +180,19 @@ impl NodePlan {
         if self.has(OptionalObject::SupportedModes) {
             let offers = Check::Offers(self.features.position_mode.number());
             steps.read(object::SUPPORTED_MODES, 4, offers);
+        }
+        if let Some(torque) = self.torque.filter(|_| self.has(OptionalObject::RatedTorque)) {
+            let [low, high] = [1.0 - RATED_SAME, 1.0 + RATED_SAME].map(|share| {
+                let exact = (torque.rated_nm * 1000.0 * share).round();
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "bounded where settings are read"
+                )]
+                let milli_nm = exact as u32;
+                milli_nm
+            });
+            steps.read(object::RATED_TORQUE, 4, Check::RatedTorque(low, high));
         }
         if self.features.digital_inputs {
             steps.read(object::DIGITAL_INPUTS, 4, Check::Present);
@@ -249,5 +271,10 @@ impl NodePlan {
 const CONTROLWORD: PdoEntry = PdoEntry::new(object::CONTROLWORD, 16);
 /// The part of another drive: a dummy entry of type UNSIGNED32.
 const SKIPPED: PdoEntry = PdoEntry::new(object::DUMMY_U32, 32);
-const TPDO1_ENTRIES: [PdoEntry; 2] =
-    [PdoEntry::new(object::STATUSWORD, 16), PdoEntry::new(object::POSITION_ACTUAL, 32)];
+const TORQUE_OFFSET: PdoEntry = PdoEntry::new(object::TORQUE_OFFSET, 16);
+/// The torque in those of drives that measure it.
+const TPDO1_ENTRIES: [PdoEntry; 3] = [
+    PdoEntry::new(object::STATUSWORD, 16),
+    PdoEntry::new(object::POSITION_ACTUAL, 32),
+    PdoEntry::new(object::TORQUE_ACTUAL, 16),
+];

@@ -30,6 +30,8 @@ pub enum Check {
     Scale,
     /// The value, of any width, is not below this one.
     AtLeast(u32),
+    /// The rated torque is within these, mNm.
+    RatedTorque(u32, u32),
     /// The PDO is off, or has this identifier, which is its drive's own.
     OffOrOwn(u32),
     /// The bits of the mask are those of the value.
@@ -116,7 +118,7 @@ impl Step {
     /// The number in an answer to this read; `None` when it is of another width than the object may have.
     #[must_use]
     pub fn number(&self, value: SdoValue) -> Option<u32> {
-        let any_width = matches!(self.check, Check::Scale | Check::AtLeast(_));
+        let any_width = matches!(self.check, Check::Scale | Check::AtLeast(_) | Check::RatedTorque(..));
         if any_width { value.as_unsigned_of_any_width() } else { value.as_unsigned(self.width) }
     }
 
@@ -265,7 +267,10 @@ pub(super) fn verification(steps: &[Step]) -> Vec<Step> {
                 let value = u32::from(mode);
                 Step { check: Check::Equals { value, mask: u32::MAX }, ..*step }
             }
-            (SdoJob::Read(_), Check::Profile402 | Check::Scale | Check::AtLeast(_)) => *step,
+            (
+                SdoJob::Read(_),
+                Check::Profile402 | Check::Scale | Check::AtLeast(_) | Check::RatedTorque(..),
+            ) => *step,
             (SdoJob::Read(_), _) => continue,
         };
         match reads.iter_mut().find(|other| other.job == read.job) {
@@ -285,6 +290,7 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
         }
         Check::Equals { value, mask } if number & mask != value & mask => BringUpFault::NotTaken,
         Check::AtLeast(least) if number < least => BringUpFault::LimitTooLow,
+        Check::RatedTorque(low, high) if !(low..=high).contains(&number) => BringUpFault::RatedTorqueDiffers,
         Check::OffOrOwn(off) if number & PDO_DISABLED == 0 && !is_same_identifier(number, off) => {
             BringUpFault::NotTaken
         }
@@ -293,6 +299,7 @@ pub(super) fn passes(check: Check, number: u32) -> Result<(), BringUpFault> {
         | Check::Equals { .. }
         | Check::OffOrOwn(_)
         | Check::AtLeast(_)
+        | Check::RatedTorque(..)
         | Check::Present
         | Check::NotEnergised
         | Check::Becomes(_)

@@ -12,16 +12,17 @@ use crate::bring_up::timing::{self, BringUpCycle, StepTimer, Timeouts};
 use crate::codec::canopen::{
     COB_PDO_STEP, COB_RPDO1, Emcy, MASTER_NODE, NODE_MAX, Nmt, NmtState, decode_sync, node_of, sync,
 };
+use crate::codec::drive_torque::DriveTorque;
 use crate::codec::sdo::SdoResponse;
 use crate::codec::setpoint_frames::{Group, SendSchedule, encode_control, encode_pair, groups};
 use crate::frame::{CanFrame, CanId, FrameBatch, JointSet};
-use crate::servo::{DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
+use crate::servo::{DriveState, DriveTarget, JointCommand, Nanos, ServoDriver, ServoStatus};
 use taustream_arm::{Cia402, Servo, Settings};
 use taustream_motion::MAX_JOINTS;
 
 pub use crate::codec::cia402_words::{
-    CountScale, DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, encode_rpdo, encode_tpdo,
-    rad_from_counts,
+    CountScale, DriveStep, counts_from_rad, decode_rpdo, decode_tpdo, decode_tpdo_with_torque, encode_rpdo,
+    encode_rpdo_with_torque, encode_tpdo, rad_from_counts,
 };
 
 /// Why a driver cannot be made from settings.
@@ -90,6 +91,9 @@ struct Drive {
     scale: CountScale,
     node: Node,
     received: Option<Nanos>,
+    torque: Option<DriveTorque>,
+    /// Torque that it measured last, thousandths of its rated torque.
+    measured: Option<i16>,
     /// Controlword of the newest frame that held one.
     control: Option<u16>,
 }
@@ -166,6 +170,7 @@ impl Cia402Driver {
                 scale: expected,
                 profile: joint(servo).and_then(|joint| ProfilePlan::of(servo, joint, setpoint_us)),
                 homing: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.homing),
+                torque: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.torque),
                 brake: servo.protocol.get::<Cia402>().and_then(|cia402| cia402.brake),
                 near_counts: expected.counts_of(near_rad),
                 features: servo.protocol.get::<Cia402>().map(|cia402| cia402.features).unwrap_or_default(),
@@ -188,7 +193,9 @@ impl Cia402Driver {
             return Err(Cia402Error::NodeTwice { joint, other, node_id });
         }
         *slot = Some(self.drives.len());
-        self.drives.push(Drive { joint, node_id, scale, node, received: None, control: None });
+        let torque = DriveTorque::of(servo);
+        let (received, measured, control) = (None, None, None);
+        self.drives.push(Drive { joint, node_id, scale, node, received, torque, measured, control });
         self.joints.push(joint);
         Ok(())
     }
@@ -235,11 +242,13 @@ impl Cia402Driver {
     fn push_kept(&self, out: &mut FrameBatch) {
         let kept =
             |at: usize| self.drives.get(at).and_then(|drive| Some((drive.node_id, drive.node.keeping()?)));
+        let own =
+            |at: usize| self.drives.get(at).and_then(|drive| Some(drive.rpdo(drive.node.keeping()?, 0)));
         for group in &self.groups {
             match *group {
                 Group::One(at) => {
-                    if let Some((node, DriveSetpoint { control, target_counts })) = kept(at) {
-                        out.push(encode_rpdo(node, control, target_counts));
+                    if let Some(frame) = own(at) {
+                        out.push(frame);
                     }
                 }
                 // A target for both is known only where both are held.
@@ -330,10 +339,16 @@ impl ServoDriver for Cia402Driver {
         if self.is_of_a_master(frame) {
             self.clock.note_other_master(frame.id());
         } else if let Some((node, status, position)) = decode_tpdo(frame) {
-            if let Some(drive) = self.drive_mut(node)
+            if let Some(drive) = self.drive_mut(node).filter(|drive| !drive.measures())
                 && drive.node.take_tpdo(step_now, status, position)
             {
                 drive.received = Some(now);
+            }
+        } else if let Some((node, status, position, per_mille)) = decode_tpdo_with_torque(frame) {
+            if let Some(drive) = self.drive_mut(node).filter(|drive| drive.measures())
+                && drive.node.take_tpdo(step_now, status, position)
+            {
+                (drive.received, drive.measured) = (Some(now), Some(per_mille));
             }
         } else if let Some((node, response)) = SdoResponse::decode(frame) {
             if let Some(drive) = self.drive_mut(node) {
@@ -366,7 +381,7 @@ impl ServoDriver for Cia402Driver {
             // The position read while configuring is no feedback yet: nothing would tell its age.
             position_rad: drive.received.map_or(f64::NAN, |_| drive.position_rad()),
             velocity_rad_s: f64::NAN,
-            torque_nm: f64::NAN,
+            torque_nm: drive.torque_nm(),
             homing: node.homing(),
             fixed_pdos: node.fixed_pdos(),
             hold_position_rad: node.held().map_or(f64::NAN, |counts| rad_from_counts(&drive.scale, counts)),
@@ -399,7 +414,7 @@ impl ServoDriver for Cia402Driver {
         let step_now = self.clock.now();
         for drive in &mut self.drives {
             drive.node.start_over(step_now);
-            drive.received = None;
+            (drive.received, drive.measured) = (None, None);
         }
         self.clock.forget_other_master();
     }
@@ -435,12 +450,35 @@ impl Drive {
         let setpoint = self.node.setpoint(cycle, target);
         self.control = setpoint.map(|setpoint| setpoint.control);
         let urgent = cycle.drive_target == DriveTarget::TorqueOff || self.control != before;
-        if let Some(DriveSetpoint { control, target_counts }) = setpoint
+        if let Some(setpoint) = setpoint
             && (is_due || urgent)
         {
-            let frame = encode_rpdo(self.node_id, control, target_counts);
+            // None before it follows, and none in the cycle in which it does not any more.
+            let follows = self.node.state() == DriveState::Enabled;
+            let per_mille =
+                self.torque.filter(|_| follows).map_or(0, |torque| torque.per_mille(target.torque_nm));
+            let frame = self.rpdo(setpoint, per_mille);
             out.push_setpoints(frame, JointSet::of(self.joint));
         }
+    }
+
+    fn rpdo(&self, setpoint: DriveSetpoint, per_mille: i16) -> CanFrame {
+        let DriveSetpoint { control, target_counts } = setpoint;
+        if self.torque.is_some_and(|torque| torque.settings.offset) {
+            encode_rpdo_with_torque(self.node_id, control, target_counts, per_mille)
+        } else {
+            encode_rpdo(self.node_id, control, target_counts)
+        }
+    }
+
+    fn measures(&self) -> bool {
+        self.torque.is_some_and(|torque| torque.settings.actual)
+    }
+
+    /// At the joint; NaN where it is not known.
+    fn torque_nm(&self) -> f64 {
+        let measured = self.torque.zip(self.measured);
+        measured.map_or(f64::NAN, |(torque, per_mille)| torque.nm(per_mille))
     }
 
     /// The controlword of a drive whose target comes in a shared frame. True when the drive gets anything new: then
@@ -468,10 +506,12 @@ impl Drive {
     }
 
     fn target(&self, commands: &[JointCommand; MAX_JOINTS], near_rad: f64) -> Target {
-        let position_rad = commands.get(self.joint).map_or(f64::NAN, |command| command.position_rad);
+        let command = commands.get(self.joint);
+        let position_rad = command.map_or(f64::NAN, |command| command.position_rad);
+        let torque_nm = command.map_or(0.0, |command| command.torque_nm);
         let counts = position_rad.is_finite().then(|| counts_from_rad(&self.scale, position_rad));
         // False for a position that is not known.
         let near = (position_rad - self.position_rad()).abs() <= near_rad;
-        Target { counts, near }
+        Target { counts, near, torque_nm }
     }
 }

@@ -118,6 +118,23 @@ pub fn decode_tpdo(frame: &CanFrame) -> Option<(u8, u16, i32)> {
     six_of(frame, COB_TPDO1)
 }
 
+/// The first RPDO of a drive whose setpoints carry a torque: controlword, target, and torque offset in thousandths.
+#[must_use]
+pub fn encode_rpdo_with_torque(node: u8, control: u16, target_counts: i32, per_mille: i16) -> CanFrame {
+    let [a, b, c, d, e, f] = six(control, target_counts);
+    let [g, h] = per_mille.to_le_bytes();
+    CanFrame::classic(cob(COB_RPDO1, node), &[a, b, c, d, e, f, g, h])
+}
+
+/// Node, statusword, position and torque in thousandths of a first TPDO that carries one; `None` for other frames and lengths.
+#[must_use]
+pub fn decode_tpdo_with_torque(frame: &CanFrame) -> Option<(u8, u16, i32, i16)> {
+    let node = node_of(frame, COB_TPDO1)?;
+    let [a, b, c, d, e, f, g, h] = *frame.data() else { return None };
+    let status = u16::from_le_bytes([a, b]);
+    Some((node, status, i32::from_le_bytes([c, d, e, f]), i16::from_le_bytes([g, h])))
+}
+
 fn six(word: u16, counts: i32) -> [u8; 6] {
     let [a, b] = word.to_le_bytes();
     let [c, d, e, f] = counts.to_le_bytes();

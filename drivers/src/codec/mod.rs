@@ -5,6 +5,7 @@ pub mod canopen;
 pub mod cia402;
 pub mod cia402_words;
 pub mod digital_inputs;
+pub mod drive_torque;
 pub mod emcy;
 pub mod error_text;
 pub mod mit;

@@ -106,6 +106,8 @@ objects! {
     FOLLOWING_ERROR_TIMEOUT_MS = 0x6066:0;
     /// Velocity actual value, i32.
     VELOCITY_ACTUAL = 0x606C:0;
+    /// Rated torque of the motor, u32, mNm.
+    RATED_TORQUE = 0x6076:0;
     /// Torque actual value, i16, 0.1 % of the rated torque.
     TORQUE_ACTUAL = 0x6077:0;
     /// Target position, i32, counts.

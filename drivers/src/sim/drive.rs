@@ -68,8 +68,21 @@ pub struct DriveParameters {
     pub step_ns: u64,
     /// The brake that its master works; `None`: it follows the torque.
     pub brake: Option<BrakeSettings>,
+    /// Rated torque of its motor (0x6076), at the link; `None`: what the motor gives, and 0x6076 states it at the link.
+    pub rated_nm: Option<f64>,
     /// What it does otherwise than masters expect.
     pub quirks: DriveQuirks,
+}
+
+impl DriveParameters {
+    /// The torque at the link of which its objects state thousandths.
+    pub(super) fn unit_nm(&self) -> f64 {
+        self.rated_nm.unwrap_or(self.plant.torque_nm_max)
+    }
+    /// What 0x6076 states, Nm.
+    pub(super) fn stated_rated_nm(&self) -> f64 {
+        self.rated_nm.map_or(self.plant.torque_nm_max, |rated_nm| rated_nm / self.gear_ratio)
+    }
 }
 
 /// A simulated drive.

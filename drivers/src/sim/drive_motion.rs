@@ -86,7 +86,7 @@ impl Drive {
         let offsets = &mut self.controller.offsets;
         offsets.velocity_rad_s = whole(self.dictionary.get(0x60B1, 0)) / self.parameters.counts_per_rad();
         offsets.torque_nm =
-            whole(self.dictionary.get(0x60B2, 0)) * 1e-3 * self.parameters.plant.torque_nm_max;
+            whole(self.dictionary.get(0x60B2, 0)) * 1e-3 * self.parameters.unit_nm() * self.parameters.sign;
         let target_rad = self.rad(whole(target));
         self.controller.set_target(now, target_rad, period_s);
     }

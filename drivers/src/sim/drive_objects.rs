@@ -71,7 +71,7 @@ impl Drive {
             (0x2000, 2, reaction_code(parameters.reaction)),
             (0x6065, 0, register(window, 0, i32::MAX)),
             (0x6066, 0, i64::from(parameters.following_timeout_ms)),
-            (0x6076, 0, register(parameters.plant.torque_nm_max * 1000.0, 0, i32::MAX)),
+            (0x6076, 0, register(parameters.stated_rated_nm() * 1000.0, 0, i32::MAX)),
             (0x607C, 0, i64::from(parameters.home_offset_counts)),
             (0x607D, 1, limits[0].min(limits[1])),
             (0x607D, 2, limits[0].max(limits[1])),
@@ -114,7 +114,7 @@ impl Drive {
     pub(super) fn publish(&mut self) {
         let ahead_s = self.mechanics.ahead_s(self.now);
         let per_rad = self.parameters.counts_per_rad();
-        let torque = 1000.0 * self.controller.torque_nm() / self.parameters.plant.torque_nm_max;
+        let torque = 1000.0 * self.controller.torque_nm() / self.parameters.unit_nm();
         let velocity = register(self.mechanics.plant.velocity_rad_s * per_rad, i32::MIN, i32::MAX);
         let demand = counts(self, self.controller.reference_rad());
         for (index, value) in [

@@ -61,6 +61,7 @@ pub(crate) fn simulate(joint: &SimulatedJoint<'_>) -> Box<dyn ModelParameters> {
         boot_s: joint.boot_s(),
         step_ns: joint.step_ns(),
         brake,
+        rated_nm: cia402.and_then(|cia402| Some(cia402.torque?.rated_nm * cia402.gear_ratio)),
         quirks: quirks(joint),
     })
 }

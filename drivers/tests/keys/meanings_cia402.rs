@@ -118,6 +118,22 @@ pub(crate) const MEANINGS: &[(&str, &str)] = &[
         "Time from the drive's confirmation until it holds; the drive keeps its torque as long.",
     ),
     (
+        "Settings files: servo[].torque",
+        "CiA 402: torques that are sent to the drive, or read from it: see [feed-forward.md](feed-forward.md#cia-402-drives).",
+    ),
+    (
+        "Settings files: servo[].torque.rated_torque_nm",
+        "Rated torque of the motor, of which the drive's torques are thousandths; 0x6076 must say the same within 1 %.",
+    ),
+    (
+        "Settings files: servo[].torque.offset",
+        "true: setpoints carry the torque of `[feed_forward]` (0x60B2); false.",
+    ),
+    (
+        "Settings files: servo[].torque.actual",
+        "true: answers carry the torque that the drive measures (0x6077); false.",
+    ),
+    (
         "Settings files: servo[].profile_limits",
         "CiA 402: the drive's own limits of speed and acceleration (0x607F, 0x6080, 0x6083 to 0x6085, 0x60C5, 0x60C6); without it they are not looked at: see [faults.md](faults.md#limits-of-speed-and-acceleration).",
     ),

@@ -30,6 +30,13 @@ pub(super) fn shipped() -> Settings {
     Settings::load(&file).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
+/// The weight of each joint pulls hardest where it starts.
+pub(super) fn level(settings: &mut Settings) {
+    let levels = START_RAD.iter().map(|angle_rad| toml::Value::Float(*angle_rad)).collect();
+    let levels = toml::Value::Array(levels);
+    settings.simulator.get_or_insert_default().insert("gravity_level_rad".to_owned(), levels);
+}
+
 impl Arm {
     fn new() -> Self {
         Self::with(shipped())

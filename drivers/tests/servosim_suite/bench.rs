@@ -42,6 +42,7 @@ pub(crate) fn parameters() -> DriveParameters {
         following_timeout_ms: 50,
         soft_limit_rad: [-3.0, 3.0],
         brake: None,
+        rated_nm: None,
         slow_rad_s2: 15.0,
         quick_rad_s2: 30.0,
         watchdog_ms: 100,

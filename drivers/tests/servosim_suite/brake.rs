@@ -1,7 +1,7 @@
 //! A brake that the master works: released once the drive holds, closed before it loses its torque, or at once when it has lost it.
 //!
 //! Method: the shoulder, whose load falls where neither motor nor brake holds it. Frames are read as bytes.
-use super::arm::{Arm, shipped};
+use super::arm::{Arm, level, shipped};
 use taustream_arm::{BrakeSettings, Cia402, Reaction, Settings};
 use taustream_drivers::sim::FaultRequest;
 use taustream_drivers::words::explain_refusal;
@@ -9,10 +9,10 @@ use taustream_drivers::{CanFrame, DriveState, DriveTarget, ServoDriver};
 use toml::Value;
 
 const LIFT: usize = 1;
-/// The simulated brake moves within 20 ms.
+/// The simulated brake moves within 50 ms.
 const BRAKE: BrakeSettings = BrakeSettings { output_bit: 0, released_by: true, release_ms: 60, close_ms: 80 };
-/// A joint that is held moves by less; one that nothing holds falls by this within 20 ms.
-const HELD_RAD: f64 = 2e-3;
+/// A joint that is held moves by less; one that nothing holds, with 60 Nm on 2 kg m2, falls by 0.037 rad while its brake closes.
+const HELD_RAD: f64 = 0.01;
 
 fn with_brake() -> Settings {
     let mut settings = shipped();
@@ -20,6 +20,8 @@ fn with_brake() -> Settings {
     let cia402 = *servo.protocol.get::<Cia402>().unwrap();
     servo.protocol = Cia402 { brake: Some(BRAKE), ..cia402 }.into();
     servo.reaction = Reaction::Hold;
+    level(&mut settings);
+    settings.simulator.get_or_insert_default().insert("brake_delay_ms".to_owned(), Value::Integer(50));
     settings
 }
 
@@ -92,7 +94,7 @@ fn brake_is_released_after_torque_and_closed_before_it_ends() {
         if control.is_some_and(|control| control != 0x0F) {
             down_at = down_at.or(Some(ms));
         }
-        assert!((place_rad(&arm) - rest_rad).abs() < 2.0 * HELD_RAD, "{ms} ms: it fell");
+        assert!((place_rad(&arm) - rest_rad).abs() < HELD_RAD, "{ms} ms: it fell");
     }
     let (closed_at, down_at) = (closed_at.unwrap(), down_at.unwrap());
     assert!(
@@ -184,7 +186,7 @@ fn drive_that_holds_with_a_released_brake_is_taken_over() {
     for _ in 0..2_000 {
         arm.cycle(DriveTarget::Disabled);
         outputs.extend(sent(&arm).0);
-        assert!((place_rad(&arm) - rest_rad).abs() < 2.0 * HELD_RAD, "it fell");
+        assert!((place_rad(&arm) - rest_rad).abs() < HELD_RAD, "it fell");
     }
     assert_eq!(arm.states(), [DriveState::Disabled; 6]);
     assert_eq!(outputs.first(), Some(&0));

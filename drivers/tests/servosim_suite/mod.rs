@@ -13,3 +13,4 @@ mod process;
 mod profile_limits;
 mod quirks;
 mod scale;
+mod torque;

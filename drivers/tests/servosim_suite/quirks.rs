@@ -59,7 +59,7 @@ fn drive_with_fixed_pdos_that_are_right_comes_up() {
 #[test]
 fn objects_that_are_absent_or_fixed_are_refused_with_the_key_and_taken_with_it() {
     for object in
-        OptionalObject::ALL.into_iter().filter(|object| !object.is_of_homing() && !object.is_profile_limit())
+        OptionalObject::ALL.into_iter().filter(|object| !object.is_of_homing() && !object.is_of_a_table())
     {
         let index = object.index();
         let subs: &[u8] = if index == 0x60C2 { &[1, 2] } else { &[0] };
