@@ -5,8 +5,8 @@ mod common;
 mod played;
 use common::{pose, ur5};
 use played::{FROM, MARGIN_M, MIDDLE, Room, TO, base, join, wait_until};
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Barrier};
 use std::thread;
 use std::time::Duration;
 use taustream_arm::body::{Body, to_parry};
@@ -110,6 +110,35 @@ fn motions_of_two_planners_never_come_too_near_in_any_interleaving() {
         assert!(least_m > MARGIN_M - SAMPLED_M, "round {round}: {least_m}");
     }
     assert!(planned >= 8 && refused >= 2, "{planned} planned, {refused} refused: the arms did not meet");
+}
+
+/// Goal: the later of two commitments sees the earlier one. Method: both are asked in the same instant for motions that meet in the
+/// middle, and plan for the same 0.4 s, so that neither motion exists while the other one is planned.
+#[test]
+fn motions_that_are_planned_at_the_same_time_do_not_meet() {
+    let room = Room::new("meet", [FROM, FROM], 1.0);
+    let both = Barrier::new(2);
+    room.run([true, true], |room| {
+        for goal in [TO, FROM, TO] {
+            thread::scope(|s| {
+                for side in 0..2 {
+                    let both = &both;
+                    s.spawn(move || {
+                        both.wait();
+                        room.ask(side, goal)
+                    });
+                }
+            });
+            room.wait_for_rest();
+            // Whoever was refused follows.
+            (0..2).for_each(|side| {
+                let _answer = room.ask(side, goal);
+                room.wait_for_rest();
+            });
+        }
+    });
+    let least_m = room.least_distance_m();
+    assert!(least_m > MARGIN_M - SAMPLED_M, "{least_m}");
 }
 
 /// Goal: nobody plans, and nothing moves on, while it is not known where the other arm is.
