@@ -67,6 +67,7 @@ pub mod trajectory_file;
 pub mod trust;
 mod urdf;
 pub mod velocity_unit;
+pub mod zone;
 
 pub use axis::{AXES_MAX, Axis, AxisContact, AxisUnit, OnFault};
 pub use brake::BrakeSettings;
@@ -104,3 +105,4 @@ pub use stall::AfterStall;
 pub use trajectory_file::TrajectoryFile;
 pub use trust::{Feedback, Reaction};
 pub use velocity_unit::VelocityUnit;
+pub use zone::Zone;

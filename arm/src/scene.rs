@@ -4,6 +4,7 @@ use crate::cloud::Cloud;
 use crate::document::{self, Node};
 use crate::mesh;
 use crate::reader::{Bounds, FaultList, Table};
+use crate::zone::{ZONES_MAX, Zone, read_zone};
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -78,6 +79,8 @@ pub struct Scene {
     pub margin_m: f64,
     /// The obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Where tips have speed limits.
+    pub zones: Vec<Zone>,
 }
 
 /// Least distance that plans keep where the file gives none.
@@ -87,9 +90,9 @@ pub const MARGIN_M_DEFAULT: f64 = 0.02;
 pub const OBSTACLES_MAX: usize = 1000;
 
 const MARGIN_M: Bounds = Bounds::within(0.0, 1.0, "m");
-const CENTER_M: Bounds = Bounds::within(-100.0, 100.0, "m");
-const SIZE_M: Bounds = Bounds::above(0.0, 100.0, "m");
-const RPY_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
+pub(crate) const CENTER_M: Bounds = Bounds::within(-100.0, 100.0, "m");
+pub(crate) const SIZE_M: Bounds = Bounds::above(0.0, 100.0, "m");
+pub(crate) const RPY_RAD: Bounds = Bounds::within(-TAU, TAU, "rad");
 const POINT_RADIUS_M: Bounds = Bounds::within(1e-4, 1.0, "m");
 const SCALE: Bounds = Bounds::above(0.0, 1e4, "");
 
@@ -122,14 +125,24 @@ impl Scene {
                 obstacles.extend(obstacle.map(|obstacle| (format!("{kind}[{i}].name"), obstacle)));
             }
         }
+        let mut zones = Vec::new();
+        for (i, table) in top.tables("zone").into_iter().enumerate() {
+            let zone = read_zone(table, format!("zone[{i}]"));
+            complete &= zone.is_some();
+            zones.extend(zone);
+        }
         top.done();
+        if zones.len() > ZONES_MAX {
+            let value = format!("{} zones", zones.len());
+            fault_list.add(None, "zone", &value, &format!("at most {ZONES_MAX}"));
+        }
         if obstacles.len() > OBSTACLES_MAX {
             let value = format!("{} obstacles", obstacles.len());
             fault_list.add(None, "", &value, &format!("at most {OBSTACLES_MAX}"));
         }
         check_names(fault_list, &obstacles);
         let obstacles = obstacles.into_iter().map(|(_, obstacle)| obstacle).collect();
-        complete.then_some(Self { file: fault_list.file().to_owned(), margin_m: margin_m?, obstacles })
+        complete.then_some(Self { file: fault_list.file().to_owned(), margin_m: margin_m?, obstacles, zones })
     }
 }
 

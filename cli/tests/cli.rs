@@ -7,6 +7,8 @@ mod buses;
 mod calibrate;
 #[path = "cli/common.rs"]
 mod common;
+#[path = "cli/constraints.rs"]
+mod constraints;
 #[path = "cli/doctor.rs"]
 mod doctor;
 #[path = "cli/good_path.rs"]

@@ -173,6 +173,10 @@ file = "tile.obj"
 center_m = [1, 0, 0]
 file = "scan.xyz"
 point_radius_m = 0.01
+[[zone]]
+center_m = [1, 0, 0]
+size_m = [0.1, 0.1, 0.1]
+speed_m_s = 0.1
 "#;
 
 /// A table of a file: its path with `[0]` for the first of a list, as faults name it.

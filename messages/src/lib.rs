@@ -26,6 +26,7 @@ pub mod scene_reply;
 pub mod service;
 pub mod target;
 pub mod text;
+pub mod tip_constraints;
 pub mod tip_goal;
 pub mod trajectory;
 pub mod way_points;

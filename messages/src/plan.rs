@@ -1,5 +1,6 @@
 //! Replan requests to the planner and its answers (request-response).
 use crate::plan_detail::{PlanDetail, WireDetail};
+use crate::tip_constraints::{TipConstraints, TipConstraintsWire};
 use crate::tip_goal::{TipGoal, TipGoalWire};
 use crate::way_points::{Blend, WAY_POINTS_MAX, WayPointsWire};
 use crate::{LAYOUT_VERSION, Receipt, Text};
@@ -35,6 +36,7 @@ pub struct PlanRequest {
     held_joints: u32,
     tip: TipGoalWire,
     way_points: WayPointsWire,
+    constraints: TipConstraintsWire,
 }
 
 impl PlanRequest {
@@ -61,6 +63,8 @@ pub struct CheckedPlanRequest {
     pub held_joints: u32,
     /// Where the tip shall end, instead.
     pub tip: Option<TipGoal>,
+    /// What the tip must keep on the way.
+    pub constraints: TipConstraints,
     /// When to replace it.
     pub when: When,
     /// How long planning may take; the planner spends it on shorter motions. With 0 it answers as soon as it can.
@@ -77,7 +81,20 @@ impl CheckedPlanRequest {
     pub fn to_pose(joints: usize, goal_rad: JointArray) -> Self {
         let (via_rad, blend, tip, when) = (Vec::new(), Blend::default(), None, When::AtOnce);
         let (deadline_ms, seed, planner) = (0, 1, String::new());
-        Self { joints, goal_rad, via_rad, blend, held_joints: 0, tip, when, deadline_ms, seed, planner }
+        let (held_joints, constraints) = (0, TipConstraints::default());
+        Self {
+            joints,
+            goal_rad,
+            via_rad,
+            blend,
+            held_joints,
+            tip,
+            constraints,
+            when,
+            deadline_ms,
+            seed,
+            planner,
+        }
     }
 
     /// The same with the joints that it says nothing of where they are in another pose.
@@ -170,6 +187,22 @@ pub enum PlanRequestError {
         /// The value in the message.
         value: f64,
     },
+    /// A number of the tip's constraints.
+    #[error("the constraint of the tip: {what} is {value}, which makes no sense")]
+    Constraint {
+        /// Which one.
+        what: &'static str,
+        /// The value in the message.
+        value: f64,
+    },
+    /// No kind of constraint.
+    #[error(
+        "unknown kind of constraint {got}; the sender is of another release, or no sender of this project"
+    )]
+    ConstraintKind {
+        /// The bits in the message.
+        got: u32,
+    },
     /// No kind of goal.
     #[error("unknown kind of goal {got}; the sender is of another release, or no sender of this project")]
     GoalKind {
@@ -203,6 +236,7 @@ impl From<&CheckedPlanRequest> for PlanRequest {
             held_joints: r.held_joints,
             tip: TipGoalWire::from(r.tip.as_ref()),
             way_points: WayPointsWire::new(&r.via_rad, r.blend),
+            constraints: TipConstraintsWire::from(&r.constraints),
         }
     }
 }
@@ -242,6 +276,7 @@ impl TryFrom<&PlanRequest> for CheckedPlanRequest {
             blend,
             held_joints: r.held_joints,
             tip: r.tip.read()?,
+            constraints: r.constraints.read()?,
             when,
             deadline_ms: r.deadline_ms,
             seed: r.seed,
@@ -406,5 +441,5 @@ impl PlanReply {
     }
 }
 
-const _: () = assert!(size_of::<PlanRequest>() == 528 + 16 + 2048);
+const _: () = assert!(size_of::<PlanRequest>() == 528 + 16 + 2048 + 120);
 const _: () = assert!(size_of::<PlanReply>() == 48 + 40 + 320 + 248 + size_of::<WireDetail>());

@@ -84,8 +84,12 @@ fn winner_is_evaluated_again_by_the_reference_cost() {
 #[test]
 fn fast_cost_of_what_makes_no_sense_is_refused_or_infinite() {
     let robot = ur5();
-    let scene =
-        Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: vec![sphere("a", [0.4, 0.3, 0.5], 0.1)] };
+    let scene = Scene {
+        file: PathBuf::new(),
+        margin_m: 0.0,
+        obstacles: vec![sphere("a", [0.4, 0.3, 0.5], 0.1)],
+        zones: Vec::new(),
+    };
     let ends: [JointArray; 2] = [[0.1; MAX_JOINTS], [1.0; MAX_JOINTS]];
     let new = |ends, points| ControlPointCost::new(&robot, &scene, ends, points, CostModel::default());
     for points in [0, 101, usize::MAX] {

@@ -43,7 +43,7 @@ fn spheres() -> Scene {
         sphere("b", [0.4, 0.4, 0.5], 0.18),
         sphere("c", [0.1, -0.6, 0.2], 0.18),
     ];
-    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles }
+    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles, zones: Vec::new() }
 }
 
 fn close(name: &str, ours: f64, theirs: f64) {
@@ -90,7 +90,7 @@ fn cost_of_a_turn_about_the_base_is_as_by_hand() {
     let mut turned = up;
     turned[0] = 1.0;
     let motion = paper_motion(&[up, turned], 6.0);
-    let empty = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+    let empty = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new(), zones: Vec::new() };
     let cost = paper_cost(&ur5(), &empty, &motion, &CostModel::default()).expect("fits");
     let tip = common::ur5_origins_m(&pose(up))[6];
     let arc_m = tip[0].hypot(tip[1]);

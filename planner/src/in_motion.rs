@@ -6,6 +6,7 @@
 //! ordinary plan from there. The last one always exists. Of those that are proven the shortest is taken. Way points before the
 //! goal, and the end of a motion that is gone on from, are corners: they are rounded where that is proven, else the arm stops at them.
 use crate::budget::Budget;
+use crate::constraints::prove_constraints;
 use crate::held::held;
 use crate::pipeline::blends_rad;
 use crate::plan::{
@@ -334,7 +335,7 @@ impl Surroundings<'_> {
         World::new(self.robot, self.scene).map_err(|name| NoReplacement::Shape { name })
     }
 
-    /// Proves limits and distances from the cut on.
+    /// Proves limits, distances and constraints from the cut on.
     fn prove(
         &self,
         trajectory: &Trajectory,
@@ -344,7 +345,10 @@ impl Surroundings<'_> {
         let world = self.world()?;
         let budget = Budget::until(options.deadline, Some(self.cancel));
         let span_s = [cut.at_s, trajectory.duration_s().max(cut.at_s)];
-        Ok(verify_stretches(&[Stretch { world: &world, span_s }], trajectory, &budget)?)
+        let proof = verify_stretches(&[Stretch { world: &world, span_s }], trajectory, &budget)?;
+        let motion = (trajectory, &proof, cut.at_s);
+        prove_constraints((&world, &options.constraints), motion, &budget).map_err(Violation::from)?;
+        Ok(proof)
     }
 }
 

@@ -43,6 +43,12 @@ impl PlannerKind {
         }
     }
 
+    /// True when it keeps constraints of poses ([`crate::constraints`]).
+    #[must_use]
+    pub fn keeps_constraints(self) -> bool {
+        matches!(self, Self::Auto | Self::Straight | Self::RrtConnect)
+    }
+
     /// One line for a list.
     #[must_use]
     pub fn about(self) -> &'static str {

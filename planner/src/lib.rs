@@ -32,6 +32,7 @@
 pub mod arguments;
 pub mod budget;
 pub mod collide;
+pub mod constraints;
 pub mod energy;
 pub mod enter;
 pub mod explain;
@@ -71,7 +72,8 @@ pub use taustream_arm::rng;
 pub use goals::{Finder, GoalError, Orientation, Reached, Situation, TipTarget, plan_to_any, plan_to_tip};
 pub use taustream_messages::way_points::Blend;
 
+pub use constraints::{TipBox, TipConstraints, Upright};
 pub use kind::{Improvement, PlannerKind};
 pub use objective::Objective;
 pub use plan::{Plan, PlanError, PlanOptions, PoseOf, Remedy, StartMargin, check_pose, plan, plan_through};
-pub use verify::{Contact, Proof, Violation, verify};
+pub use verify::{Contact, Proof, Violation, verify, verify_keeping};

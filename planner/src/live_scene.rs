@@ -345,6 +345,7 @@ impl LiveScene {
             obstacles: draft.obstacles.iter().chain(&self.occupied).cloned().collect(),
             file: scene.file.clone(),
             margin_m: scene.margin_m,
+            zones: scene.zones.clone(),
         });
         let shape = |name| SceneChangeError::Shape { name };
         let (robot, world) = if draft.tip_changed {

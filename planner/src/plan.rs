@@ -1,6 +1,7 @@
 //! From two poses to a verified motion.
 use crate::budget::Budget;
 use crate::collide::{Course, Motion, SweepRules};
+use crate::constraints::{TipConstraints, TipFault, TipRules, TipUse};
 use crate::enter::Entry;
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
@@ -39,6 +40,8 @@ pub struct PlanOptions {
     pub objective: Objective,
     /// How far from the corners of its path the motion may pass.
     pub blend: Blend,
+    /// What the tip must keep along the whole motion.
+    pub constraints: TipConstraints,
     /// True when the clock aborts at the deadline. Without it only the budget that is derived from the deadline ends the
     /// work, so that one seed gives one answer on any machine, however busy: for comparisons, not for arms.
     pub keeps_deadline: bool,
@@ -61,6 +64,7 @@ impl Default for PlanOptions {
             improvement,
             objective,
             blend,
+            constraints: TipConstraints::default(),
             keeps_deadline,
             spends_deadline,
         }
@@ -93,6 +97,8 @@ pub struct Plan {
     pub first_s: f64,
     /// Poses that searches, shortcuts and refinements checked: the measure of work that every machine agrees on.
     pub checks: usize,
+    /// What the motion uses of its constraints; `None` without any.
+    pub tip_use: Option<TipUse>,
     /// What was done, in its order.
     pub stages: Vec<Stage>,
 }
@@ -134,6 +140,16 @@ pub enum PoseOf {
     Goal,
     /// A pose that it shall pass, counted from 0.
     Via(usize),
+}
+
+impl PoseOf {
+    fn kind(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+            Self::Via(_) => "way point",
+        }
+    }
 }
 
 impl std::fmt::Display for PoseOf {
@@ -249,6 +265,25 @@ pub enum PlanError {
         /// Lower bound of the duration.
         least_s: f64,
     },
+    /// A pose violates a constraint of the tip.
+    #[error("the {which} violates a constraint of the tip: {fault}; choose another {}, or a wider constraint", which.kind())]
+    Constraint {
+        /// Which pose.
+        which: PoseOf,
+        /// Which constraint.
+        fault: TipFault,
+    },
+    /// Constraints that make no sense for this robot.
+    #[error(transparent)]
+    Constraints(TipFault),
+    /// A planner that keeps no constraints of poses.
+    #[error(
+        "planner {planner} does not keep the tip upright or inside a box; use auto, straight or rrt-connect"
+    )]
+    Unconstrained {
+        /// Its name.
+        planner: String,
+    },
     /// A path was found, but no timing of it fits into a message.
     #[error(
         "a path was found ({tried}), but not in {MAX_STROKES} strokes: it is too long, or has too many corners, for the motion \
@@ -340,6 +375,7 @@ pub fn plan_through_until(
     let budget = Budget::until(options.clock(), cancel);
     let evaluator = Evaluator::new(options.objective, robot)?;
     let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
+    check_constraints(&world, poses_rad, options)?;
     if let (StartMargin::AsItStands, Some((start_rad, onward_rad))) = (margin, poses_rad.split_first()) {
         check_numbers(robot, PoseOf::Start, start_rad)?;
         let entry = Entry::of(robot, start_rad);
@@ -456,6 +492,7 @@ fn plan_inside(
     let evaluator = Evaluator::new(options.objective, task.robot)?;
     let world = World::new(task.robot, task.scene).map_err(|name| PlanError::Shape { name })?;
     let (start_rad, goal_rad) = (&task.start_rad, &task.goal_rad);
+    check_constraints(&world, &[*start_rad, *goal_rad], options)?;
     let relaxed = match (task.margin, world.contact(start_rad)) {
         (StartMargin::Scene, Some(contact)) => return Err(PlanError::too_close(PoseOf::Start, contact)),
         (StartMargin::Scene, None) => None,
@@ -530,6 +567,9 @@ impl PlanError {
             | Self::InsideMargin { .. }
             | Self::Shape { .. }
             | Self::NoMasses(_)
+            | Self::Constraint { .. }
+            | Self::Constraints(_)
+            | Self::Unconstrained { .. }
             | Self::TooSlow { .. } => &[],
         }
     }
@@ -542,6 +582,29 @@ impl PlanError {
             Self::InsideMargin { which, contact }
         }
     }
+}
+
+/// Refuses poses of a motion that violate constraints of the tip, and constraints that no planner of this name keeps.
+fn check_constraints(
+    world: &World,
+    poses_rad: &[JointArray],
+    options: &PlanOptions,
+) -> Result<(), PlanError> {
+    let rules = TipRules::in_world(world, &options.constraints).map_err(PlanError::Constraints)?;
+    let Some(rules) = rules.filter(TipRules::are_of_poses) else { return Ok(()) };
+    if !options.planner.keeps_constraints() {
+        return Err(PlanError::Unconstrained { planner: options.planner.name().to_owned() });
+    }
+    let last = poses_rad.len().saturating_sub(1);
+    for (i, pose_rad) in poses_rad.iter().enumerate() {
+        let which = match i {
+            0 => PoseOf::Start,
+            _ if i == last => PoseOf::Goal,
+            _ => PoseOf::Via(i - 1),
+        };
+        rules.check_pose(pose_rad).map_err(|fault| PlanError::Constraint { which, fault })?;
+    }
+    Ok(())
 }
 
 /// Refuses goals that a joint cannot reach within [`LONGEST_S`], whatever the path.

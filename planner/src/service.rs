@@ -11,6 +11,7 @@ mod scene;
 mod scene_effect;
 mod streaming;
 mod tip;
+mod tip_constraints;
 
 use crate::foreign::Foreign;
 use crate::held::check_held;
@@ -49,6 +50,7 @@ use taustream_messages::service::{
 use taustream_messages::tip_goal::TipGoal;
 use taustream_messages::{Phase, PlanReply, PlanRequest, Replaces, Report};
 use taustream_motion::JointArray;
+use tip_constraints::Remembered;
 use tracing::{info, warn};
 
 /// How long the service waits for a request before it looks at targets, reports and files again: targets come without events.
@@ -141,6 +143,7 @@ pub struct Service<'a> {
     stream: Stream,
     promise: Promise,
     reported: Reported,
+    kept_constraints: RefCell<Remembered>,
     footprint: Footprint,
 }
 
@@ -204,6 +207,7 @@ impl<'a> Service<'a> {
             stream: Stream::new(robot),
             promise,
             reported: Reported::default(),
+            kept_constraints: RefCell::default(),
             footprint: wire.footprint(),
         })
     }
@@ -298,7 +302,7 @@ impl<'a> Service<'a> {
             (Phase::Holding, When::Cancel) => Err("nothing runs that could be cancelled".to_owned()),
             (Phase::Holding, When::AtOnce | When::AfterCurrent | When::Queue) if report.energised == 1 => {
                 let planned = self.plan(request, report.command_rad, (requested, &options))?;
-                Ok(self.send(request, &planned))
+                Ok(self.remembering(self.send(request, &planned), &requested.constraints))
             }
             (phase, _) if moving::runs(phase) => {
                 self.replan_in_motion(request, (requested, &options), report)
@@ -322,7 +326,7 @@ impl<'a> Service<'a> {
             Some(line) if rests => {
                 let start = (report.command_rad, requested.held_joints);
                 let planned = self.plan_straight(request, start, (tip, line, options))?;
-                Ok(self.send(request, &planned))
+                Ok(self.remembering(self.send(request, &planned), &requested.constraints))
             }
             Some(_) if moving::runs(phase) => {
                 Err("a straight line of the tip begins at rest; wait until the motion has ended".to_owned())
@@ -554,8 +558,8 @@ fn options(requested: &CheckedPlanRequest) -> Result<PlanOptions, String> {
         0 => (default.deadline, false),
         ms => (Duration::from_millis(ms.into()).min(DEADLINE_MAX), true),
     };
-    let (seed, blend) = (requested.seed, requested.blend);
-    Ok(PlanOptions { seed, deadline, planner, blend, spends_deadline, ..default })
+    let (seed, blend, constraints) = (requested.seed, requested.blend, requested.constraints);
+    Ok(PlanOptions { seed, deadline, planner, blend, constraints, spends_deadline, ..default })
 }
 
 /// Why an arm in this phase gets no plan, and what to do.

@@ -4,6 +4,7 @@
 //! ([`crate::collide::sweep()`]). A motion that cannot be proven within bounded work is refused, and said to be so.
 use crate::budget::Budget;
 use crate::collide::{Blocked, Course, SweepRules, sweep, sweep_in_parts};
+use crate::constraints::{ConstraintViolation, TipConstraints, TipUse, prove_constraints};
 use crate::torque::{Overload, TorqueLimits};
 use crate::world::World;
 use taustream_arm::{Robot, Scene};
@@ -152,6 +153,9 @@ pub enum Violation {
         /// What touches what, and by how much.
         contact: Contact,
     },
+    /// The tip does not keep a constraint, or a zone's speed limit.
+    #[error("constraint of the tip: {0}")]
+    Constraint(#[from] ConstraintViolation),
     /// A drive cannot bear it.
     #[error(transparent)]
     Torque(#[from] Overload),
@@ -171,12 +175,26 @@ pub enum Violation {
 /// # Errors
 /// The first violation, with joint or pair, time and amount.
 pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<Proof, Violation> {
+    Ok(verify_keeping(robot, scene, (trajectory, &TipConstraints::default()))?.0)
+}
+
+/// The same with what the tip must keep, and what the motion uses of that.
+///
+/// # Errors
+/// The first violation, with joint or pair, time and amount.
+pub fn verify_keeping(
+    robot: &Robot,
+    scene: &Scene,
+    (trajectory, asked): (&Trajectory, &TipConstraints),
+) -> Result<(Proof, Option<TipUse>), Violation> {
     let world = World::new(robot, scene).map_err(|name| Violation::Shape { name })?;
-    let proof = verify_in(&world, trajectory, &Budget::unbounded())?;
+    let budget = Budget::unbounded();
+    let proof = verify_in(&world, trajectory, &budget)?;
+    let used = prove_constraints((&world, asked), (trajectory, &proof, 0.0), &budget)?;
     if let Ok(limits) = TorqueLimits::of(robot) {
         limits.prove(trajectory)?;
     }
-    Ok(proof)
+    Ok((proof, used))
 }
 
 /// Like [`verify`], in a world that exists already and with a clock that may cut the proof short.
@@ -184,7 +202,10 @@ pub fn verify(robot: &Robot, scene: &Scene, trajectory: &Trajectory) -> Result<P
 /// # Errors
 /// The first violation; `Unresolved` when the clock cut in.
 pub fn verify_in(world: &World, trajectory: &Trajectory, budget: &Budget) -> Result<Proof, Violation> {
-    verify_stretches(&[Stretch { world, span_s: [0.0, trajectory.duration_s()] }], trajectory, budget)
+    let whole = Stretch { world, span_s: [0.0, trajectory.duration_s()] };
+    let proof = verify_stretches(&[whole], trajectory, budget)?;
+    prove_constraints((world, &TipConstraints::default()), (trajectory, &proof, 0.0), budget)?;
+    Ok(proof)
 }
 
 /// A part of a motion, and the world whose distances it must keep.

@@ -12,7 +12,7 @@ use parry3d_f64::math::{Pose, Vector};
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 use taustream_arm::body::to_parry;
-use taustream_arm::{Obstacle, Robot, Scene};
+use taustream_arm::{Obstacle, Robot, Scene, Zone};
 use taustream_motion::chain::{self, ChainJoint};
 use taustream_motion::{JointArray, JointKind, MAX_JOINTS};
 
@@ -123,6 +123,7 @@ pub struct World<'a> {
     margin_m: f64,
     extent_m: f64,
     in_lanes: InLanes,
+    zones: Vec<Zone>,
 }
 
 /// Which link bodies some pairs are about.
@@ -182,6 +183,7 @@ impl<'a> World<'a> {
             margin_m: scene.margin_m,
             extent_m: 0.0,
             in_lanes: InLanes::default(),
+            zones: scene.zones.clone(),
         };
         world.extent_m = world.farthest_m();
         world.pairs = world.pairs_to_keep(scene.margin_m);
@@ -599,7 +601,7 @@ mod tests {
     #[test]
     fn moves_bound_holds_for_random_turns_and_fails_when_shrunk() {
         let robot = ur5();
-        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new(), zones: Vec::new() };
         let world = World::new(&robot, &scene).expect("builds");
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
         let all = world.every_body();
@@ -644,7 +646,7 @@ mod tests {
     #[test]
     fn reach_is_an_upper_bound_of_every_lever() {
         let robot = ur5();
-        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+        let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new(), zones: Vec::new() };
         let world = World::new(&robot, &scene).expect("builds");
         let (mut snapshot, mut moves_m) = (Snapshot::default(), Vec::new());
         let all = world.every_body();

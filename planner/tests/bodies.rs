@@ -137,7 +137,7 @@ fn kind(shape: &Shape) -> usize {
 }
 
 fn empty() -> Scene {
-    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() }
+    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new(), zones: Vec::new() }
 }
 
 /// Goal: no point of any shape's core moves further than `moves_m` says, seen from the base and from any link before it, nor is any of the

@@ -41,7 +41,7 @@ fn rods(places_m: &[[f64; 2]]) -> Robot {
 }
 
 fn scene(obstacles: Vec<Obstacle>) -> Scene {
-    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles }
+    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles, zones: Vec::new() }
 }
 
 fn pose(angles: &[f64]) -> JointArray {

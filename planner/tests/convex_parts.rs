@@ -87,7 +87,7 @@ fn link_in_the_gap_of_a_fork_is_free_and_meets_its_walls() {
     assert!(hulls(&fork) >= 3 && hulls(&block) == 1, "{:?}", fork.notices);
     assert!(fork.notices.iter().any(|n| n.contains(" convex parts, together ")), "{:?}", fork.notices);
     assert_ne!(fork.digest, block.digest);
-    let scene = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+    let scene = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
     let (world, filled) = (World::new(&fork, &scene).unwrap(), World::new(&block, &scene).unwrap());
 
     let (inside, outside) = (at([0.5, 0.3, 0.1]), at([-0.5, 0.0, 2.8]));

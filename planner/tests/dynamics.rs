@@ -281,7 +281,7 @@ fn plans_by_energy_and_by_cost_have_less_of_it_than_plans_by_time() {
 #[test]
 fn energy_of_an_arm_without_masses_is_refused_with_what_to_do() {
     let piper = Robot::load(&config("robots/piper.toml")).expect("shipped");
-    let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+    let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
     let options = PlanOptions { objective: Objective::Energy, ..PlanOptions::default() };
     let ends = [pose([0.0, 0.5, -0.5, 0.0, 0.0, 0.0]), pose([0.0, 1.0, -1.0, 0.0, 0.0, 0.0])];
     let error = plan(&piper, &empty, &ends[0], &ends[1], &options).expect_err("no masses");

@@ -20,7 +20,7 @@ use taustream_planner::{
 };
 
 fn scene(obstacles: Vec<taustream_arm::Obstacle>) -> Scene {
-    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles }
+    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles, zones: Vec::new() }
 }
 
 fn piper() -> Robot {

@@ -84,7 +84,7 @@ fn improvements_never_lengthen_a_motion_and_repeat_without_the_clock() {
 #[test]
 fn every_optimiser_plans_a_proven_motion_or_says_what_to_try() {
     let balls = [0.1, 0.3, 0.5].map(|z| sphere(&format!("ball {z}"), [-0.68, 0.0, z], 0.07));
-    let scene = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: balls.to_vec() };
+    let scene = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: balls.to_vec(), zones: Vec::new() };
     let robot = ur5();
     let (start, goal) =
         (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));

@@ -81,7 +81,7 @@ fn scene(rng: &mut SeededRng, obstacles: usize, far_m: f64) -> Scene {
         Obstacle { name: format!("thing {i}"), pose: Pose::from_parts(at, turn), shape }
     };
     let obstacles = (0..obstacles).map(&mut obstacle).collect();
-    Scene { file: PathBuf::new(), margin_m: rng.within(0.0, 0.02), obstacles }
+    Scene { file: PathBuf::new(), margin_m: rng.within(0.0, 0.02), obstacles, zones: Vec::new() }
 }
 
 /// The three upper joints of an arm with what they carry, moved from its forearm to the base beside it.

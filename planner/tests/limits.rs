@@ -14,7 +14,7 @@ use taustream_planner::{Plan, PlanError, PlanOptions, PoseOf, plan, verify};
 const HOME: [f64; 6] = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0];
 
 fn open() -> Scene {
-    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() }
+    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() }
 }
 
 fn options() -> PlanOptions {

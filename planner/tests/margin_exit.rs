@@ -133,7 +133,7 @@ fn replan_from_inside_the_margin_of_spheres_keeps_what_it_says_by_an_independent
     let mut planned = 0;
     for seed in 0..150 {
         let mut rng = SeededRng::new(seed, 300);
-        let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+        let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
         let start = pose(std::array::from_fn(|_| rng.within(-2.0, 2.0)));
         let goal = pose(std::array::from_fn(|_| rng.within(-2.0, 2.0)));
         let gap_m = rng.within(0.002, 0.019);
@@ -175,6 +175,7 @@ fn replan_start_with_no_exit_nearby_keeps_the_reduced_margin_throughout_and_says
         file: PathBuf::new(),
         margin_m: 0.6,
         obstacles: vec![sphere("ball", [-x, 0.0, 0.2], 0.02)],
+        zones: Vec::new(),
     };
     let (mut near, mut far) = (0.7, 1.7);
     for _ in 0..50 {

@@ -61,7 +61,7 @@ fn long_motion_of_slow_joints_fits_into_one_message_near_full_speed() {
         for joint in &mut robot.joints {
             joint.limits.motion.velocity_rad_s = velocity_rad_s;
         }
-        let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+        let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
         let (start, goal) =
             (pose([-3.0, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([3.0, -0.7, 0.7, -1.57, -1.57, 0.0]));
         let plan = plan(&robot, &empty, &start, &goal, &options(0, 500, PlannerKind::Auto))
@@ -78,7 +78,7 @@ fn independent_check_sees_a_motion_through_a_sphere() {
     let robot = ur5();
     let (start, goal) =
         (pose([-0.5, -0.7, 0.7, -1.57, -1.57, 0.0]), pose([0.5, -0.7, 0.7, -1.57, -1.57, 0.0]));
-    let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+    let free = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
     let through = plan(&robot, &free, &start, &goal, &options(0, 500, PlannerKind::Straight)).expect("free");
     let pillar = Scene { obstacles: vec![sphere("ball", [-0.7, 0.0, 0.3], 0.05)], ..free };
     let caught = std::panic::catch_unwind(|| {
@@ -132,7 +132,7 @@ fn planning_with_the_plain_tree_by_name_goes_round_pillars() {
 fn planning_to_an_unreachable_goal_fails_at_the_deadline_and_says_what_was_tried() {
     let robot = ur5();
     let mut rng = SeededRng::new(3, 0);
-    let open = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new() };
+    let open = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: Vec::new(), zones: Vec::new() };
     let goal = free_pose(&robot, &open, &mut rng);
     let start = free_pose(&robot, &open, &mut rng);
     let elbow = common::ur5_origins_m(&goal)[3];

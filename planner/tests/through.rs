@@ -16,7 +16,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn poses_on_the_way_are_passed_within_the_blend() {
     let robot = ur5();
-    let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new() };
+    let empty = Scene { file: PathBuf::new(), margin_m: 0.02, obstacles: Vec::new(), zones: Vec::new() };
     let poses = [
         pose([-0.5, -0.9, 0.9, -1.57, -1.57, 0.0]),
         pose([0.0, -1.3, 1.2, -1.57, -1.2, 0.3]),

@@ -25,7 +25,7 @@ fn with_strokes(motion: &Trajectory, change: impl Fn(usize, &mut Stroke)) -> Tra
 }
 
 fn scene_of(margin_m: f64, obstacles: Vec<Obstacle>) -> Scene {
-    Scene { file: PathBuf::new(), margin_m, obstacles }
+    Scene { file: PathBuf::new(), margin_m, obstacles, zones: Vec::new() }
 }
 
 fn still(name: &str, center_m: [f64; 3], shape: Shape) -> Obstacle {

@@ -107,6 +107,9 @@ impl Contest {
                 | PlanError::InsideMargin { .. }
                 | PlanError::Shape { .. }
                 | PlanError::TooSlow { .. }
+                | PlanError::Constraint { .. }
+                | PlanError::Constraints(_)
+                | PlanError::Unconstrained { .. }
                 | PlanError::NoMasses(_)),
             ) => Err(Stop::Refused(format!("problem {}: {error}", problem.id))),
         }

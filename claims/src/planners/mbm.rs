@@ -201,6 +201,9 @@ impl Figures {
                     | PlanError::InsideMargin { .. }
                     | PlanError::Shape { .. }
                     | PlanError::TooSlow { .. }
+                    | PlanError::Constraint { .. }
+                    | PlanError::Constraints(_)
+                    | PlanError::Unconstrained { .. }
                     | PlanError::NoMasses(_)),
                 ) => Err(format!("problem {}: {error}", problem.id)),
             }

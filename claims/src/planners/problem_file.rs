@@ -89,7 +89,7 @@ impl ProblemFile {
         let obstacles = question.obstacles.iter().enumerate();
         let obstacles =
             obstacles.map(|(i, thing)| obstacle(i, thing)).collect::<Result<Vec<_>, _>>().map_err(fail)?;
-        let scene = Scene { file: PathBuf::new(), margin_m: MARGIN_M, obstacles };
+        let scene = Scene { file: PathBuf::new(), margin_m: MARGIN_M, obstacles, zones: Vec::new() };
         let pose = |values: &[f64]| self.pose(robot, values).map_err(fail);
         Ok(Problem { id, scene, start_rad: pose(&question.start)?, goal_rad: pose(&question.goal)? })
     }

@@ -1,9 +1,11 @@
 //! Where a motion shall end: the options that `plan` and `replan` share.
+use super::tip::TipArgs;
 use crate::angles::{Angles, Position, TipPose, Tolerances};
 use crate::failure::Failure;
 use clap::{ArgGroup, Args};
 use taustream_arm::{Group, NamedPose, Robot};
 use taustream_motion::{JointArray, MAX_JOINTS};
+use taustream_planner::TipConstraints;
 use taustream_planner::goals::{Orientation, TipSpeed, TipTarget, nearest_turn};
 
 /// A goal.
@@ -65,9 +67,6 @@ pub(crate) struct GoalArgs {
     /// Lead the tip straight to --to-position (its orientation stays) or --to-pose (it turns evenly).
     #[arg(long, conflicts_with_all = ["goal", "goal_deg", "to_named", "by", "by_deg"])]
     pub(crate) linear: bool,
-    /// Speed of the tip along the straight line, m/s.
-    #[arg(long, value_name = "M_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().linear_m_s, requires = "linear")]
-    tip_speed_m_s: f64,
     /// Turning speed of the tip along the straight line, rad/s.
     #[arg(long, value_name = "RAD_S", allow_negative_numbers = true, default_value_t = TipSpeed::default().angular_rad_s, requires = "linear")]
     tip_speed_rad_s: f64,
@@ -77,6 +76,9 @@ pub(crate) struct GoalArgs {
     /// Take each joint with more than one turn to the nearest angle at which its link stands as in the goal.
     #[arg(long, conflicts_with_all = ["by", "by_deg", "to_position", "to_pose"])]
     nearest_turn: bool,
+    /// What the tip must keep on the way.
+    #[command(flatten)]
+    tip: TipArgs,
 }
 
 /// A goal with the numbers of a robot.
@@ -125,9 +127,17 @@ impl GoalArgs {
 
     /// How the tip goes along a straight line.
     pub(crate) fn tip_speed(&self) -> TipSpeed {
-        let (linear_m_s, angular_rad_s, off_m_max) =
-            (self.tip_speed_m_s, self.tip_speed_rad_s, self.line_off_m);
+        let linear_m_s = self.tip.tip_speed_m_s.unwrap_or(TipSpeed::default().linear_m_s);
+        let (angular_rad_s, off_m_max) = (self.tip_speed_rad_s, self.line_off_m);
         TipSpeed { linear_m_s, angular_rad_s, off_m_max }
+    }
+
+    /// What the tip must keep on the way.
+    ///
+    /// # Errors
+    /// A tip that is not named, or numbers that make no sense.
+    pub(crate) fn constraints(&self, robot: &Robot) -> Result<TipConstraints, Failure> {
+        constraints_of(&self.tip, robot, self.group_of(robot)?)
     }
 
     /// The poses that were given as angles, and the option that gave them.
@@ -159,6 +169,21 @@ impl GoalArgs {
             Some(TipTarget { tip: 0, position_m, tolerance_m, orientation })
         })
     }
+}
+
+/// What the tip of a group must keep.
+///
+/// # Errors
+/// A tip that is not named, or numbers that make no sense.
+pub(crate) fn constraints_of(
+    asked: &TipArgs,
+    robot: &Robot,
+    group: Option<&Group>,
+) -> Result<TipConstraints, Failure> {
+    if !asked.is_given() {
+        return Ok(TipConstraints::default());
+    }
+    asked.of(tip_of(robot, group)?).map_err(Failure::Usage)
 }
 
 /// The group of a name, if one was given.

@@ -101,7 +101,7 @@ Examples:
   taustream replan --goal \"1.2,-1.3,1.4,-1.6,-1.57,0\" --wait
   taustream replan --to-pose 0.4,-0.3,0.35,3.1416,0,0 --tolerance-rad 0.01,0.01,free
   taustream replan --to-position 0.4,-0.3,0.25 --linear --tip-speed-m-s 0.1 --wait
-  taustream replan --to-named home
+  taustream replan --to-named home --upright-deg 10 --tool-axis -z --tip-speed-m-s 0.25
   taustream replan --via \"0.4,-1.2,1.2,-1.6,-1.57,0\" --via \"0.8,-1,1,-1.6,-1.57,0\" --goal \"..\" --blend-rad 0.1
   taustream replan --goal \"..\" --after-current --deadline-ms 5000
   taustream replan --to-named home --wait-s 20
@@ -111,7 +111,10 @@ At rest the motion starts at the commanded pose. An arm that moves, or is paused
 cuts the motion a little ahead of the arm, or lets it end, leads on to the goal, verifies everything from the cut on, and sends
 it. The arm does not jump, and a pause stays a pause. What was rejected changes nothing. The receipt of the streamer states
 whether, and from when, it runs. A motion that goes on from another one, or passes poses, rounds the corners within the blend
-while that is still possible; what planned it says so. Exit code 0 means: accepted (with --wait: executed).";
+while that is still possible; what planned it says so.
+
+What the tip must keep (--upright-deg, --tip-above-m, --tip-box-m, --tip-speed-m-s) is proven from the cut on, or, where the
+running motion does not keep it from there, from its end on. Exit code 0 means: accepted (with --wait: executed).";
 
 /// `taustream replan`
 #[derive(Args, Debug)]

@@ -13,19 +13,20 @@ mod planners;
 mod scene;
 mod stream;
 mod timing;
+mod tip;
 mod via;
 
 pub(crate) use axis::{AxisAction, AxisArgs};
 pub(crate) use calibrate::{CalibrateArgs, CalibrateWhat, GravityArgs};
-pub(crate) use goal::{Goal, group_of, tip_of};
+pub(crate) use goal::{Goal, constraints_of, group_of, tip_of};
 pub(crate) use import::ImportArgs;
 pub(crate) use live::{
     CancelArgs, CommandArgs, DemoArgs, HomeArgs, RecoverArgs, ReferenceArgs, ReplanArgs, RunArgs, SpeedArgs,
     StopArgs, WatchArgs,
 };
 pub(crate) use offline::{
-    BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, MotionArgs,
-    PlanArgs, PlotArgs, SampleArgs, StopsBenchArgs,
+    BenchArgs, BenchName, CheckArgs, CompareArgs, CostArgs, CostBenchArgs, DoctorArgs, ManArgs, PlanArgs,
+    PlotArgs, SampleArgs, StopsBenchArgs, VerifyArgs,
 };
 
 pub(crate) use cuts::CutsBenchArgs;
@@ -191,11 +192,11 @@ pub(crate) enum Action {
     /// Evaluate a trajectory by the cost function of Wang et al. (2022), in its own model.
     Cost(CostArgs),
     /// Prove that a trajectory keeps limits and clearance, or name the first violation.
-    Verify(MotionArgs),
+    Verify(Box<VerifyArgs>),
     /// Check a configuration: robot, scene, settings or trajectory file; every fault at once.
     Check(CheckArgs),
     /// Request a motion to a new goal from the running planner, and print the receipt.
-    Replan(ReplanArgs),
+    Replan(Box<ReplanArgs>),
     /// Follow a stream of targets from standard input, 5 to 500 a second.
     Follow(FollowArgs),
     /// Move one joint, or the tip along an axis, while a key is held.

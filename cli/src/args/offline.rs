@@ -1,5 +1,6 @@
 //! Arguments of the commands that need no running process.
 use super::goal::GoalArgs;
+use super::tip::TipArgs;
 use super::via::ViaArgs;
 use crate::angles::{Angles, Times};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -20,12 +21,15 @@ Examples:
   taustream plan --robot piper --scene open --start 0,0.5,-0.5,0,0,0 --to-position 0.3,0.1,0.25
   taustream plan ... --to-pose 0.4,-0.3,0.35,0,3.1416,0 --tolerance-rad 0.01,0.01,free
   taustream plan ... --to-position 0.4,-0.3,0.35 --linear --tip-speed-m-s 0.1
+  taustream plan ... --upright-deg 10 --tool-axis -z --tip-above-m 0.2    a glass of water, above the table
+  taustream plan ... --tip-box-m -0.6,-0.6,0.1,0.6,0.6,inf --tip-speed-m-s 0.25
   taustream plan ... --to-named home          a [[pose]] of the robot file, or a group_state of its SRDF
   taustream plan ... --by 0,0,0,0,0,90deg     relative to the start
   taustream plan ... --via 0.3,-1.2,1.2,-1.6,-1.57,0 --via 0.8,-1,1,-1.6,-1.57,0 --blend-rad 0.1
   taustream plan ... -o - | jq .strokes        the file on stdout, the summary on stderr
 
-The motion is verified along its whole length before it is written. One seed gives one motion, unless the deadline
+The motion is verified along its whole length before it is written; what the tip must keep on the way is proven with it, as are
+the speed limits of the scene's zones ([[zone]], docs/scene.md). A start or goal that violates a constraint is refused. One seed gives one motion, unless the deadline
 aborted the search; the summary then says so.";
 
 /// `taustream plan`
@@ -174,7 +178,30 @@ pub(crate) struct CostArgs {
     pub(crate) weights: Weights,
 }
 
-/// Robot, scene and trajectory; `taustream verify`
+const VERIFY_HELP: &str = "\
+Examples:
+  taustream verify --robot ur5 --scene pillars --trajectory move.json
+  taustream verify move.json --scene pillars --upright-deg 10 --tool-axis -z --tip-speed-m-s 0.25
+
+Limits, distances, and the speed limits of the scene's zones are proven along the whole motion, between samples too;
+so is what the tip shall keep, where options ask for it.";
+
+/// `taustream verify`
+#[derive(Args, Debug)]
+#[command(after_help = VERIFY_HELP)]
+pub(crate) struct VerifyArgs {
+    /// The motion.
+    #[command(flatten)]
+    pub(crate) motion: MotionArgs,
+    /// What the tip must keep.
+    #[command(flatten)]
+    pub(crate) tip: TipArgs,
+    /// Group whose tip is meant, for a robot with several tips.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) group: Option<String>,
+}
+
+/// Robot, scene and trajectory.
 #[derive(Args, Debug)]
 pub(crate) struct MotionArgs {
     /// Robot: a path, or the name of a shipped robot. Without it the one that the file names.

@@ -209,6 +209,7 @@ pub(crate) fn run(form: Form, settings: Option<&Path>, args: &ReplanArgs) -> Res
         via_rad: args.via.poses_of((robot, group), &others_rad)?,
         held_joints: group.map_or(0, |group| group.others(robot.joints.len())),
         blend: args.via.blend(),
+        constraints: args.goal.constraints(robot)?,
         when: args.when(),
         deadline_ms: args.deadline_ms.unwrap_or(0),
         seed: args.seed,

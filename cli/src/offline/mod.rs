@@ -23,5 +23,6 @@ mod protocol_line;
 pub(crate) mod sample;
 mod stops_bench;
 mod timing_bench;
+mod tip_lines;
 mod torque_use;
 pub(crate) mod verify;

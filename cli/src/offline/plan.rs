@@ -1,4 +1,5 @@
 //! `taustream plan`: from a pose to a goal, as a verified trajectory file.
+use super::tip_lines::TipLines;
 use super::torque_use::Torques;
 use super::verify::{PeakTable, PeakUse, Unmodelled, clearance_words, peak_use};
 use crate::args::{Goal, PlanArgs};
@@ -13,7 +14,7 @@ use taustream_arm::text::counted;
 use taustream_arm::{Robot, TrajectoryFile};
 use taustream_motion::JointArray;
 use taustream_planner::budget::Budget;
-use taustream_planner::goals::{TipError, plan_line};
+use taustream_planner::goals::{TipError, plan_line_keeping};
 use taustream_planner::held::check_held;
 use taustream_planner::{
     Finder, GoalError, Plan, PlanOptions, PoseOf, Situation, StartMargin, TipTarget, check_pose,
@@ -47,6 +48,8 @@ struct Summary {
     peak_use: Vec<PeakUse>,
     #[serde(flatten)]
     torques: Torques,
+    #[serde(flatten)]
+    tip: TipLines,
     goal_rad: Vec<f64>,
     /// Units of `goal_rad`, one a joint; left out where all are rad.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -109,7 +112,7 @@ impl fmt::Display for Summary {
             "clearance     {}",
             clearance_words((self.clearance_m, self.clearance_required_m), self.clearance_at_s, (a, b))
         )?;
-        write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
+        write!(f, "{}{}", Unmodelled(&self.unmodelled_links), self.tip)?;
         if let (Some([x, y, z]), Some(error_m)) = (self.target_m, self.position_error_m) {
             let turned = self.orientation_error_rad.map(|rad| format!(", turned by {rad:.1e} rad"));
             let turned = turned.unwrap_or_default();
@@ -160,6 +163,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         reading: args.reading,
         objective: args.objective,
         blend: args.via.blend(),
+        constraints: args.goal.constraints(&robot)?,
         ..default
     };
     let situation = Situation { robot: &robot, scene: &scene, start_rad, margin: StartMargin::Scene };
@@ -171,7 +175,7 @@ pub(crate) fn run(form: Form, args: &PlanArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("{option}: {why}")));
     }
     let work = || match goal {
-        Goal::Tip(target) if args.goal.linear => straight(&situation, &target, args).map(Ok),
+        Goal::Tip(target) if args.goal.linear => straight(&situation, &target, (args, &options)).map(Ok),
         Goal::Tip(target) => Ok(to_tip(&situation, &target, (args, &options))),
         Goal::Poses(goals_rad) => to_poses(&situation, &goals_rad, (args, &options)),
     };
@@ -204,12 +208,17 @@ struct Planned {
     line: Option<[f64; 2]>,
 }
 
-fn straight(situation: &Situation, target: &TipTarget, args: &PlanArgs) -> Result<Planned, Failure> {
+fn straight(
+    situation: &Situation,
+    target: &TipTarget,
+    (args, options): (&PlanArgs, &PlanOptions),
+) -> Result<Planned, Failure> {
     let started = Instant::now();
     let budget = args
         .deadline_ms
         .map_or_else(Budget::unbounded, |ms| Budget::until(Duration::from_millis(ms.into()), None));
-    let found = plan_line(situation, target, &args.goal.tip_speed(), &budget)
+    let asked = (&args.goal.tip_speed(), &options.constraints);
+    let found = plan_line_keeping(situation, target, asked, &budget)
         .map_err(|error| Failure::Refused(format!("no plan: {error}")))?;
     let line = Some([found.length_m, found.off_m]);
     let plan = found.into_plan("straight line of the tip".to_owned(), started.elapsed().as_secs_f64());
@@ -312,6 +321,7 @@ fn summarise(robot: &Robot, Planned { plan: found, tip, line }: Planned, args: &
         clearance_required_m: found.proof.clearance_required_m,
         peak_use: peak_use(robot, &found.proof.peaks),
         torques: Torques::of(robot, &found.trajectory),
+        tip: TipLines::of(&args.goal.constraints(robot).unwrap_or_default(), found.tip_use),
         goal_rad,
         units: units(robot),
         target_m: tip.map(|(target, _)| target.position_m),

@@ -1,6 +1,7 @@
 //! `taustream verify`: the proof that a motion keeps limits and clearance, or the first violation.
+use super::tip_lines::TipLines;
 use super::torque_use::Torques;
-use crate::args::MotionArgs;
+use crate::args::{VerifyArgs, constraints_of, group_of};
 use crate::arm;
 use crate::failure::Failure;
 use crate::output::{Form, note};
@@ -11,7 +12,7 @@ use taustream_arm::{Robot, RobotJoint};
 use taustream_motion::digits::Decimals;
 use taustream_motion::limits::Peaks;
 use taustream_planner::enter::Entry;
-use taustream_planner::verify;
+use taustream_planner::verify_keeping;
 
 /// Why every trajectory that passed the file's door is smooth: any sum of strokes with n >= 4 is C3.
 const CONTINUITY: &str = "position, velocity, acceleration and jerk are continuous (a sum of Tau-J* strokes)";
@@ -33,6 +34,8 @@ struct Answer {
     peak_use: Vec<PeakUse>,
     #[serde(flatten)]
     torques: Torques,
+    #[serde(flatten)]
+    tip: TipLines,
 }
 
 impl fmt::Display for Answer {
@@ -47,18 +50,19 @@ impl fmt::Display for Answer {
         )?;
         write!(f, "{}", Unmodelled(&self.unmodelled_links))?;
         writeln!(f, "continuity    {}", self.continuity)?;
-        write!(f, "{}", self.torques)?;
+        write!(f, "{}{}", self.torques, self.tip)?;
         write!(f, "{}", PeakTable(&self.peak_use))
     }
 }
 
 /// Verifies and prints the proof.
-pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
+pub(crate) fn run(form: Form, VerifyArgs { motion: args, tip, group }: &VerifyArgs) -> Result<(), Failure> {
     let path = args.trajectory.path();
     let scene = arm::scene(&args.scene)?;
     let (robot, file) = arm::motion_of(args.robot.as_deref(), path)?;
     robot.require_modelled()?;
-    let proof = verify(&robot, &scene, &file.trajectory)
+    let asked = constraints_of(tip, &robot, group_of(&robot, group.as_deref())?)?;
+    let (proof, tip_use) = verify_keeping(&robot, &scene, (&file.trajectory, &asked))
         .map_err(|v| Failure::Refused(format!("{}: not safe: {v}", path.display())))?;
     let (a, b) = proof.clearance_between;
     if let Some(entry) = Entry::of(&robot, file.trajectory.base_rad()) {
@@ -78,6 +82,7 @@ pub(crate) fn run(form: Form, args: &MotionArgs) -> Result<(), Failure> {
         continuity: CONTINUITY,
         peak_use: peak_use(&robot, &proof.peaks),
         torques: Torques::of(&robot, &file.trajectory),
+        tip: TipLines::of(&asked, tip_use),
     })
 }
 

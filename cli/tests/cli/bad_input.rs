@@ -284,9 +284,9 @@ fn goals_of_the_tip_that_are_wrong_are_refused_by_name() {
         &Scratch::new(),
         &[
             (&pose("0.49,0.109,0.4,0,0,0 --linear"), 1, &["straight line is left after", "choose"]),
-            (&pose("0.4,0,0.3,0,0,0 --linear --tip-speed-m-s=0"), 1, &["speed of the tip is 0", "m/s"]),
+            (&pose("0.4,0,0.3,0,0,0 --linear --tip-speed-m-s=0"), 2, &["speed limit", "is 0", "m/s"]),
             (&pose("0.4,0,0.3,0,0,0 --linear --via HOME"), 2, &["--via"]),
-            (&pose("0.4,0,0.3,0,0,0 --tip-speed-m-s=0.1"), 2, &["--linear"]),
+            (&pose("0.4,0,0.3,0,0,0 --tip-speed-rad-s=0.1"), 2, &["--linear"]),
             (&pose("0.4,0,0.3"), 2, &["--to-pose", "3 values", "quaternion"]),
             (&pose("0.4,0,0.3,0,0,0,0"), 2, &["--to-pose", "length is 0"]),
             (&pose("0.4,0,0.3,nan,0,0"), 2, &["--to-pose", "value 4 is NaN"]),

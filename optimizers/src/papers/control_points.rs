@@ -56,7 +56,12 @@ impl Case {
             let ends_rad = [pose(), pose()];
             let obstacles =
                 (0..SPHERES).map(|i| sphere(i, centres_m.map(|[low, high]| rng.within(low, high))));
-            let scene = Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: obstacles.collect() };
+            let scene = Scene {
+                file: PathBuf::new(),
+                margin_m: 0.0,
+                obstacles: obstacles.collect(),
+                zones: Vec::new(),
+            };
             Self { ends_rad, scene }
         });
         attempts.find(|case| case.ends_rad.iter().all(|end| case.is_free(robot, model, end)))

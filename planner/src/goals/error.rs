@@ -1,4 +1,5 @@
 //! Why a goal is not reached.
+use crate::constraints::TipFault;
 use crate::explain::Stage;
 use crate::plan::PlanError;
 use crate::verify::Contact;
@@ -70,6 +71,19 @@ pub enum GoalError {
         /// What is least in the way.
         contact: Contact,
     },
+    /// The tip gets there, but never as it must be on the way.
+    #[error(
+        "no pose at the position keeps the constraints of the tip: of {tries} tries {poses} got there, the last with {fault}; \
+         choose another position, or a wider constraint"
+    )]
+    NoKeptPose {
+        /// Guesses, or runs of a swarm.
+        tries: usize,
+        /// How many found a pose.
+        poses: usize,
+        /// Which constraint.
+        fault: TipFault,
+    },
     /// Clear poses, and no way to any of them.
     #[error("{poses} clear poses at the position, and no motion to the {planned} nearest: {error}")]
     NoMotion {
@@ -126,6 +140,7 @@ impl GoalError {
             | Self::TooFar { .. }
             | Self::Missed { .. }
             | Self::NoClearPose { .. }
+            | Self::NoKeptPose { .. }
             | Self::NoGoal
             | Self::NoTime
             | Self::Refused(_) => &[],

@@ -8,12 +8,14 @@ use super::inverse::Inverse;
 use super::target::{Orientation, TipTarget};
 use super::{Situation, check_reach, check_target};
 use crate::budget::Budget;
+use crate::constraints::{ConstraintViolation, TipConstraints, TipUse, prove_constraints};
 use crate::explain::Stage;
 use crate::import::{ImportError, Imported, Reference, import_within};
-use crate::plan::{Plan, PoseOf, check_pose};
+use crate::plan::{Plan, PlanError, PoseOf, check_pose};
 use crate::timing::line::LineLimits;
+use crate::world::World;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
-use taustream_arm::{MotionTable, Robot};
+use taustream_arm::{MotionTable, Robot, Scene, Zone};
 use taustream_motion::chain::Pose;
 use taustream_motion::{JointArray, MAX_JOINTS};
 
@@ -26,6 +28,11 @@ const JUMP_RAD: f64 = 0.1;
 /// How far the strokes may be from the profile at first, as tip way (m); halved until the line is kept.
 const OFF_M: f64 = 5e-4;
 const HALVINGS: i32 = 3;
+/// Share of a speed limit that is used: strokes are not exactly the profile.
+const SPEED_SHARE: f64 = 0.99;
+/// Places at which zones on the line are looked for, and how near they count (m).
+const ZONE_SAMPLES: u32 = 1_000;
+const ZONE_NEAR_M: f64 = 2e-3;
 /// Rows of the table that becomes strokes.
 const ROW_S: f64 = 5e-3;
 const ROWS: [f64; 2] = [200.0, 20_000.0];
@@ -59,6 +66,8 @@ pub struct Line {
     pub angle_rad: f64,
     /// How far the tip is from the line at most.
     pub off_m: f64,
+    /// What the motion uses of its constraints; `None` without any.
+    pub tip_use: Option<TipUse>,
 }
 
 impl Line {
@@ -77,6 +86,7 @@ impl Line {
             planning_s,
             first_s: planning_s,
             checks: 0,
+            tip_use: self.tip_use,
             stages,
         }
     }
@@ -125,6 +135,9 @@ pub enum LineError {
     /// The motion exists but is not safe, or no strokes keep to it.
     #[error("along the straight line: {0}")]
     Import(#[from] ImportError),
+    /// The tip does not keep a constraint on the line.
+    #[error("along the straight line: {0}; choose another line, or a wider constraint")]
+    Constraint(#[from] ConstraintViolation),
     /// The strokes are too far from the line.
     #[error("the motion would be {off_m:.5} m off the straight line; at most {off_m_max} m were asked for")]
     Off {
@@ -143,6 +156,19 @@ pub fn plan_line(
     situation: &Situation,
     target: &TipTarget,
     speed: &TipSpeed,
+    budget: &Budget,
+) -> Result<Line, LineError> {
+    plan_line_keeping(situation, target, (speed, &TipConstraints::default()), budget)
+}
+
+/// The same with what the tip must keep on the way.
+///
+/// # Errors
+/// As for [`plan_line`], and which constraint is not kept.
+pub fn plan_line_keeping(
+    situation: &Situation,
+    target: &TipTarget,
+    (speed, asked): (&TipSpeed, &TipConstraints),
     budget: &Budget,
 ) -> Result<Line, LineError> {
     let Situation { robot, scene, start_rad, .. } = *situation;
@@ -165,6 +191,7 @@ pub fn plan_line(
     }
     let out_of_time = || LineError::NoTime { after_s: budget.elapsed_s() };
     let track = JointTrack::follow((robot, &start_rad), &line, reach_m, budget)?;
+    let speed = &slower(speed, asked, (&line, scene));
     let profile = track.limits(robot, &line, speed).optimum();
     let shares = |t_s: f64| profile.position(t_s);
     let table = track.table(robot, (&line, reach_m), (&shares, profile.duration_s()), budget);
@@ -181,11 +208,27 @@ pub fn plan_line(
         let off_m = line.off_m(robot, &imported);
         let (length_m, angle_rad) = (line.length_m, line.angle_rad);
         if off_m <= speed.off_m_max {
-            return Ok(Line { imported, length_m, angle_rad, off_m });
+            let world =
+                World::new(robot, scene).map_err(|name| GoalError::Plan(PlanError::Shape { name }))?;
+            let motion = (&imported.trajectory, &imported.proof, 0.0);
+            let tip_use = prove_constraints((&world, asked), motion, budget)?;
+            return Ok(Line { imported, length_m, angle_rad, off_m, tip_use });
         }
         refusal = Some(LineError::Off { off_m, off_m_max: speed.off_m_max });
     }
     Err(refusal.unwrap_or(LineError::Still))
+}
+
+/// The speed of a line whose tip has a speed limit, or that passes zones with one.
+fn slower(speed: &TipSpeed, asked: &TipConstraints, (line, scene): (&Segment, &Scene)) -> TipSpeed {
+    let passes = |zone: &&Zone| {
+        let mut shares = (0..=ZONE_SAMPLES).map(|i| f64::from(i) / f64::from(ZONE_SAMPLES));
+        let near_m = ZONE_NEAR_M + line.length_m / f64::from(ZONE_SAMPLES);
+        shares.any(|share| zone.distance_m(&line.at(share).translation.vector) <= near_m)
+    };
+    let zones = scene.zones.iter().filter(passes).map(|zone| zone.speed_m_s);
+    let limit_m_s = zones.chain(asked.speed_m_s).fold(f64::INFINITY, f64::min);
+    TipSpeed { linear_m_s: speed.linear_m_s.min(SPEED_SHARE * limit_m_s), ..*speed }
 }
 
 /// The line itself, by the share of it that is behind.

@@ -12,6 +12,7 @@ mod target;
 mod turns;
 
 use crate::budget::Budget;
+use crate::constraints::TipRules;
 use crate::objective::Objective;
 use crate::plan::{
     CUT_SHORT, Plan, PlanError, PlanOptions, PoseOf, StartMargin, Task, check_pose, plan_until,
@@ -27,7 +28,7 @@ use taustream_optimizers::Reading;
 
 pub use error::GoalError;
 pub use inverse::Inverse;
-pub use line::{Line, LineError, TipSpeed, plan_line};
+pub use line::{Line, LineError, TipSpeed, plan_line, plan_line_keeping};
 pub use poses::Finder;
 pub use target::{ERROR_M_MAX, ERROR_RAD_MAX, Orientation, TipError, TipTarget};
 pub use turns::nearest_turn;
@@ -124,7 +125,9 @@ fn find_poses(
     let world = World::new(robot, scene).map_err(|name| PlanError::Shape { name })?;
     let reach_m = check_reach(robot, target)?;
     let (reading, seed) = (options.reading, options.seed);
-    let search = Search { world: &world, budget, start_rad, target, reach_m, finder, reading, seed };
+    let rules = TipRules::in_world(&world, &options.constraints).map_err(PlanError::Constraints)?;
+    let rules = rules.filter(TipRules::are_of_poses);
+    let search = Search { world: &world, budget, start_rad, target, reach_m, finder, reading, seed, rules };
     Ok((search.run(options.deadline)?, reach_m))
 }
 
@@ -167,7 +170,8 @@ pub fn one_try(
     let (robot, budget) = (world.robot(), Budget::unbounded());
     let reach_m = check_reach(robot, target)?;
     let reading = Reading::Corrected;
-    let search = Search { world, budget: &budget, start_rad, target, reach_m, finder, reading, seed };
+    let rules = None;
+    let search = Search { world, budget: &budget, start_rad, target, reach_m, finder, reading, seed, rules };
     let pose = poses::one_try(&search)?;
     Ok(pose.map(|pose| (pose, time_s(robot, &start_rad, &pose))))
 }

@@ -6,6 +6,7 @@ use super::target::{TipError, TipTarget};
 use super::time_s;
 use super::turns::nearest_turn;
 use crate::budget::Budget;
+use crate::constraints::{TipFault, TipRules};
 use crate::margin_exit::is_clear;
 use crate::plan::nearest_inside;
 use crate::verify::Contact;
@@ -73,6 +74,8 @@ pub(super) struct Search<'a> {
     pub(super) finder: Finder,
     pub(super) reading: Reading,
     pub(super) seed: u64,
+    /// What the tip must keep, where that is asked for.
+    pub(super) rules: Option<TipRules<'a>>,
 }
 
 /// Clear poses at the target, those that take least time first.
@@ -88,7 +91,7 @@ impl Search<'_> {
         let robot = self.world.robot();
         let mut poses = Poses { clear: Vec::new(), tries: 0 };
         let (mut nearest, mut there, mut stale) = (None::<TipError>, 0, 0);
-        let mut least_contact = None::<Contact>;
+        let (mut least_contact, mut violating) = (None::<Contact>, None);
         for number in (0_u64..).take(self.finder.tries(deadline)) {
             if stale >= STALE_MAX || poses.clear.len() >= POSES_MAX {
                 break;
@@ -106,6 +109,10 @@ impl Search<'_> {
                 continue;
             }
             there += 1;
+            if let Some(Err(fault)) = self.rules.as_ref().map(|rules| rules.check_pose(&pose)) {
+                violating = Some(fault);
+                continue;
+            }
             if is_clear(self.world, &pose) {
                 stale = if poses.keep(pose) { 0 } else { stale };
             } else if let Some((pair, distance_m)) = self.world.closest(&pose) {
@@ -124,6 +131,10 @@ impl Search<'_> {
                 Ok(poses)
             }
             (true, Some(contact), _) => Err(GoalError::NoClearPose { tries, poses: there, contact }),
+            (true, None, _) if violating.is_some() => {
+                let fault = violating.unwrap_or(TipFault::NONE);
+                Err(GoalError::NoKeptPose { tries, poses: there, fault })
+            }
             (true, None, Some(error)) => {
                 let by_rad = error.angle_rad(self.target);
                 Err(GoalError::Missed { tries, by_m: error.position_m, by_rad })
@@ -153,7 +164,10 @@ impl Search<'_> {
         };
         Ok(rough.map(|rough| {
             let exact = Inverse::new(robot, self.target, self.reach_m).polish(&rough);
-            nearest_inside(robot, &nearest_turn(robot, &self.start_rad, &exact))
+            let exact = nearest_inside(robot, &nearest_turn(robot, &self.start_rad, &exact));
+            // Where the orientation is free, a pose that keeps the constraints is beside many that do not.
+            let kept = self.rules.as_ref().filter(|rules| rules.check_pose(&exact).is_err());
+            kept.and_then(|rules| rules.project(&exact, Some(self.target))).unwrap_or(exact)
         }))
     }
 

@@ -69,7 +69,7 @@ impl TipTarget {
 
     /// What is left to a frame: position, m, then turn in the target's axes, rad, each only as far as it is outside its
     /// tolerance.
-    pub(super) fn left(&self, tip: &Pose) -> Vector6<f64> {
+    pub(crate) fn left(&self, tip: &Pose) -> Vector6<f64> {
         let off_m = Vector3::from(self.position_m) - tip.translation.vector;
         let far_m = off_m.norm();
         let beyond = far_m - AIM * self.tolerance_m;

@@ -33,7 +33,19 @@ impl Pipeline<'_> {
                 }
                 let (energy_j, checks) = (self.evaluator.energy_j(&trajectory), self.space.checks());
                 let (planning_s, first_s) = (budget.elapsed_s(), self.first_s);
-                Ok(Plan { trajectory, how, proof, score, energy_j, planning_s, first_s, checks, stages })
+                let tip_use = self.rules.as_ref().map(|rules| rules.used(&trajectory));
+                Ok(Plan {
+                    trajectory,
+                    how,
+                    proof,
+                    score,
+                    energy_j,
+                    planning_s,
+                    first_s,
+                    checks,
+                    tip_use,
+                    stages,
+                })
             }
             (None, Some(violation)) => {
                 if cut && matches!(violation, Violation::Unresolved { .. }) {

@@ -3,7 +3,7 @@ use super::Pipeline;
 use crate::collide::{Course, Motion};
 use crate::lanes::Lanes;
 use crate::objective::Objective;
-use crate::timing::{Timed, distance};
+use crate::timing::{Path, Timed, distance};
 use crate::tree::Space;
 use crate::world::World;
 use taustream_messages::way_points::Blend;
@@ -89,7 +89,10 @@ impl Pipeline<'_> {
             return false;
         }
         let level = |corner: usize| {
-            let is_free = |width: &f64| lanes.are_free(&rounded(whole, corner, *width), 0.0);
+            let is_free = |width: &f64| {
+                let poses_rad = rounded(whole, corner, *width);
+                lanes.are_free(&poses_rad, 0.0) && self.first_violating(&poses_rad).is_none()
+            };
             widths_rad.iter().position(is_free).unwrap_or(widths_rad.len() - 1)
         };
         let mut blends = Blends { widths_rad: &widths_rad, levels: (0..corners).map(level).collect() };
@@ -98,7 +101,7 @@ impl Pipeline<'_> {
                 return false;
             }
             let most_s = PROMISING * self.best_s();
-            let timed = self.path(whole).rounded(&blends.radians(), most_s);
+            let timed = self.timed(whole, &|path: &Path| path.rounded(&blends.radians(), most_s));
             let tightened = match timed {
                 None => blends.tighten_all(),
                 Some(timed) => match self.in_the_way(&timed.trajectory, lanes) {
@@ -133,6 +136,9 @@ impl Pipeline<'_> {
             i += 1.0;
         }
         self.space.note_checks(poses_rad.len());
+        if let Some(first) = self.first_violating(&poses_rad) {
+            return poses_rad.get(first).copied();
+        }
         lanes.first_blocked(&poses_rad, INSTANTS_EXTRA_M).map(|i| poses_rad[i])
     }
 

@@ -4,6 +4,7 @@
 //! found is shortened, rounded and proven at once; from then on there is an answer, and later stages can only replace it by
 //! a better one. A longer deadline does the same work first, then more, so it can only give a better motion.
 mod answer;
+mod constrained;
 mod corners;
 mod quick;
 mod slower;
@@ -13,6 +14,7 @@ pub(crate) use corners::blends_rad;
 
 use crate::budget::Budget;
 use crate::collide::{Course, StraightEdge, SweepRules, sweep_in_parts};
+use crate::constraints::TipRules;
 use crate::explain::{Explanation, Stage};
 use crate::kind::{Improvement, PlannerKind};
 use crate::margin_exit::MarginExit;
@@ -27,6 +29,7 @@ use crate::torque::TorqueLimits;
 use crate::tree::Space;
 use crate::verify::{Proof, Stretch, Violation, prove_candidate};
 use crate::world::World;
+use constrained::is_too_fast;
 use rustix::time::{ClockId, clock_gettime};
 use std::ops::Range;
 use std::time::Duration;
@@ -135,6 +138,8 @@ pub struct Pipeline<'a> {
     evaluator: &'a Evaluator<'a>,
     stage_budgets: StageBudgets,
     limits: [JointLimits; MAX_JOINTS],
+    /// What the tip must keep, where that is asked for.
+    rules: Option<TipRules<'a>>,
     /// What the drives can bear, where that is known.
     torque_limits: Option<TorqueLimits<'a>>,
     /// The time of the best motion by time, once motions of less energy are looked for: none of them is faster.
@@ -176,6 +181,8 @@ impl<'a> Pipeline<'a> {
             evaluator,
             stage_budgets: StageBudgets::of(options),
             limits: world.robot().limits(),
+            // Constraints that make no sense were refused before.
+            rules: TipRules::in_world(world, &options.constraints).unwrap_or_default(),
             torque_limits: TorqueLimits::of(world.robot()).ok(),
             least_s: None,
             refines_by_energy: false,
@@ -335,7 +342,8 @@ impl<'a> Pipeline<'a> {
     fn stay(&mut self, pose_rad: &JointArray) {
         let Some(trajectory) = stand_still(self.space.world.joints(), pose_rad) else { return };
         let whole = Stretch { world: self.space.world, span_s: [0.0, trajectory.duration_s()] };
-        match prove_candidate(&[whole], &trajectory, self.space.budget) {
+        let proof = prove_candidate(&[whole], &trajectory, self.space.budget);
+        match proof.and_then(|proof| self.prove_rules(&trajectory, proof)) {
             Ok(proof) => self.keep(trajectory, proof, "already there".to_owned()),
             Err(violation) => self.blame(violation),
         }
@@ -376,6 +384,10 @@ impl<'a> Pipeline<'a> {
     fn straight(&mut self, line: &[JointArray]) -> bool {
         let [from_rad, to_rad] = line else { return false };
         let edge = StraightEdge { from_rad, to_rad };
+        if let Some(why) = self.violating_line(line) {
+            self.note(format!("straight line ({why})"));
+            return false;
+        }
         let result =
             sweep_in_parts(self.space.world, &edge, [0.0, 1.0], &SweepRules::EDGE, self.space.budget);
         match result.map_err(|b| b.pair) {
@@ -420,11 +432,11 @@ impl<'a> Pipeline<'a> {
             }
             made += 1;
             let mut rng = SeededRng::new(self.options.seed, 10 + stream);
-            let search = searcher.search(&self.space, [start, goal], left, &mut rng);
+            let search = self.search_keeping(searcher, [start, goal], left, &mut rng);
             nodes += search.nodes;
             let Some(mut path) = search.path else { continue };
             found += 1;
-            shorten(&self.space, &mut path, SHORTCUTS, &mut rng);
+            shorten(&self.keeping(), &mut path, SHORTCUTS, &mut rng);
             let estimate_s = self.estimate_s(&path);
             let is_new = estimate_s < CLEARLY_LESS * self.least_estimate_s;
             if is_new {
@@ -476,7 +488,7 @@ impl<'a> Pipeline<'a> {
         };
         let free = corners.windows(2).all(|p| {
             let [a, b] = p else { return false };
-            self.space.is_edge_free(a, b)
+            self.is_edge_kept(a, b) && self.space.is_edge_free(a, b)
         });
         let evaluations = found.progress.evaluations;
         self.space.note_checks(evaluations * refine::POSES);
@@ -489,14 +501,14 @@ impl<'a> Pipeline<'a> {
             return None;
         }
         // The optimiser always has three control points; those that lie on the way are not needed.
-        shorten(&self.space, &mut corners, 0, &mut SeededRng::new(self.options.seed, 2));
+        shorten(&self.keeping(), &mut corners, 0, &mut SeededRng::new(self.options.seed, 2));
         Some(corners)
     }
 
     /// Times a path with a stop at every corner and proves the motion.
     fn propose(&mut self, path: &[JointArray], how: &str) {
         let corners = self.whole_path(path);
-        match self.path(&corners).stopping() {
+        match self.timed(&corners, &|path: &Path| path.stopping()) {
             Some(timed) => {
                 self.prove(&timed, how);
             }
@@ -523,7 +535,8 @@ impl<'a> Pipeline<'a> {
         for _ in 0..SLOWER_TRIES {
             let Some(stretches) = self.stretches(&timed.trajectory) else { return false };
             let left_s = stretches.first().map(|s| s.span_s[1]);
-            match prove_candidate(&stretches, &timed.trajectory, self.space.budget) {
+            let proof = prove_candidate(&stretches, &timed.trajectory, self.space.budget);
+            match proof.and_then(|proof| self.prove_rules(&timed.trajectory, proof)) {
                 Ok(proof) => {
                     match self.slowdown(&timed.trajectory, &proof) {
                         Ok(None) => {}
@@ -545,7 +558,8 @@ impl<'a> Pipeline<'a> {
                 Err(violation) => {
                     // Slower, a position limit stays in the way.
                     let limit = matches!(&violation, Violation::Limit { violation, .. }
-                        if violation.quantity != Quantity::Position);
+                        if violation.quantity != Quantity::Position)
+                        || is_too_fast(&violation);
                     self.blame(violation);
                     let Some(slower) = timed.slower(SLOWER).filter(|_| limit) else { return false };
                     timed = slower;

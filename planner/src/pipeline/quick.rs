@@ -4,6 +4,7 @@
 //! fails, and the next search looks at samples that are twice as near.
 use super::{CLEARLY_LESS, Pipeline, searched};
 use crate::collide::SweepRules;
+use crate::constraints;
 use crate::lanes::Lanes;
 use crate::rng::SeededRng;
 use crate::sampled::{Sampled, Sampling};
@@ -57,7 +58,11 @@ impl Pipeline<'_> {
             let sampling =
                 Sampling { spacing_m: (nearer * spacing_m).max(SPACING_M_MIN), ..SAMPLINGS[level] };
             let sampled = Sampled::new(&self.space, &lanes, [start, goal], sampling);
-            let search = rrt_connect(&sampled, start, goal, left, &mut rng);
+            let sampled = self.keeping_in(&sampled);
+            let search = match sampled.rules {
+                Some(rules) => constraints::search::search(rules, &sampled, [start, goal], left, &mut rng),
+                None => rrt_connect(sampled.field, start, goal, left, &mut rng),
+            };
             nodes += search.nodes;
             let Some(mut path) = search.path else {
                 // Narrow passages need what the first samplings leave out.

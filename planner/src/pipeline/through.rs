@@ -47,12 +47,12 @@ impl Pipeline<'_> {
     /// The straight line between two poses, or a shortened path around what blocks it.
     fn leg(&mut self, leg: &[JointArray], number: usize, checks_max: usize) -> Option<Vec<JointArray>> {
         let [from, to] = leg else { return None };
-        if self.space.is_edge_free(from, to) {
+        if self.is_edge_kept(from, to) && self.space.is_edge_free(from, to) {
             return Some(leg.to_vec());
         }
         let searcher = Searcher::RrtConnect;
         let mut rng = SeededRng::new(self.options.seed, 10 + number as u64);
-        let search = searcher.search(&self.space, [from, to], checks_max, &mut rng);
+        let search = self.search_keeping(searcher, [from, to], checks_max, &mut rng);
         let verdict = if search.path.is_some() { "" } else { ", nothing found" };
         self.note(format!(
             "{} for leg {} ({} {}{verdict})",
@@ -62,7 +62,7 @@ impl Pipeline<'_> {
             searcher.unit()
         ));
         let mut path = search.path?;
-        shorten(&self.space, &mut path, SHORTCUTS, &mut rng);
+        shorten(&self.keeping(), &mut path, SHORTCUTS, &mut rng);
         Some(path)
     }
 }

@@ -105,14 +105,25 @@ impl Service<'_> {
         (requested, options): (&CheckedPlanRequest, &PlanOptions),
         mut report: Report,
     ) -> Result<PlanOutcome, String> {
+        let (asked, running) = (requested.constraints, self.running_constraints(&report));
+        let mut options = *options;
         let ways: &[Way] = match requested.when {
+            When::Cancel => {
+                // A taper leaves the path.
+                options.constraints = running.ok_or(
+                    "parts of what runs keep different constraints of the tip; use `taustream stop`, which stays on the path",
+                )?;
+                &[Way::Taper]
+            }
+            // Rounding its end changes the motion before it, which keeps what was asked for there.
+            When::Queue if running != Some(asked) => &[Way::End],
             When::AtOnce if is_free_choice(options.planner) => &[Way::Direct, Way::RestFirst, Way::End],
             // Whoever names a searcher wants its path.
             When::AtOnce => &[Way::RestFirst, Way::End],
             When::AfterCurrent => &[Way::End],
             When::Queue => &[Way::PastEnd, Way::End],
-            When::Cancel => &[Way::Taper],
         };
+        let options = &options;
         let mut why = String::new();
         for way in ways {
             let tries = if *way == Way::End { END_TRIES } else { TRIES };
@@ -141,7 +152,7 @@ impl Service<'_> {
                 if phase == Phase::Holding && next.energised == 1 && requested.when != When::Cancel {
                     // It has ended meanwhile.
                     let planned = self.plan(request, next.command_rad, (requested, options))?;
-                    return Ok(self.send(request, &planned));
+                    return Ok(self.remembering(self.send(request, &planned), &asked));
                 }
                 if !runs(phase) {
                     return Err(not_ready(phase));
@@ -223,6 +234,11 @@ impl Service<'_> {
         {
             return Ok(Tried::TooLate(rejection));
         }
+        let running = self.running_constraints(report);
+        let asked = options.constraints;
+        // What was kept of the motion before keeps what was asked for there.
+        let is_one = made.replaces != end.replaces() || running == Some(asked);
+        self.remember(sent.trajectory_id, is_one.then_some(asked));
         let motion_s = made.trajectory.duration_s() - from_s;
         self.reported.step(format!("{way}: {}", made.how), planning_s, Some(motion_s));
         self.reported.motion((&made.trajectory, from_s), made.least.clone());

@@ -176,6 +176,8 @@ impl Service<'_> {
     ) -> Option<(u64, String)> {
         let begun = Instant::now();
         let cancel = AtomicBool::new(false);
+        // A stop stays on the path, and keeps whatever it keeps.
+        let constraints = self.running_constraints(report)?;
         let latency_s = self.latency.quantile_s() + LATENCY_MARGIN_S;
         for search_s in [0.0, SEARCH_S_MAX] {
             let left_s = spare_s - begun.elapsed().as_secs_f64() - latency_s;
@@ -189,7 +191,7 @@ impl Service<'_> {
                 return None;
             }
             let deadline = Duration::from_secs_f64(if search_s > 0.0 { search_s } else { left_s.min(1.0) });
-            let options = PlanOptions { deadline, ..PlanOptions::default() };
+            let options = PlanOptions { deadline, constraints, ..PlanOptions::default() };
             let goal_rad = cut.end_rad;
             let (robot, scene) = (&*revision.robot, &*revision.scene);
             let held_joints = cut.trajectory.as_ref().map_or(0, |motion| resting(robot, motion));
@@ -200,6 +202,7 @@ impl Service<'_> {
                 surroundings.direct((&cut, &[goal_rad]), &options)
             };
             if let Some(sent) = self.send_reroute(revision, &report, (&cut, made)) {
+                self.remember(sent.0, Some(constraints));
                 return Some(sent);
             }
         }

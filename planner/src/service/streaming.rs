@@ -249,6 +249,7 @@ impl Service<'_> {
         }
         check_robot(self.robot, &report).map_err(|e| refused(&e))?;
         self.know_neighbours().map_err(Failed::Refused)?;
+        self.unconstrained(&report, runs(phase)).map_err(Failed::Refused)?;
         let latency_s = (self.stream.latency.quantile_s() + LATENCY_MARGIN_S) * f64::from(1 << number);
         let start = self.start(&report, phase, latency_s)?;
         let revision = self.revision();

@@ -1,7 +1,9 @@
 //! Requests for the tip: poses of the joints that serve are tried, the nearest first; a straight line is planned at rest.
 use super::{Planned, Request, Service, holding};
 use crate::budget::Budget;
-use crate::goals::{GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line, tip_poses};
+use crate::goals::{
+    GOALS_MAX, GoalError, Orientation, Situation, TipSpeed, TipTarget, plan_line_keeping, tip_poses,
+};
 use crate::held::check_held;
 use crate::live_scene::SceneRevision;
 use crate::plan::{PlanOptions, StartMargin};
@@ -73,7 +75,8 @@ impl Service<'_> {
         let speed = TipSpeed { linear_m_s, angular_rad_s, off_m_max };
         let within = if options.spends_deadline { options.deadline } else { LINE_WITHIN };
         let planned = self.work(request, within, |cancel| {
-            plan_line(&situation, &target, &speed, &Budget::until(within, Some(cancel)))
+            let asked = (&speed, &options.constraints);
+            plan_line_keeping(&situation, &target, asked, &Budget::until(within, Some(cancel)))
         })?;
         let line = planned.map_err(|e| e.to_string())?;
         let how = format!("straight line of the tip, at most {:.3} mm off", 1e3 * line.off_m);

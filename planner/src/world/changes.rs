@@ -3,7 +3,7 @@ use super::{Other, RobotOf, StillBody, World};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use taustream_arm::body::to_parry;
-use taustream_arm::{Robot, Scene};
+use taustream_arm::{Robot, Scene, Zone};
 
 impl World<'static> {
     /// The same as [`World::new`], for a robot that is shared.
@@ -38,6 +38,12 @@ impl World<'_> {
         let mut world = Self { obstacles, margin_m: scene.margin_m, pairs: Vec::new(), ..self.clone() };
         world.pairs = world.pairs_to_keep(scene.margin_m);
         Ok(world)
+    }
+
+    /// Where tips have speed limits.
+    #[must_use]
+    pub fn zones(&self) -> &[Zone] {
+        &self.zones
     }
 
     /// The same world, of which only the pairs with these obstacles, and those of these links, count.

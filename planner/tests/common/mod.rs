@@ -49,7 +49,7 @@ pub(crate) fn random_spheres(rng: &mut SeededRng) -> Scene {
             obstacles.push(sphere(&format!("sphere{}", obstacles.len()), center_m, radius_m));
         }
     }
-    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles }
+    Scene { file: PathBuf::new(), margin_m: 0.02, obstacles, zones: Vec::new() }
 }
 
 /// UR5 rows (a, alpha, d) in m and rad, from the data sheet and not from the shipped file.
