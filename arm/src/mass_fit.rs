@@ -3,10 +3,10 @@
 //!
 //! Torques at rest are linear in the mass and the first moment (mass times centre) of everything that moves with a joint. Rest does
 //! not show all of them: what it does not show stays where the robot file has it, because each unknown is held to the file's value
-//! with an uncertainty that is stated here. The answer says of each body whether the torques told it.
+//! with an uncertainty that is stated here. The answer says of each body whether the torques determine it.
 //!
 //! Source: Atkeson, An and Hollerbach, "Estimation of inertial parameters of manipulator links and loads", International Journal
-//! of Robotics Research 5(3), 1986: torques linear in the parameters, ridge regression for those that cannot be told.
+//! of Robotics Research 5(3), 1986: torques linear in the parameters, ridge regression for those that cannot be determined.
 use crate::{NoMasses, Robot};
 use nalgebra::{SMatrix, SVector, Vector3};
 use taustream_motion::dynamics::{Body, Dynamics};
@@ -35,8 +35,8 @@ const FILE_MOMENT_KG_M: f64 = 0.005;
 /// How uncertain a payload is of which nothing is known.
 const PAYLOAD_KG: f64 = 20.0;
 const PAYLOAD_MOMENT_KG_M: f64 = 6.0;
-/// A body was told when the torques left less than this share of the uncertainty of its best known part.
-const TOLD_SHARE: f64 = 0.5;
+/// A body is determined when the torques leave less than this share of the uncertainty of its best known part.
+const DETERMINED_SHARE: f64 = 0.5;
 
 /// What was measured in one pose at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +76,8 @@ pub struct FittedBody {
     pub after: PointMass,
     /// Standard deviation of the mass that is left.
     pub mass_sigma_kg: f64,
-    /// True when the torques told something about it; otherwise it is mostly the file's.
-    pub is_told: bool,
+    /// True when the torques determine something of it; otherwise it is mostly the file's.
+    pub is_determined: bool,
 }
 
 /// How far model and drives agree at one joint.
@@ -391,13 +391,13 @@ impl Problem {
                 let name = robot.joints.get(joint).map_or_else(String::new, |joint| joint.name.clone());
                 return Err(MassFitError::Negative { joint, name, mass_kg: after_kg });
             }
-            let told = (0..PARTS).map(|part| solution.left[at + part]).fold(1.0, f64::min);
+            let left = (0..PARTS).map(|part| solution.left[at + part]).fold(1.0, f64::min);
             fitted.push(FittedBody {
                 joint,
                 before: point_mass(mass_kg, moment_kg_m),
                 after: point_mass(after_kg, moment_kg_m + Vector3::new(change(1), change(2), change(3))),
                 mass_sigma_kg: solution.left[at] * sigma(0),
-                is_told: told < TOLD_SHARE,
+                is_determined: left < DETERMINED_SHARE,
             });
         }
         Ok(fitted)

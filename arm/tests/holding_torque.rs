@@ -48,7 +48,7 @@ fn friction_and_readings_that_are_a_little_off_are_no_mismatch() {
 }
 
 #[test]
-fn what_is_not_measured_or_not_known_is_not_judged() {
+fn what_is_not_measured_or_not_known_is_not_checked() {
     let mut settings = settings();
     assert_eq!(settings.holding_mismatches(&pose(), &[f64::NAN; MAX_JOINTS]), []);
     settings.robot.joints.iter_mut().for_each(|joint| joint.torque_nm_max = None);

@@ -77,7 +77,7 @@ fn payload_is_found_that_the_file_does_not_state() {
         });
         let found = fit(&file, &measured(&truth, 12, (seed, 0.0)), Unknown::Payload).unwrap();
         let [payload] = found.bodies.as_slice() else { panic!("{name}: {:?}", found.bodies) };
-        assert!(payload.is_told && payload.before.mass_kg == 0.0, "{name}");
+        assert!(payload.is_determined && payload.before.mass_kg == 0.0, "{name}");
         assert!((payload.after.mass_kg - 1.3).abs() < 1e-3, "{name}: {payload:?}");
         assert!((payload.after.center_m - center_m).norm() < 1e-3, "{name}: {payload:?}");
         let worst = found.joints.iter().map(|joint| joint.unseen_rms_nm).fold(0.0, f64::max);
@@ -104,7 +104,7 @@ fn stated_uncertainty_covers_the_truth() {
     }
 }
 
-/// Goal: wrong masses of all links are mended as far as torques at rest show them: the model predicts poses that it has not seen.
+/// Goal: wrong masses of all links are corrected as far as torques at rest show them: the model predicts poses that it has not seen.
 #[test]
 fn links_are_fitted_so_that_unseen_poses_agree() {
     let file = robot("ur5.toml");
@@ -120,8 +120,8 @@ fn links_are_fitted_so_that_unseen_poses_agree() {
         let asked_nm = if off_nm == 0.0 { 0.02 * before_nm } else { 0.25 * before_nm };
         assert!(after_nm < asked_nm, "off {off_nm}: {before_nm} before, {after_nm} after");
         let base = found.bodies[0];
-        // A body that turns about gravity alone is not told by torques at rest, and stays as it was.
-        assert!(!base.is_told, "{base:?}");
+        // A body that turns about gravity alone is not determined by torques at rest, and stays as it was.
+        assert!(!base.is_determined, "{base:?}");
         assert!((base.after.mass_kg - base.before.mass_kg).abs() < 1e-6, "{base:?}");
     }
 }

@@ -264,6 +264,7 @@ impl LiveScene {
             obstacles: scene.obstacles.iter().take(own).chain(&self.occupied).cloned().collect(),
             file: scene.file.clone(),
             margin_m: scene.margin_m,
+            zones: scene.zones.clone(),
         });
         let world = match self.current.world.in_scene(&scene, &names) {
             Ok(world) => Arc::new(world),

@@ -73,7 +73,7 @@ fn plate(name: &str, size_m: [f64; 3], at_m: [f64; 3]) -> Obstacle {
 }
 
 fn only(obstacle: Obstacle) -> Scene {
-    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: vec![obstacle] }
+    Scene { file: PathBuf::new(), margin_m: 0.0, obstacles: vec![obstacle], zones: Vec::new() }
 }
 
 /// Goal: what a prismatic joint pushes through a thin thing is found, however short the levers about its axis are.

@@ -51,8 +51,8 @@ struct Body {
     before: Mass,
     after: Mass,
     mass_sigma_kg: f64,
-    /// Torques at rest told it.
-    told: bool,
+    /// Torques at rest determine it.
+    determined: bool,
 }
 
 /// A mass and its centre in the frame behind the joint.
@@ -85,7 +85,7 @@ impl Answer {
             before: body.before.into(),
             after: body.after.into(),
             mass_sigma_kg: body.mass_sigma_kg,
-            told: body.is_told,
+            determined: body.is_determined,
         };
         Self {
             arm: settings.name.clone(),
@@ -161,9 +161,13 @@ impl Body {
     /// What it is, and what of it is known.
     fn words(&self) -> String {
         let what = self.link.as_ref().map_or_else(|| "payload".to_owned(), |link| format!("link {link}"));
-        let told = if self.told { "" } else { " (not told by torques at rest; nearly as the file has it)" };
+        let how = if self.determined {
+            ""
+        } else {
+            " (not determined by torques at rest; nearly as the file has it)"
+        };
         let (before_kg, after_kg, sigma_kg) = (self.before.mass_kg, self.after.mass_kg, self.mass_sigma_kg);
-        format!("{what}: {before_kg:.3} kg before, {after_kg:.3} kg +- {sigma_kg:.3} now{told}")
+        format!("{what}: {before_kg:.3} kg before, {after_kg:.3} kg +- {sigma_kg:.3} now{how}")
     }
 
     /// As the file states it.
