@@ -1,8 +1,8 @@
 //! What the tip must keep along a whole motion: upright within an angle, inside a box, below a speed.
 //!
-//! Angle and place are constraints of poses: searches project their poses into what is allowed ([`mod@search`]), and straight edges
-//! and timed motions are proven by bisection with a step that cannot miss a violation ([`mod@poses`]). Speeds, of the whole motion and
-//! in the scene's zones, are a matter of timing ([`mod@speed`]). A motion without constraints, in a scene without zones, does none of
+//! Angle and place are constraints of poses: searches project their poses into what is allowed (`search.rs`), and straight edges
+//! and timed motions are proven by bisection with a step that cannot miss a violation (`poses.rs`). Speeds, of the whole motion and
+//! in the scene's zones, are a matter of timing (`speed.rs`). A motion without constraints, in a scene without zones, does none of
 //! this.
 mod fault;
 mod poses;
