@@ -56,8 +56,8 @@ fn neighbours_motion_counts_until_it_has_ended() {
         room.go(1, MIDDLE);
         room.wait_for_rest();
         // And now it is in the way at rest, which waiting does not change.
-        let (reason, for_now) = room.refusal(0, MIDDLE);
-        assert!(!for_now && reason.contains(&room.names[1]), "{reason}");
+        let reason = room.lasting_refusal(0, MIDDLE);
+        assert!(reason.contains(&room.names[1]), "{reason}");
     });
     assert!(room.least_distance_m() > MARGIN_M - SAMPLED_M);
 }

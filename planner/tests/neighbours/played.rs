@@ -253,8 +253,21 @@ impl Room {
         }
     }
 
+    /// The answer once the planner has seen what is true: an arm that has just come to rest still moves in its newest report.
+    fn settled(&self, side: usize, goal: [f64; 6]) -> PlanReply {
+        let mut reply = self.ask(side, goal);
+        wait_until("the planner has seen that both arms rest", || {
+            let is_behind = reply.is_for_now() && !self.is_moving(0) && !self.is_moving(1);
+            if is_behind {
+                reply = self.ask(side, goal);
+            }
+            !is_behind
+        });
+        reply
+    }
+
     pub(super) fn go(&self, side: usize, goal: [f64; 6]) {
-        let outcome = self.ask(side, goal).outcome();
+        let outcome = self.settled(side, goal).outcome();
         assert!(matches!(outcome, PlanOutcome::Planned { .. }), "{outcome:?}");
     }
 
@@ -262,6 +275,14 @@ impl Room {
         let reply = self.ask(side, goal);
         let PlanOutcome::Failed { reason } = reply.outcome() else { panic!("{:?}", reply.outcome()) };
         (reason, reply.is_for_now())
+    }
+
+    /// Why a goal is refused for good while both arms rest.
+    pub(super) fn lasting_refusal(&self, side: usize, goal: [f64; 6]) -> String {
+        let reply = self.settled(side, goal);
+        let PlanOutcome::Failed { reason } = reply.outcome() else { panic!("{:?}", reply.outcome()) };
+        assert!(!reply.is_for_now(), "{reason}");
+        reason
     }
 
     pub(super) fn is_moving(&self, side: usize) -> bool {
