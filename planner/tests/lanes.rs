@@ -114,18 +114,22 @@ fn pose(rng: &mut SeededRng, robot: &Robot) -> JointArray {
     pose
 }
 
-/// Goal: for every pose the lanes say what the exact model says, whatever the machine's instructions.
-/// Method: random scenes of every kind of shape, few obstacles and many; at least three poses in ten in contact, as many free.
-#[test]
-fn lanes_answer_as_the_exact_model_for_random_poses() {
+/// Arms of every kind of chain, each with how far from its base obstacles stand (m).
+fn robots() -> [(&'static str, Robot, f64); 4] {
     let shipped = |name: &str| Robot::load(&file(name)).expect("shipped");
-    let robots = [
+    [
         ("ur5.toml", shipped("ur5.toml"), 1.1),
         ("piper.toml", shipped("piper.toml"), 0.5),
         ("two arms", two_arms(shipped("ur5.toml")), 0.7),
         ("ur5 with slides", with_slides(shipped("ur5.toml")), 1.1),
-    ];
-    for (arm, (name, robot, far_m)) in robots.into_iter().enumerate() {
+    ]
+}
+
+/// Goal: for every pose the lanes say what the exact model says, whatever the machine's instructions.
+/// Method: random scenes of every kind of shape, few obstacles and many; at least three poses in ten in contact, as many free.
+#[test]
+fn lanes_answer_as_the_exact_model_for_random_poses() {
+    for (arm, (name, robot, far_m)) in robots().into_iter().enumerate() {
         let (mut free, mut all) = (0_u64, 0_u64);
         for number in 0..poses().div_ceil(POSES_PER_SCENE) {
             let mut rng = SeededRng::new(number, 60 + arm as u64);
@@ -194,14 +198,7 @@ fn lanes_answer_as_the_exact_model_next_to_contact() {
 /// Method: random scenes of every kind of shape, turns of every size; the exact model at random poses within each interval.
 #[test]
 fn no_pose_of_an_interval_keeps_less_than_its_bound() {
-    let shipped = |name: &str| Robot::load(&file(name)).expect("shipped");
-    let robots = [
-        ("ur5.toml", shipped("ur5.toml"), 1.1),
-        ("piper.toml", shipped("piper.toml"), 0.5),
-        ("two arms", two_arms(shipped("ur5.toml")), 0.7),
-        ("ur5 with slides", with_slides(shipped("ur5.toml")), 1.1),
-    ];
-    for (arm, (name, robot, far_m)) in robots.into_iter().enumerate() {
+    for (arm, (name, robot, far_m)) in robots().into_iter().enumerate() {
         let (mut all, mut moved, mut tight) = (0, 0, 0);
         for number in 0..poses().div_ceil(POSES_PER_SCENE) {
             let mut rng = SeededRng::new(number, 80 + arm as u64);

@@ -19,7 +19,7 @@ const CUTS: u32 = 4;
 const ROUNDS: usize = 4;
 /// Share of the parts that may be open for another round to be worth it.
 const WORTH: f64 = 0.6;
-/// Larger distances are not told apart where the least one is not looked for (m).
+/// Larger distances are not distinguished where the least one is not looked for (m).
 const ENOUGH_M: f64 = 0.02;
 
 /// Proves that a motion keeps every distance from `from` to `to`, as [`super::sweep()`] does.

@@ -24,7 +24,7 @@ pub(super) struct Pass<'a> {
     pub(super) poses_rad: &'a [JointArray],
     /// How far each joint can be from there within the interval (m for a prismatic one).
     pub(super) turns_rad: &'a [JointArray],
-    /// Larger distances need not be told apart (m).
+    /// Larger distances need not be distinguished (m).
     pub(super) enough_m: f64,
     pub(super) scratch: &'a mut Scratch,
     pub(super) kept: &'a mut Vec<Kept>,
