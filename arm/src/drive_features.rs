@@ -2,7 +2,7 @@
 //!
 //! The profile demands little beside the state machine, and drives differ in the rest. What a drive lacks is never skipped
 //! in silence: bring-up refuses it by object, and its owner states here that the drive has it solved by other means.
-use crate::document::{Value, shown};
+use crate::document::Value;
 use crate::profile_limits::{self, ProfileLimits};
 use crate::reader::{Bounds, Table};
 
@@ -395,14 +395,7 @@ fn read_limits(table: &mut Table<'_>) -> Option<WrittenLimits> {
 fn read_position_mode(table: &mut Table<'_>) -> Option<PositionMode> {
     const KEY: &str = "position_mode";
     const EXPECTED: &str = "\"cyclic\" (cyclic synchronous position, mode 8) or \"interpolated\" (interpolated position, mode 7)";
-    let Some(word) = table.text_if_there(KEY, EXPECTED) else {
-        return (!table.had(KEY)).then_some(PositionMode::Cyclic);
-    };
-    let known = PositionMode::ALL.into_iter().find(|choice| choice.word() == word);
-    if known.is_none() {
-        table.fault(KEY, &shown(&word), EXPECTED);
-    }
-    known
+    table.choice_or(KEY, EXPECTED, PositionMode::Cyclic, (&PositionMode::ALL, PositionMode::word))
 }
 
 fn read_absent(table: &mut Table<'_>) -> Option<AbsentObjects> {
@@ -436,14 +429,12 @@ fn read_supervision(table: &mut Table<'_>) -> Option<MasterSupervision> {
     const KEY: &str = "master_supervision";
     const EXPECTED: &str = "\"heartbeat\" (0x1016), \"setpoint-timer\" (the event timer of its RPDO, 0x1400:05) or \"drive\" \
                             (set in the drive)";
-    let Some(word) = table.text_if_there(KEY, EXPECTED) else {
-        return (!table.had(KEY)).then_some(MasterSupervision::Heartbeat);
-    };
-    let known = MasterSupervision::ALL.into_iter().find(|choice| choice.word() == word);
-    if known.is_none() {
-        table.fault(KEY, &shown(&word), EXPECTED);
-    }
-    known
+    table.choice_or(
+        KEY,
+        EXPECTED,
+        MasterSupervision::Heartbeat,
+        (&MasterSupervision::ALL, MasterSupervision::word),
+    )
 }
 
 #[cfg(test)]

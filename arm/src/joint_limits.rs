@@ -77,16 +77,8 @@ const STOP_JERK_RATIO: f64 = 4.0;
 /// The kind of a joint of rows; revolute where nothing is said. `None` is a fault.
 pub(crate) fn read_kind(table: &mut Table<'_>) -> Option<JointKind> {
     const EXPECTED: &str = "\"revolute\" (rad) or \"prismatic\" (m)";
-    if !table.has("kind") {
-        table.take("kind");
-        return Some(JointKind::Revolute);
-    }
-    let word = table.text("kind", EXPECTED)?;
-    let kind = [JointKind::Revolute, JointKind::Prismatic].into_iter().find(|kind| kind.word() == word);
-    if kind.is_none() {
-        table.fault("kind", &shown(&word), EXPECTED);
-    }
-    kind
+    let all = [JointKind::Revolute, JointKind::Prismatic];
+    table.choice_or("kind", EXPECTED, JointKind::Revolute, (&all, JointKind::word))
 }
 
 /// The kind that a table seems to mean, where nothing else says it: so that one fault is not followed by others.

@@ -5,7 +5,6 @@
 //! which no setpoint exceeds (0x6083 and 0x6084, ramps of the drive's own profiles: below its motion limits). In which unit a drive takes them must be stated, because no object states it reliably.
 //!
 //! Source: CiA 402-2, "Profile position mode": 0x607F, 0x6080, 0x6083 to 0x6085, 0x60C5, 0x60C6.
-use crate::document::shown;
 use crate::reader::Table;
 use crate::velocity_unit::{self, VelocityUnit};
 
@@ -72,10 +71,5 @@ fn read_use(table: &mut Table<'_>) -> Option<LimitUse> {
     const KEY: &str = "apply";
     const EXPECTED: &str =
         "\"compare\" (the drive is refused where one is below the joint's) or \"write\" (set and read back)";
-    let word = table.text(KEY, EXPECTED)?;
-    let known = LimitUse::ALL.into_iter().find(|choice| choice.word() == word);
-    if known.is_none() {
-        table.fault(KEY, &shown(&word), EXPECTED);
-    }
-    known
+    table.choice(KEY, EXPECTED, (&LimitUse::ALL, LimitUse::word))
 }

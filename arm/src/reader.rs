@@ -2,7 +2,7 @@
 //!
 //! A [`Table`] hands out its keys one by one; a key that is not requested is unknown. A getter returns `None` after
 //! noting the fault, and the caller continues to the next key: a description is only built when the list is empty.
-use crate::document::{Entry, Node, Value, key_shown};
+use crate::document::{Entry, Node, Value, key_shown, shown};
 use crate::{Fault, Faults};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -301,6 +301,42 @@ impl<'b> Table<'b> {
     pub(crate) fn text_if_there(&mut self, key: &'static str, expected: &str) -> Option<String> {
         let node = self.take(key)?;
         self.text_of(key, &node, expected)
+    }
+    /// One of several choices by its word; `None` only after a fault.
+    pub(crate) fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        expected: &str,
+        (all, word): (&[T], fn(T) -> &'static str),
+    ) -> Option<T> {
+        let text = self.text(key, expected)?;
+        self.chosen(key, expected, &text, (all, word))
+    }
+    /// The same with what holds where the key is absent.
+    pub(crate) fn choice_or<T: Copy>(
+        &mut self,
+        key: &'static str,
+        expected: &str,
+        absent: T,
+        (all, word): (&[T], fn(T) -> &'static str),
+    ) -> Option<T> {
+        let Some(text) = self.text_if_there(key, expected) else {
+            return (!self.had(key)).then_some(absent);
+        };
+        self.chosen(key, expected, &text, (all, word))
+    }
+    fn chosen<T: Copy>(
+        &mut self,
+        key: &'static str,
+        expected: &str,
+        text: &str,
+        (all, word): (&[T], fn(T) -> &'static str),
+    ) -> Option<T> {
+        let known = all.iter().copied().find(|choice| word(*choice) == text);
+        if known.is_none() {
+            self.fault(key, &shown(text), expected);
+        }
+        known
     }
     fn text_of(&self, key: &str, node: &Node, expected: &str) -> Option<String> {
         if let Value::Text(text) = &node.value

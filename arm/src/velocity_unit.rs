@@ -1,7 +1,6 @@
 //! The unit of velocities in a CiA 402 drive: by the profile position units a second, in many drives revolutions of the motor.
 //!
 //! Nothing in the drive states it reliably (0x60A9 is optional), so the owner does.
-use crate::document::shown;
 use crate::reader::Table;
 use std::f64::consts::TAU;
 
@@ -51,12 +50,7 @@ impl VelocityUnit {
 pub(crate) fn read(table: &mut Table<'_>) -> Option<VelocityUnit> {
     const KEY: &str = "velocity_unit";
     const EXPECTED: &str = "\"counts/s\", \"rpm\" or \"0.1rpm\" (of the motor): the unit in which the drive takes speeds, and a second, accelerations";
-    let word = table.text(KEY, EXPECTED)?;
-    let known = VelocityUnit::ALL.into_iter().find(|unit| unit.word() == word);
-    if known.is_none() {
-        table.fault(KEY, &shown(&word), EXPECTED);
-    }
-    known
+    table.choice(KEY, EXPECTED, (&VelocityUnit::ALL, VelocityUnit::word))
 }
 
 #[cfg(test)]
